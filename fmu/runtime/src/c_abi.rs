@@ -22,11 +22,12 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of a function.
+/// Return value of an FMI function, which tells the host whether the call succeeded: [`OK`],
+/// [`DISCARD`], [`ERROR`] or [`FATAL`].
 pub type Status = c_int;
 /// The call succeeded.
 pub const OK: Status = 0;
-/// Status of warnings in the log; no function returns it.
+/// Status with which warnings are sent to the host's log; no function returns it.
 pub const WARNING: Status = 1;
 /// The FMU cannot compute the result, and the instance is unchanged.
 pub const DISCARD: Status = 2;
@@ -61,7 +62,8 @@ impl Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
 
-    /// Logs why a call has failed, under the category for its severity.
+    /// Writes the reason why a call has failed to the host's log, under the log category for the
+    /// severity of the failure.
     pub fn report(&self, fault: &Fault) {
         self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
     }
@@ -76,13 +78,15 @@ impl Log {
         }
     }
 
-    /// Logs a warning about a side effect of a call.
+    /// Writes a warning to the host's log that `call` has had a side effect, which `effect`
+    /// describes.
     #[cold]
     pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
         self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));
     }
 
-    /// Logs a warning about the host's steps, once, if the model has one.
+    /// Writes the model's warning about the host's communication steps to the host's log, if there
+    /// is one, at most once per instance.
     pub fn report_step_warning<M: Model, V: Version>(&mut self, instance: &Instance<M, V>) {
         if !self.step_warned
             && self.filter.wants(Topic::Warning)
@@ -142,8 +146,11 @@ pub unsafe fn text(string: *const c_char) -> Option<String> {
     Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
 }
 
-/// Borrows an array of the host for reading. A NULL pointer is allowed for an empty array; otherwise it is an error whose
-/// message has the argument's `name`.
+/// Borrows an array that the host passes as the argument `name`, for reading. The pointer may be
+/// NULL if the array is empty.
+///
+/// # Errors
+/// If the pointer is NULL and the array is not empty; the message contains `name`.
 pub unsafe fn array<'a, T>(
     call: &Call,
     name: &str,
@@ -159,7 +166,10 @@ pub unsafe fn array<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// Borrows an array of the host for writing; otherwise like [`array`].
+/// Borrows an array that the host passes as the argument `name`, for writing results.
+///
+/// # Errors
+/// If the pointer is NULL and the array is not empty; the message contains `name`.
 pub unsafe fn array_mut<'a, T>(
     call: &Call,
     name: &str,
@@ -175,10 +185,10 @@ pub unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// Borrows a variable of the host for one result.
+/// Borrows the variable of the host, passed as the pointer argument `name`, into which a function
+/// writes one result.
 ///
 /// # Errors
-///
 /// If the pointer is NULL.
 pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
     unsafe { pointer.as_mut() }.ok_or_else(|| null_argument(call, name))
@@ -205,7 +215,8 @@ fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     kind ^ table ^ u64::from(version) ^ handle.addr() as u64
 }
 
-/// Lowest address of an object on the platforms for which FMUs are built.
+/// Lowest address that a component can have on the platforms for which FMUs are built. Smaller
+/// handles are refused without being read.
 const LOWEST_ADDRESS: usize = 1024;
 
 /// The object to which a component handle points.
@@ -215,11 +226,12 @@ pub struct Component<M: Model, V: Version> {
     mark: u64,
     pub instance: Instance<M, V>,
     pub log: Log,
-    /// Data about the host that this version of FMI needs.
+    /// Data that only this version of FMI keeps about the host, for example its callbacks.
     pub host: V::Host<M>,
 }
 
-/// Creates a component and returns its handle.
+/// Creates the component of an instance, to which the handle points that the host gets from
+/// fmi2Instantiate or fmi3Instantiate…, and returns this handle.
 pub fn new_component<M: Model, V: Version>(
     instance: Instance<M, V>,
     log: Log,
@@ -230,7 +242,8 @@ pub fn new_component<M: Model, V: Version>(
     Box::into_raw(component).cast()
 }
 
-/// Returns true if a handle points to a live `T`, whose first field is a mark.
+/// Returns true if `handle` points to a live component or saved state `T`, whose first field is its
+/// mark (see [`mark`]). `kind` is the constant that the mark contains for this type.
 unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bool {
     handle.addr() >= LOWEST_ADDRESS
         && handle.cast::<T>().is_aligned()
@@ -246,7 +259,8 @@ unsafe fn free<T>(handle: *mut c_void) {
     }
 }
 
-/// Frees a component. Any other handle is ignored.
+/// Frees the component behind a handle that the host passes to fmi2FreeInstance or
+/// fmi3FreeInstance. A handle that is not the handle of a live component is ignored.
 pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     unsafe {
         if is_live::<Component<M, V>, M, V>(handle, COMPONENT) {
@@ -335,7 +349,10 @@ pub fn silence_panics() {
 
 // ---- Functions that both versions have ----
 
-/// Returns the filter for the log categories that the host names.
+/// Returns the filter for the host's log that lets the named log categories pass.
+///
+/// # Errors
+/// If a name is unknown or NULL.
 pub unsafe fn filter<M: Model>(
     call: &Call,
     categories: *const *const c_char,
@@ -348,7 +365,7 @@ pub unsafe fn filter<M: Model>(
     Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))
 }
 
-/// Fills an array of the host by `body`.
+/// Fills an array that the host passes to a getter with the values that `body` writes.
 pub unsafe fn fill<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -427,7 +444,8 @@ struct SavedState<M: Model, V: Version> {
     instance: Instance<M, V>,
 }
 
-/// Creates a saved state and returns its handle.
+/// Creates a saved state, which is a copy of an instance, and returns the handle with which the
+/// host refers to it.
 pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void {
     let mut state = Box::new(SavedState { mark: 0, instance });
     state.mark = mark::<M, V>(STATE, ptr::from_ref(&*state).cast());
@@ -471,7 +489,8 @@ pub unsafe fn save_state<M: Model, V: Version>(
     Ok(())
 }
 
-/// Writes the number of bytes of a serialised state to `size`.
+/// Writes the number of bytes that a saved state has when it is serialised to the host's variable
+/// `size`.
 pub unsafe fn serialized_size<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,

@@ -25,7 +25,7 @@ impl Interface {
     }
 }
 
-/// The party that handles events.
+/// The party, host or FMU, that handles events such as the start of sticking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Events {
@@ -128,7 +128,8 @@ pub enum CType {
     String,
 }
 
-/// Sets of instance states, as bits, in which a function is allowed.
+/// Sets of instance states in which a function is allowed. A set is an integer with one bit per
+/// state.
 #[allow(missing_docs)]
 pub(crate) mod states {
     use super::InstanceState;
@@ -155,7 +156,8 @@ pub struct Call {
     /// Name of the function, with which its messages begin.
     pub name: &'static str,
     allowed: u16,
-    /// The C type of the values that the function reads or sets; `None` for other functions.
+    /// The C type of the values if the function reads or sets values of variables; `None` for all
+    /// other functions.
     pub c_type: Option<CType>,
     only_in: Option<Interface>,
 }
@@ -165,11 +167,11 @@ impl Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// Checks that the call is allowed.
+    /// Checks that the host may make this call with the interface, the handler of events and the
+    /// present state of the instance.
     ///
     /// # Errors
-    ///
-    /// If it is not; the message names the states in which it is.
+    /// If it may not; the message names the instance states in which it may.
     #[inline]
     pub fn check(
         &self,

@@ -18,9 +18,10 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// An instant for the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// Time of the host, s. It is a label of the instant in messages and outputs.
+    /// Time by the host's clock, s. Messages and outputs name the instant by this time.
     pub time: f64,
-    /// Time since the start, s, in Model Exchange. In Co-Simulation the model adds up the step sizes.
+    /// Time since the start of the simulation, s, in Model Exchange. `None` in Co-Simulation, where
+    /// the model adds up the step sizes instead.
     pub since_start: Option<f64>,
     /// Times of the host that differ by less than this are equal, s.
     pub resolution: f64,
@@ -39,13 +40,14 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Returns a clock at the time `start`, s; `stop` is the end of the experiment, if the host gives one.
+    /// Returns a clock that shows the time `start`, s. `stop` is the end of the experiment, s, if
+    /// the host gives one.
     pub fn new(interface: Interface, start: f64, stop: Option<f64>) -> Clock {
         let is_hosts = interface == Interface::ModelExchange;
         Clock { start, stop, time: start, is_hosts, last_event: f64::NEG_INFINITY }
     }
 
-    /// Returns the present instant.
+    /// Returns the present instant, that is, the present time with its resolution.
     pub fn now(&self) -> Instant {
         self.at(self.time, 0.0)
     }
@@ -68,7 +70,7 @@ impl Clock {
         DRIFT * (time - self.start).abs().max(h) + self.resolution(time)
     }
 
-    /// Returns true if two times are equal within rounding.
+    /// Returns true if two times of the host, s, are equal within rounding.
     pub fn is_same(&self, a: f64, b: f64) -> bool {
         (a - b).abs() <= self.resolution(a)
     }
@@ -78,10 +80,9 @@ impl Clock {
         is_finite(time) && time < end - self.resolution(end)
     }
 
-    /// Checks a step from `at` with size `h`.
+    /// Checks that the host may make a step of size `h`, s, from the time `at`, s.
     ///
     /// # Errors
-    ///
     /// If such a step is not allowed; the text is the reason.
     #[inline(always)]
     pub fn check_step(&self, at: f64, h: f64) -> Result<(), String> {
@@ -124,7 +125,8 @@ impl Clock {
         Ok(())
     }
 
-    /// Returns the stop time if the present time is after it.
+    /// Returns the stop time, s, if the present time is after it by more than a clock's rounding
+    /// error.
     pub fn passed_stop(&self) -> Option<f64> {
         self.stop.filter(|stop| self.time > stop + self.tolerance(*stop, 1.0))
     }

@@ -4,12 +4,12 @@ use std::fmt::Debug;
 
 pub use crate::clock::Instant;
 
-/// Failure of a step.
+/// Reason why the model could not compute a step, as a text for the user.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct StepFailure {
     pub text: String,
-    /// True if a shorter step may succeed.
+    /// True if the step may succeed when the host tries it again with a shorter length.
     pub shorter_may_succeed: bool,
 }
 
@@ -20,14 +20,15 @@ impl From<&str> for StepFailure {
     }
 }
 
-/// End of a step that stops at events.
+/// Instant at which a step of [`Model::step_to_event`] has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum StepEnd {
     End,
-    /// The step has reached its end, where there is an event.
+    /// The step has reached its end, and there is an event at that instant.
     EventAtEnd,
-    /// There is an event before the end, this long after the start of the step, s.
+    /// The step has stopped at an event before its end. The number is the time from the start of
+    /// the step to the event, s.
     Event(f64),
 }
 
@@ -47,11 +48,13 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// Discrete values that inputs can change immediately; `()` for a model without events.
     type Discrete: Default;
 
-    /// True if outputs depend not only on the inputs' values but also on their slopes.
+    /// True if outputs depend on the inputs' slopes too, for example because an output is a time
+    /// derivative.
     const OUTPUTS_USE_SLOPES: bool = false;
 
-    /// Name of the parameter that counts elements (for example tanks) which have event indicators. Each element has the
-    /// same number of indicators, and the indicators are in the order of the elements.
+    /// Name of the parameter that counts the elements with event indicators, for example the tanks.
+    /// Each element has the same number of indicators, and the indicators are in the order of the
+    /// elements. `None` if the number of indicators does not depend on a parameter.
     const INDICATORS_OF: Option<&'static str> = None;
 
     /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is
@@ -84,8 +87,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         None
     }
 
-    /// Appends the saved state except parameters and inputs: always
-    /// [`About::saved_words`](crate::table::About::saved_words) words.
+    /// Appends the states of the model to `words` for a saved state; parameters and inputs are
+    /// saved by the caller. The number of words is always
+    /// [`About::saved_words`](crate::table::About::saved_words).
     fn save(&self, words: &mut Vec<u64>);
 
     /// Restores a saved state with the same parameters. Returns `None` if the words are not a state.
@@ -101,8 +105,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         self.step(inputs, h).map(|()| StepEnd::End)
     }
 
-    /// Applies the discrete changes that the present inputs cause, see [`Model::apply_present_inputs`], without the
-    /// possibility to revert them.
+    /// Applies the discrete changes that the present inputs cause, as
+    /// [`Model::apply_present_inputs`] does, but for good, so that they cannot be reverted.
     fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
         let _ = inputs;
     }

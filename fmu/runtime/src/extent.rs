@@ -21,19 +21,21 @@ use crate::model::Model;
 use crate::table::{GUID_LENGTH, Scalar, Table};
 use crate::variable::{Access, Causality, Dimension, Value};
 
-/// Name of the file of start values, in the folder of resources.
+/// Name of the file in the FMU's folder `resources` that has the start values of a reduced model
+/// description.
 pub const START_VALUES: &str = "start_values.txt";
 
 const DIGITS: usize = SIZES + 6;
 
 const SIZES: usize = 3;
 
-/// The part of the table that a reduced description contains.
+/// The part of the table of variables that a reduced model description contains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extent {
     token: String,
     sizes: Vec<(&'static str, usize)>,
-    /// Indices in the model of the continuous states, in the host's order.
+    /// Numbers of the continuous states that the reduced description has, as the model counts them,
+    /// in the order in which the host reads them.
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
@@ -85,10 +87,10 @@ impl Extent {
         Some(Extent { token: token.into(), sizes, places, indicators, starts, inputs: Vec::new() })
     }
 
-    /// Reads the description's start values from the folder of resources, if they differ from the table's.
+    /// Reads the start values of the reduced description from the FMU's folder `resources`, if they
+    /// differ from the start values in the table.
     ///
     /// # Errors
-    ///
     /// If the file is missing, belongs to another description, or does not fit the table.
     pub fn read_starts<M: Model>(&mut self, resources: Option<&Path>) -> Result<(), String> {
         let expected = &self.token[GUID_LENGTH - 5..GUID_LENGTH - 1];
@@ -142,7 +144,7 @@ impl Extent {
         Ok(())
     }
 
-    /// Returns the GUID (FMI 2.0) or instantiationToken (FMI 3.0).
+    /// Returns the GUID (FMI 2.0) or instantiationToken (FMI 3.0) of the reduced description.
     pub fn token(&self) -> &str {
         &self.token
     }
@@ -194,7 +196,8 @@ fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) 
     }
 }
 
-/// Returns the checksum of a file of start values for a token.
+/// Returns the checksum of a file of start values, which is part of the GUID or token of a reduced
+/// description: four hexadecimal digits.
 pub fn checksum(text: &str) -> String {
     // 0 means that there is no file.
     let sum = (Hash::new().bytes(text.as_bytes()).value() & 0xffff).max(1);
@@ -202,8 +205,8 @@ pub fn checksum(text: &str) -> String {
 }
 
 impl<M: Model> Table<M> {
-    /// Returns the names and largest values of the parameters that size arrays, in the order of their first
-    /// array.
+    /// Returns, in the order of their first array, the parameters that say how many elements arrays
+    /// have: the name of each and its largest value.
     pub fn sizes(&self) -> Vec<(&'static str, usize)> {
         let mut sizes: Vec<(&'static str, usize)> = Vec::new();
         for dimension in self.variables.iter().flat_map(|variable| variable.shape) {
@@ -218,7 +221,8 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if the indices of this scalar are within the sizes, so that the reduced description contains it.
+    /// Returns true if a reduced description with these `sizes` contains this scalar, that is, if
+    /// the indices of the scalar do not exceed them.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {
@@ -268,7 +272,8 @@ mod tests {
         Extent::from_token::<Trays>(&token, whole)
     }
 
-    /// The test model has at most three trays, each with its level as a state; by default it has two.
+    /// A reduced description's token contains the number of states. The test model has at most
+    /// three trays, each with its level as a state; by default it has two.
     #[test]
     fn a_token_contains_the_number_of_states() {
         assert_eq!(extent_with("000000000").unwrap().places(), [0_usize; 0]);

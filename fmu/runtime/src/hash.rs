@@ -1,7 +1,7 @@
 //! FNV-1a with 128 bits, which distinguishes tables and byte strings identically on every platform. It
 //! protects against mistakes, not against attackers.
 
-/// A hash value that is being computed.
+/// A hash value to which bytes and texts are added one after another.
 #[derive(Clone, Copy, Debug)]
 pub struct Hash(u128);
 

@@ -19,9 +19,9 @@ use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Causality, Value, Variable};
 use crate::version::Version;
 
-/// Relative tolerance if the host gives none.
+/// Relative tolerance of the integration if the host gives none.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
-/// Range of tolerances that a host can set.
+/// Range of the relative tolerances of the integration that a host can set.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 /// Limit of the magnitude of continuous states. Powers and products of larger states could overflow, although
 /// no real motion reaches it.
@@ -36,32 +36,35 @@ pub struct Instance<M: Model, V: Version> {
     version: PhantomData<V>,
     pub(crate) interface: Interface,
     pub(crate) events: Events,
-    /// Form in which the host sees arrays: as variables, or as their elements.
+    /// Form in which the host's model description has arrays: as one variable each, or as one
+    /// variable for each element.
     pub(crate) layout: Layout,
     /// The part of the variables that the model description read by the host contains; `None` for all.
     pub(crate) extent: Option<Arc<Extent>>,
     pub(crate) state: InstanceState,
     pub(crate) clock: Clock,
     pub(crate) tolerance: f64,
-    /// Values of the parameters in the order of the table, even if they are not allowed.
+    /// Values of the parameters in the order of the table. They may be outside their ranges,
+    /// because they are checked only at the end of initialization.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
     pub(crate) sloped: bool,
-    /// True while the inputs have the slopes of the step that has just ended. Until an input is set, outputs
-    /// are then limits from the left.
+    /// True from the end of a step with linearly changing inputs until an input is set. The inputs
+    /// still have the slopes of that step meanwhile, so that outputs are limits from the left.
     pub(crate) past_slopes: bool,
     /// The model. It is created when it is needed for the first time in initialization mode, and dropped when
     /// a parameter or input is set before the simulation starts.
     pub(crate) model: Option<M>,
     pub(crate) outputs: Option<M::Outputs>,
-    /// Values of the discrete outputs as the host saw them last in event mode, by slot
-    /// ([`Events::Reported`]). Empty until initialization has ended; before that discrete outputs are
-    /// computed like all others.
+    /// Values of the discrete outputs, by slot, as the host saw them when it was last in event
+    /// mode; needed if events are handled as [`Events::Reported`]. Empty until initialization has
+    /// ended; before that, discrete outputs are computed like all others.
     pub(crate) shown: Vec<i32>,
     scratch: [Vec<f64>; 2],
 }
 
-/// Indices in the model of the continuous states, in the host's order.
+/// Iterator over the numbers of the continuous states as the model counts them, in the order in
+/// which the host reads them.
 struct Places<M: Model> {
     extent: Option<Arc<Extent>>,
     next: usize,
@@ -127,7 +130,6 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
         }
     }
 
-    /// Copies without allocating memory if the existing memory is large enough.
     fn clone_from(&mut self, other: &Self) {
         let mut parameters = std::mem::take(&mut self.parameters);
         parameters.clone_from(&other.parameters);
@@ -221,7 +223,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.clock.time
     }
 
-    /// Makes the instance unusable after a panic, because its values cannot be trusted.
+    /// Makes the instance unusable: after a panic its values cannot be trusted, so every further
+    /// call except freeing is refused.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
     }
@@ -316,7 +319,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 None => reasons.push((why, vec![scalar.name()])),
             }
         }
-        /// Number of names in a message; more would hide the reason.
+        /// Largest number of parameter names in one message. More names would hide the reason.
         const NAMED: usize = 6;
         warnings.extend(reasons.into_iter().map(|(why, names)| {
             let verb = if names.len() == 1 { "has" } else { "have" };
@@ -808,7 +811,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(found.map(|(known, _)| V::reference(known)).collect())
     }
 
-    /// Displaces states and inputs by up to `share` of their nominal values, differently for each `point`.
+    /// Displaces states and inputs by up to `share` of their nominal values, each `point` in
+    /// another direction. Derivatives at such nearby points show which dependencies vanish only at
+    /// the present point.
     fn move_aside(&mut self, share: f64, point: u64) {
         // Multiples of the golden ratio fill the interval uniformly.
         let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;
@@ -1619,7 +1624,9 @@ mod tests {
     use crate::tests::trays::Trays;
     use crate::v3::Fmi3;
 
-    /// Levels have the nominal value 5 m, inputs 4 m/s: aside by up to a hundredth of it, inputs upwards, within their range.
+    /// The nearby points at which dependencies are tested: states with the nominal value 5 m and
+    /// inputs with the nominal value 4 m/s move by up to a hundredth of it, inputs upwards, within
+    /// their range.
     #[test]
     fn nearby_points_for_differences_move_every_state_and_input_by_a_share_of_its_size() {
         let moved = |share: f64, point: u64, q: f64| {

@@ -21,7 +21,7 @@ pub enum Topic {
     Failure(Severity),
 }
 
-/// A log category of the model description.
+/// A log category of the model description, which the host can switch on and off.
 #[derive(Clone, Debug)]
 #[allow(missing_docs)]
 pub struct Category {
@@ -61,7 +61,7 @@ pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     all.map(|&(name, topic)| Category { name, description: description(topic), topic }).collect()
 }
 
-/// Returns the category of messages on a topic.
+/// Returns the name of the log category to which messages on a topic belong.
 pub fn category(topic: Topic) -> &'static str {
     NAMES.iter().find(|(_, of)| *of == Some(topic)).map_or("logAll", |(name, _)| name)
 }
@@ -94,11 +94,11 @@ impl Filter {
         Filter { discard: true, error: true, fatal: true, ..self }
     }
 
-    /// Selects only these categories; an empty list selects all.
+    /// Returns the selection of messages in the log categories `names`; an empty list selects all
+    /// messages.
     ///
     /// # Errors
-    ///
-    /// If names are unknown; the text lists them and the known ones.
+    /// If names are unknown; the text lists them and the known names.
     pub fn from_categories<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
         let known = category_names(table);
         if names.is_empty() {

@@ -41,7 +41,7 @@ const HAS_SLOPES: u8 = 4;
 const HAS_PAST_SLOPES: u8 = 8;
 const HAS_SHOWN: u8 = 16;
 
-/// Returns the number of bytes, which is the same for every state of a model.
+/// Returns the number of bytes of a serialised state, which is the same for every state of a model.
 pub fn size<M: Model>() -> usize {
     let table = M::table();
     let head = 8 + 4 + 4 + 38 + 4 + 5 * 8;
@@ -236,8 +236,8 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(format!("the saved state is damaged: {what}")) }
     }
 
-    /// Reads the value of a parameter of the same type as `like`. It need not be in its range, because a
-    /// state can be saved before initialization ends.
+    /// Reads the value of a parameter, which must have the type of `like`, from a saved state. The
+    /// value may be outside its range, because a state can be saved before initialization ends.
     fn value<M: Model>(&mut self, scalar: &Scalar<M>, like: Value) -> Result<Value, String> {
         let bytes = self.take()?;
         let number = i32::try_from(i64::from_le_bytes(bytes));

@@ -23,7 +23,7 @@ pub struct About {
     /// Description of events for the log; "" without events.
     pub events: &'static str,
     pub event_indicators: usize,
-    /// Number of words that [`Dynamics::save`] writes.
+    /// Number of 64-bit words that [`Dynamics::save`] writes for a saved state.
     pub saved_words: usize,
 }
 
@@ -43,7 +43,7 @@ pub struct Table<M: Dynamics> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// Correspondence of the table's entries to variables of FMI.
+/// Way in which the entries of the table become variables of FMI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Layout {
@@ -81,7 +81,8 @@ pub const fn join<M: Dynamics, const N: usize>(parts: &[&[Variable<M>]]) -> [Var
     all
 }
 
-/// Consecutive scalars: index of the first, and of the one after the last.
+/// Range of consecutive scalars in the table: the index of the first scalar, and the index after
+/// the last scalar.
 type Span = (usize, usize);
 
 /// Returns the range of indices of one kind of scalars: 'i' for inputs, 'p' for parameters, any other character for
@@ -109,7 +110,7 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
     (begin, end)
 }
 
-/// A scalar of the table.
+/// A scalar of the table: a scalar variable, or one element of an array.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
@@ -118,16 +119,17 @@ pub struct Scalar<M: Dynamics> {
     pub access: Access<M>,
     /// C type in which the scalar is read and set. It is copied from the table's entry, because every call needs it.
     pub c_type: CType,
-    /// Function that returns the index of the continuous state, if the scalar is one. It is copied from the table's entry,
-    /// because every call needs it.
+    /// Function that returns the number of the continuous state, if this scalar is a continuous
+    /// state. It is copied from the table's entry, because every call needs it.
     pub state: Option<Place>,
     /// Index among all scalars, from which the value reference follows (see
     /// [`Version`](crate::version::Version)).
     pub index: u32,
     /// Number of the element in its array, 0 for the first.
     pub element: usize,
-    /// For a parameter the number of scalar parameters before it; for a discrete output the number of
-    /// discrete outputs before it.
+    /// For a parameter the number of scalar parameters before it in the table; for a discrete
+    /// output the number of discrete outputs before it. It is the index in the instance's arrays of
+    /// values.
     pub slot: usize,
 }
 
@@ -201,7 +203,8 @@ impl<M: Dynamics> Scalar<M> {
         self.variable.element_name(self.element)
     }
 
-    /// Returns the index among the model's continuous states, if it is one.
+    /// Returns the number of the continuous state, as the model counts states, if this scalar is a
+    /// continuous state.
     #[inline]
     pub fn state(&self) -> Option<usize> {
         self.state.map(|place| place(self.element))
@@ -331,7 +334,8 @@ impl<M: Dynamics> Table<M> {
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the indices in the model of the continuous states, in the host's order.
+    /// Returns the numbers of the continuous states as the model counts them, in the order in which
+    /// the host reads them.
     pub fn places(&self) -> impl ExactSizeIterator<Item = usize> + use<M> {
         self.derivatives().iter().map(|s| match s.access {
             Access::Derivative(place) => place(s.element),
@@ -339,12 +343,12 @@ impl<M: Dynamics> Table<M> {
         })
     }
 
-    /// Finds the scalar of the continuous state with this index in the model.
+    /// Finds the scalar that is continuous state number `place` of the model.
     pub fn state_at(&self, place: usize) -> Option<&'static Scalar<M>> {
         self.scalars.iter().find(|s| s.state() == Some(place))
     }
 
-    /// Returns the units that the variables use.
+    /// Returns the units that the variables of the table use.
     pub fn units(&self) -> impl Iterator<Item = &'static Unit> {
         let used = |unit: &&Unit| {
             self.variables
@@ -434,7 +438,6 @@ mod tests {
         }
     }
 
-    /// The GUID is a hash of names, types, units and other attributes of the variables, but not of their descriptions.
     #[test]
     fn the_guid_has_the_right_form_and_does_not_depend_on_descriptions() {
         let guid = Spring::table().guid();

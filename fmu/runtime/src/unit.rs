@@ -7,7 +7,8 @@ pub struct Unit {
     pub name: &'static str,
     /// Exponents of kg, m, s, rad; `None` if they are not integers.
     pub base: Option<[i32; 4]>,
-    /// Display units, each with the factor by which a value is multiplied.
+    /// Units in which hosts may show a value, each with the factor by which the value in this unit
+    /// is multiplied.
     pub display_units: &'static [(&'static str, f64)],
 }
 

@@ -202,7 +202,8 @@ fn wrong_reference<M: Model>(reference: u32, found: Option<&Scalar<M>>) -> Strin
     }
 }
 
-/// Result of fmi2NewDiscreteStates.
+/// Result of fmi2NewDiscreteStates, which tells the host about the events that were handled and the
+/// next time event.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
@@ -329,7 +330,8 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Returns a property of the last step, or discards the call if `known` has no value for this kind.
+/// Writes a property of the last step to the host's variable: `known` returns the value for a kind
+/// of status. The call is discarded if `known` has no value for this kind.
 unsafe fn write_step_status<M: Model, T>(
     c: fmi2Component,
     call: &'static Call,

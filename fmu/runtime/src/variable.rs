@@ -60,7 +60,7 @@ pub enum Causality {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Quantity {
-    /// Unit, SI; "" if it depends on parameters.
+    /// Unit of the SI value, for example "N.m"; "" if the unit depends on parameters.
     pub unit: &'static str,
     pub display_unit: Option<&'static str>,
     pub min: Option<f64>,
@@ -113,7 +113,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
-/// Maps the number of an array's element, 0 for the first, to the index of a continuous state.
+/// Function from the number of an array's element, 0 for the first, to the number of the continuous
+/// state that this element is.
 pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
@@ -146,12 +147,13 @@ impl Dimension {
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub enum Access<M: Dynamics> {
-    /// Value and slope of an input.
+    /// An input; the function returns the places of its value and its slope.
     Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
     Output(fn(&M::Outputs, usize) -> f64),
     OutputInteger(fn(&M::Outputs, usize) -> i32),
     OutputBoolean(fn(&M::Outputs, usize) -> bool),
-    /// Function of parameters and present inputs that returns the value, and its rate for the inputs' slopes.
+    /// A variable that follows only from parameters and present inputs; the function returns its
+    /// value, and its rate of change for the inputs' slopes.
     OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
     Boolean(fn(&mut M::Parameters) -> &mut bool),
@@ -183,7 +185,8 @@ pub struct Variable<M: Dynamics> {
     pub access: Access<M>,
     /// Dimensions of an array; empty for a scalar.
     pub shape: &'static [Dimension],
-    /// Index of the continuous state, if it is one.
+    /// For a continuous state the function that returns its number as the model counts states;
+    /// otherwise `None`.
     pub state: Option<Place>,
     /// True if events can make this state discontinuous.
     pub reinit: bool,
@@ -192,11 +195,12 @@ pub struct Variable<M: Dynamics> {
     pub follows_inputs: bool,
     /// True if this parameter can be set during the simulation.
     pub tunable: bool,
-    /// Inputs and continuous states on which it depends without delay. The name of an array stands for all
-    /// elements, and with "[]" for the element with the same index.
+    /// Inputs and continuous states on which the variable depends without delay. The name of an
+    /// array stands for all its elements; the name with "[]" stands for the element with the index
+    /// of the variable.
     pub depends_on: &'static [&'static str],
-    /// Further parameters and inputs on which its initial value depends. A name that ends with a dot stands
-    /// for all parameters that begin with it.
+    /// Further parameters and inputs on which the initial value of the variable depends. A name
+    /// that ends with a dot stands for all parameters that begin with it.
     pub initial_depends_on: &'static [&'static str],
 }
 
@@ -368,13 +372,15 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Declares that events can make this state discontinuous.
+    /// Declares that events can make this continuous state discontinuous, such as a velocity at an
+    /// impact.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
     }
 
-    /// Declares that during a step this input follows from other inputs.
+    /// Declares that during a step this input follows from other inputs, for example a rate from an
+    /// acceleration.
     pub const fn follows_inputs(mut self) -> Self {
         self.follows_inputs = true;
         self
@@ -398,7 +404,8 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Returns the number of scalars: the product of the largest lengths of all dimensions.
+    /// Returns the number of scalars that the variable has: the product of the largest lengths of
+    /// all dimensions.
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {

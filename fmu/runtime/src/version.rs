@@ -12,12 +12,12 @@ use crate::table::{Layout, Scalar};
 pub trait Version: std::fmt::Debug + 'static {
     const PREFIX: &'static str;
 
-    /// Data about the host, other than the logger, that an instance needs.
+    /// Data that an instance keeps about its host in this version of FMI, other than the logger.
     type Host<M: Model>;
 
     /// The instance state after a failed call, if it changes.
     const AFTER_ERROR: Option<InstanceState>;
-    /// Severity of a value outside its range that is refused immediately.
+    /// Severity of the failure if a call sets a value outside its range.
     const OUT_OF_RANGE: Severity;
     /// The instance state after initialization mode if the host handles events.
     const FIRST_EVENT: InstanceState;
@@ -58,13 +58,12 @@ pub trait Version: std::fmt::Debug + 'static {
         events == Self::events(interface)
     }
 
-    /// Returns the value reference of a scalar.
+    /// Returns the value reference by which the host refers to a scalar in this version of FMI.
     fn reference<M: Model>(scalar: &Scalar<M>) -> u32;
 
-    /// Finds the scalar of a value reference.
+    /// Finds the scalar to which a host's value reference belongs.
     ///
     /// # Errors
-    ///
     /// If there is none, or it does not have this C type.
     fn scalar<M: Model>(
         reference: u32,

@@ -10,17 +10,19 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Dimension, Value, Variable};
 
-/// The scalars of each variable, with the present sizes.
+/// The scalars of each array variable, with the array sizes that the structural parameters have at
+/// present.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
     /// Value references of the scalars, variable by variable.
     scalars: Vec<u32>,
     ends: Vec<usize>,
     types: Vec<CType>,
-    /// For each scalar its array and its position in the array, counted from 1; position 0 is outside the present
-    /// size.
+    /// For each scalar the number of its array and its position among the array's elements, counted
+    /// from 1; position 0 says that the scalar is outside the array's present size.
     places: Vec<(u32, usize)>,
-    /// Indices of the existing states among the largest possible number of states, in the host's order.
+    /// Numbers of the continuous states that exist with the present array sizes, counted among the
+    /// states of the largest arrays, in the order in which the host reads them.
     states: Vec<usize>,
 }
 
@@ -62,7 +64,8 @@ impl Arrays {
         arrays
     }
 
-    /// Returns the scalars of a value reference.
+    /// Returns the scalars, by their indices in the table, that the variable with this value
+    /// reference has; `None` if there is no such variable.
     pub fn scalars(&self, reference: u32) -> Option<&[u32]> {
         let n = (reference as usize).checked_sub(1)?;
         let begin = if n == 0 { 0 } else { *self.ends.get(n - 1)? };
@@ -92,8 +95,8 @@ impl Arrays {
         (place.1 > 0).then_some(place)
     }
 
-    /// Returns the indices of the existing states among the largest possible number of states, in the host's
-    /// order.
+    /// Returns the numbers of the continuous states that exist with the present array sizes,
+    /// counted among the states of the largest arrays, in the order in which the host reads them.
     pub fn states(&self) -> &[usize] {
         &self.states
     }
@@ -112,7 +115,8 @@ fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     }
 }
 
-/// Returns the lengths of a variable along its dimensions for these values of the structural parameters.
+/// Returns the lengths of a variable along its dimensions. `size` returns the value of a structural
+/// parameter by its name.
 pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
     let length = |dimension: &Dimension| match dimension {
         Dimension::Fixed(length) | Dimension::Used(_, length) => *length,
@@ -143,7 +147,8 @@ pub fn time<M: Model>() -> u32 {
     M::table().variables.len() as u32 + 1
 }
 
-/// Name of the event indicators.
+/// Name of the array variable of event indicators, which FMI 3.0 requires besides the variables of
+/// the table.
 pub const INDICATORS: &str = "event_indicator";
 
 /// Returns the name of a variable by its value reference; `None` if there is none.

@@ -48,7 +48,7 @@ mod list {
 }
 pub use list::*;
 
-/// FMI 3.0.
+/// FMI 3.0, as an implementation of [`Version`].
 #[derive(Clone, Copy, Debug)]
 pub struct Fmi3;
 

@@ -15,7 +15,8 @@ pub(super) struct Dependency {
     independent_element: usize,
 }
 
-/// Finds the scalars on which a variable depends in the present state, and how.
+/// Finds the scalars on which a variable depends in the present state, each with the kind of the
+/// dependency.
 pub(super) fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
@@ -55,8 +56,8 @@ pub(super) fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// Returns the dependencies of a variable: until the end of initialization mode the dependencies of its initial value, then
-/// the present dependencies.
+/// Writes the dependencies of a variable to the host's arrays: until the end of initialization mode
+/// the dependencies of its initial value, afterwards the present ones.
 pub(super) unsafe fn write_dependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,

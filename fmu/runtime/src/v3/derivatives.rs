@@ -42,8 +42,8 @@ pub(super) unsafe fn directional_derivative<M: Model>(
     }
 }
 
-/// Computes the derivative of a weighted sum of the unknowns with respect to each known, each as a
-/// directional derivative.
+/// Computes the derivative of a weighted sum of the unknowns with respect to each known. Each
+/// derivative is computed as a directional derivative along that known.
 pub(super) unsafe fn adjoint_derivative<M: Model>(
     instance: fmi3Instance,
     (unknowns, n_unknowns): References,

@@ -1,4 +1,5 @@
-//! Translates value references of the host to scalars, and checks numbers of values.
+//! Translates the host's value references to scalars of the table, and checks that a call has as
+//! many values as scalars.
 
 use std::borrow::Cow;
 
@@ -11,7 +12,7 @@ use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::{Dimension, Value};
 
-/// Checks that there is one value for each reference, if all variables are scalars.
+/// Checks, if every variable is a scalar, that the host passes one value for each value reference.
 #[inline]
 pub(super) fn check_count(call: &Call, references: usize, values: usize) -> Result<(), Fault> {
     if references == values {
@@ -112,8 +113,8 @@ pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     }
 }
 
-/// Resets everything that is sized by changed structural parameters to its start values. If the host had set
-/// other values, a warning says that they are lost.
+/// Sets everything that is sized by the changed structural parameters to its start values. If the
+/// host had set other values, a warning in its log says that they are lost.
 pub(super) fn start_resized<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

@@ -12,7 +12,8 @@ pub struct Host<M: Model> {
     pub(super) early_return_allowed: bool,
     pub(super) required: Vec<fmi3ValueReference>,
     pub(super) phase: Phase,
-    /// Values of the inputs at the end of the next part of the step, as far as they are set.
+    /// Values that the host has set for inputs at the end of the next part of a step, in an
+    /// intermediate update.
     pub(super) ends: M::Inputs,
     pub(super) set: Vec<fmi3ValueReference>,
     pub(super) indicators: Vec<f64>,

@@ -59,7 +59,7 @@ pub(super) fn wrong_reference<M: Model>(
     }
 }
 
-/// A variable that is not in the table.
+/// A variable of FMI 3.0 that the table does not contain: the time or an event indicator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Extra {
@@ -76,14 +76,16 @@ pub(super) fn extra_variable<M: Model>(reference: u32) -> Option<Extra> {
     }
 }
 
-/// Returns the names of the extra variables, in the order of their value references.
+/// Returns the names of the variables that the table does not contain, time and event indicators,
+/// in the order of their value references.
 pub fn extra_names<M: Model>() -> Vec<String> {
     let indicators = 1..=M::table().about.event_indicators;
     let indicators = indicators.map(|n| format!("event_indicator[{n}]"));
     std::iter::once("time".to_string()).chain(indicators).collect()
 }
 
-/// Returns the value reference of the independent variable; the event indicators follow.
+/// Returns the value reference of the time, the independent variable. The event indicators have the
+/// value references after it.
 pub fn time_reference<M: Model>() -> u32 {
     M::table().scalars.len() as u32 + 1
 }

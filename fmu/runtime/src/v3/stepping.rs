@@ -1,4 +1,4 @@
-//! Co-Simulation: steps, intermediate update and early return.
+//! Steps of FMI 3.0 Co-Simulation, with intermediate update and early return.
 
 #![allow(unsafe_code)]
 

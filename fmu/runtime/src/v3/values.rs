@@ -167,7 +167,8 @@ fn set_arrays<M: Model>(
     Ok(())
 }
 
-/// Sets inputs within a step: their values at the end of the next part of the step.
+/// Sets inputs within a step, that is, their values at the end of the part of the step that
+/// follows.
 #[cold]
 fn set_ends<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -199,8 +200,8 @@ fn set_ends<M: Model>(
     Ok(())
 }
 
-/// Checks the arguments of a function for a type that no variable has: it succeeds without references and
-/// otherwise fails.
+/// Checks the arguments of a getter or setter for a type that no variable has: the call succeeds if
+/// it has no references, and otherwise fails.
 fn check_no_variable<M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
