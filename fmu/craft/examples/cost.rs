@@ -19,7 +19,8 @@ use plant::{FrictionModel, Plant, SloshModel};
 
 const STEP: f64 = 0.02;
 
-/// A torque that swings at w rad/s, from knot k to the next, and its slope.
+/// Returns a torque that oscillates at `w`, rad/s, at the start of step number `k`, and its slope
+/// over this step.
 fn torque(size: f64, w: f64, step: f64, k: usize) -> (f64, f64) {
     let at = |k: usize| size * f64::sin(w * step * k as f64);
     (at(k), (at(k + 1) - at(k)) / step)

@@ -75,7 +75,7 @@ impl Default for Appendage {
 }
 
 impl Appendage {
-    /// Returns true if the mode moves the craft, or moves at the start.
+    /// Returns true if the mode has any effect: it moves the craft, or it moves at the start.
     pub(crate) fn acts(&self) -> bool {
         self.participation != [0.0; 6] || self.eta != 0.0 || self.eta_dot != 0.0
     }
@@ -127,8 +127,9 @@ impl Mode {
         ww[0] * xx + ww[1] * yy + ww[2] * zz + (ww[3] * xy + ww[4] * xz + ww[5] * yz) * 2.0
     }
 
-    /// Returns the part of -eta'', the mode's deceleration, that depends neither on the craft's acceleration a nor on
-    /// its angular acceleration w'. `turning` is w.(D w), see the module's head.
+    /// Returns minus the acceleration eta'' of the mode, without its parts that depend on the
+    /// craft's acceleration a and on its angular acceleration w'. `turning` is w.(D w), see the
+    /// module's head.
     fn pull<T: Number>(&self, eta: T, rate: T, turning: T) -> T {
         rate * self.damping + eta * self.stiffness - turning * 0.5
     }
@@ -227,7 +228,7 @@ impl Structure {
         }
     }
 
-    /// Returns the deformed appendages for the states x.
+    /// Returns the deformed appendages at an instant from the continuous states `x`.
     pub fn deformed_at<T: Number>(&self, x: &[T; STATES]) -> Deformed<T> {
         self.deformed(&x[index::ETA..], &x[index::ETA_DOT..])
     }
@@ -289,7 +290,8 @@ impl Structure {
         modes.fold(T::constant(0.0), |sum, (mode, rate)| sum + *rate * *rate * mode.damping)
     }
 
-    /// Returns the largest speed |eta'| + omega |eta| + |eta''| t of a mode, for error control.
+    /// Returns the largest speed of a mode, |eta'| + omega |eta| + |eta''| t, to which its allowed
+    /// error is relative.
     pub fn speed_scale(&self, eta: &[f64], rate: &[f64], second: &[f64], t: f64) -> f64 {
         let states = eta.iter().zip(rate.iter().zip(second));
         self.modes.iter().zip(states).fold(0.0, |most, (mode, (eta, (rate, second)))| {
@@ -344,14 +346,16 @@ pub(crate) struct Flexing {
     momentum: Vector,
     moment: Vector,
     growth: [Symmetric; ORDER + 1],
-    /// The vectors w x y and D w, and their sums with K and L (see the module's head).
+    /// The vectors w x y and D w, and the sums of these vectors with K and L (see the module's
+    /// head).
     turned: Vector,
     grown: Vector,
     flow: Vector,
     spin: Vector,
     pull: [f64; APPENDAGES],
     second: [f64; APPENDAGES],
-    /// True while coefficient 1 is the derivative along a direction.
+    /// True while coefficient 1 of the series is a derivative along a direction of the states and
+    /// not a derivative by time.
     along: bool,
 }
 
@@ -499,7 +503,8 @@ impl Flexing {
         ]
     }
 
-    /// Sets coefficient n + 1 of all rates from coefficient n of [a; w'].
+    /// Sets coefficient n + 1 of the rates of all modes from coefficient n of the craft's
+    /// accelerations [a; w'].
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let order = (n + 1) as f64;
         for (j, mode) in self.structure.modes.iter().enumerate() {
@@ -525,7 +530,8 @@ impl Flexing {
             .fold(0.0, |sum, (mode, rate)| sum + mode.damping * series::square(n, rate))
     }
 
-    /// Returns the scale of eta' within the time `t`, for error control.
+    /// Returns the scale of the modes' rates eta' within the time `t`, s, to which their allowed
+    /// error is relative.
     pub fn speed_scale(&self, t: f64) -> f64 {
         let [eta, rate, second] = [(&self.eta, 0), (&self.rate, 0), (&self.rate, 1)]
             .map(|(of, n)| self.coefficients(of, n));
@@ -538,7 +544,8 @@ impl Flexing {
             .fold(0.0, |most, rate| if rate[n].abs() > most { rate[n].abs() } else { most })
     }
 
-    /// Writes the states at `t` after the start, from the series up to order n.
+    /// Writes displacement and rate of every mode at `t`, s, after the start of the expansion into
+    /// the states `x`, from the series up to order n.
     pub fn write_states(&self, x: &mut [f64; STATES], n: usize, t: f64) {
         for j in 0..self.structure.len() {
             let [eta, rate] = series::values([&self.eta[j], &self.rate[j]], n, t);
@@ -546,7 +553,8 @@ impl Flexing {
         }
     }
 
-    /// Updates the rates for an impulse that changes the craft's velocity by dV (of O) and dw, body axes.
+    /// Updates the modes' rates for an impulse on the craft that changes the velocity of O by `dv`
+    /// and the angular velocity by `dw`, both in body axes.
     pub fn after_impulse(&self, x: &mut [f64; STATES], dv: Vec3, dw: Vec3) {
         for (j, mode) in self.structure.modes.iter().enumerate() {
             x[index::ETA_DOT + j] -= dot(mode.p, dv) + dot(mode.l, dw);

@@ -135,8 +135,8 @@ impl Bob {
         }
     }
 
-    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates with `w`.
-    /// Both are normalised first.
+    /// Starts an expansion at the bob's direction and rate `x` (tank axes, six numbers), which are
+    /// normalised first. The craft rotates with the angular velocity `w`.
     #[inline(always)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let p = times(&self.axes, [x[0], x[1], x[2]]);
@@ -290,8 +290,8 @@ impl Bob {
         }
     }
 
-    /// Returns coefficient N (0 or 1) of the rates of the bob's six states in tank axes: of p' for its direction p, and
-    /// of p'' = v' - w' x p - w x p' for the rate of the direction.
+    /// Returns the rates of the bob's six states in tank axes, or for N = 1 their derivatives along
+    /// the direction: p' of the bob's direction p, and p'' = v' - w' x p - w x p' of its rate.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
@@ -300,8 +300,8 @@ impl Bob {
         [p_d[0], p_d[1], p_d[2], p_dd[0], p_dd[1], p_dd[2]]
     }
 
-    /// Returns the scale of the bob's velocity v for error control, 1/s: the rate of the swing plus the rate that
-    /// gravity or centring gives to the angle.
+    /// Returns the scale, 1/s, to which the allowed error of the bob's velocity v is relative: the
+    /// rate of the swing plus the rate that gravity or centring gives to the angle.
     #[inline(always)]
     pub fn rate_scale(&self) -> f64 {
         let stiffness = largest(self.specific_force[0]) * self.inv_l + self.k_m;
@@ -325,12 +325,14 @@ impl Bob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Stores the value that the series of v' has at `h`, from the series up to order n.
+    /// Stores v', the derivative of the bob's velocity, at `h`, s, after the start of the
+    /// expansion, from the series up to order n, for [`Bob::slope_defect`].
     pub fn store_slope(&mut self, n: usize, h: f64) {
         self.slope = space::value(&self.v_d, n - 1, h);
     }
 
-    /// Returns the difference of the stored v' from v' at the start of the expansion, 1/s^2.
+    /// Returns the difference, 1/s^2, between the v' that [`Bob::store_slope`] has stored and v' at
+    /// the start of the present expansion.
     pub fn slope_defect(&self) -> f64 {
         largest(sub(self.slope, self.v_d[0]))
     }
@@ -345,7 +347,7 @@ impl Bob {
         [number(&self.p), number(&self.p_d), number(&self.specific_force)]
     }
 
-    /// Returns the force on the craft and its torque about O, body axes.
+    /// Returns the force of the bob on the craft and its torque about O, both in body axes.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let tension = T::with_slope(self.tension[0], self.tension[1]) * self.m;

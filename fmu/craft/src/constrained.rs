@@ -235,7 +235,8 @@ impl HigherSeries {
         ]
     }
 
-    /// Sets coefficient n of the rate on which the drag depends; [`HigherSeries::expand`] must have computed order n.
+    /// Sets coefficient n of the rate of the bob that determines its drag. [`HigherSeries::expand`]
+    /// must have computed order n.
     fn set_rate(&mut self, n: usize, r: &Vector, r_d: Vec3, u: &Series) {
         let (mut radial, mut tangential) = (0.0, 0.0);
         for j in 1..=n {
@@ -288,7 +289,8 @@ fn dot_from_1(n: usize, a: &Vector, b: &Vector) -> f64 {
     sum[0] + sum[1] + sum[2]
 }
 
-/// Returns coefficient n of the series of |a|^2 without the component along the axis (index 2).
+/// Returns coefficient n of the square of a vector's part across the tank's axis, the components
+/// with the indices 0 and 1.
 fn square_across(n: usize, a: &Vector) -> f64 {
     let mut sum = [0.0; 2];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
@@ -354,8 +356,8 @@ impl ConstrainedBob {
         })
     }
 
-    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates with `w`.
-    /// Both are normalised first.
+    /// Starts an expansion at the bob's direction and rate `x` (tank axes, six numbers), which are
+    /// normalised first. The craft rotates with the angular velocity `w`.
     #[inline(never)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let [p, p_d] = self.projected([x[0], x[1], x[2]], [x[3], x[4], x[5]]);
@@ -615,8 +617,8 @@ impl ConstrainedBob {
         [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
     }
 
-    /// Returns the first time within `h` at which the bob reaches the bound of its surface, from the series
-    /// up to order n.
+    /// Returns the first time within `h`, s, at which the bob reaches the end of its surface (the
+    /// slosh angle up to which the model is valid), from the series up to order n.
     pub fn bound(&self, n: usize, h: f64) -> Option<f64> {
         let highest = self.highest?;
         let mut below = self.eta.map(|eta| -eta);
@@ -624,7 +626,8 @@ impl ConstrainedBob {
         first_root(&below[..=n], h)
     }
 
-    /// Returns the message for a bob beyond the bound of its surface; `name` is the tank's name in the FMU.
+    /// Returns the message for a bob that has passed the end of its surface, the slosh angle up to
+    /// which the model is valid. `name` is the tank's name in the FMU.
     pub fn bound_message(&self, name: &str) -> String {
         let higher = self.surface.higher().unwrap_or_default();
         surface::bound_message(self.coefficients, higher, self.mode, name)
@@ -699,13 +702,15 @@ impl ConstrainedBob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Stores the value that the series of V' has at `h`, from the series up to order n.
+    /// Stores V', the derivative of the bob's velocity, at `h`, s, after the start of the
+    /// expansion, from the series up to order n, for [`ConstrainedBob::slope_defect`].
     pub fn store_slope(&mut self, n: usize, h: f64) {
         let horner = |sum: Vec3, k: usize| add(scale(h, sum), scale(k as f64, self.v[k]));
         self.slope_at_end = (1..=n).rev().fold([0.0; 3], horner);
     }
 
-    /// Returns the difference of the stored V' from V' at the start of the expansion, 1/s^2.
+    /// Returns the difference, 1/s^2, between the V' that [`ConstrainedBob::store_slope`] has
+    /// stored and V' at the start of the present expansion.
     pub fn slope_defect(&self) -> f64 {
         largest(sub(self.slope_at_end, self.v[1]))
     }

@@ -42,8 +42,8 @@ const SMALLEST: f64 = 1e-4;
 
 const CORNER: f64 = 0.02;
 
-/// Breaking of a mode's waves: zeta_b, the steepness s_b at which it `begins` with sqrt(s_b^2 + delta^2), and
-/// k a/A, 1/rad.
+/// Damping by breaking waves of a mode: zeta_b, the steepness s_b at which breaking `begins`, with
+/// sqrt(s_b^2 + delta^2), and the steepness per amplitude k a/A, 1/rad.
 #[derive(Clone, Copy, Debug)]
 struct Breaking {
     zeta: f64,
@@ -67,7 +67,7 @@ impl Breaking {
 /// Largest step as a share of the time to the nearest singularity of a power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// The power series of w f(k a) and of the products in it.
+/// Power series of the damping by breaking waves, w f(k a), and of the products in it.
 #[derive(Clone, Debug)]
 struct Excess {
     law: Breaking,

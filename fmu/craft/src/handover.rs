@@ -31,7 +31,8 @@ pub(crate) trait Carrier {
 
     fn ball_state(&mut self, lump: usize) -> &mut BallState;
 
-    /// Returns the six numbers of the detached liquid, position and velocity, among the states.
+    /// Returns position and velocity of the detached liquid number `lump`, six numbers, among the
+    /// carrier's states.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
     /// Returns the six states of one bob of the lump's tank: its direction p and its velocity v relative to the hinge.
@@ -39,10 +40,12 @@ pub(crate) trait Carrier {
 
     fn directions(&self, lump: usize) -> Directions;
 
-    /// Returns the bobs of the lump's tank with their present motion, after [`Carrier::evaluate_at`].
+    /// Returns the bobs of the tank in which the detached liquid number `lump` is, with their
+    /// present motion. [`Carrier::evaluate_at`] must have been called.
     fn bobs_beside(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>>;
 
-    /// Returns all bobs and lumps that move, after [`Carrier::evaluate_at`].
+    /// Returns the masses that move in the tanks, all bobs and all detached liquids, with their
+    /// present motion. [`Carrier::evaluate_at`] must have been called.
     fn points(&self) -> impl Iterator<Item = BobNow<f64>>;
 
     fn rigid(&self) -> Rigid;
@@ -54,7 +57,7 @@ pub(crate) trait Carrier {
     /// Returns the acceleration a, the angular velocity w and the angular acceleration w' of the carrier.
     fn motion(&self) -> [&Vector; 3];
 
-    /// Returns the factors of the mass matrix with everything attached to the carrier.
+    /// Returns the factorised mass matrix of the carrier with everything attached to it.
     fn factors(&self) -> &Factors;
 
     fn dissipated(&mut self) -> &mut f64;
@@ -139,8 +142,9 @@ pub(crate) trait Carrier {
         (mass, scale(1.0 / mass, momentum))
     }
 
-    /// Detaches the liquid from the bottom. The liquid's centre keeps its velocity. Motions within the liquid end in its shape,
-    /// and the carrier takes over their moment of momentum.
+    /// Detaches the liquid of the tank with the number `lump` from the bottom at the time `t`. The
+    /// liquid's centre keeps its velocity. Motions within the liquid end in its shape, and the
+    /// carrier takes over their moment of momentum.
     fn leave(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let center = self.lump(lump).common_center(&self.directions(lump));
@@ -157,7 +161,8 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// Reflects the lump at the wall, or holds it there if it is slow and pressed to the wall.
+    /// Reflects the detached liquid at the wall, or holds it there if it is slow and pressed to the
+    /// wall.
     fn throw_back(&mut self, lump: usize, t: f64) {
         let before = self.memory();
         let (e, contact_speed) = self.lump(lump).restitution();
@@ -176,8 +181,9 @@ pub(crate) trait Carrier {
         self.strike(lump, e, t);
     }
 
-    /// Moves a lump that a host has integrated through the wall back onto the wall. Its velocity, the common
-    /// centre of mass and the angular momentum stay as they are.
+    /// Moves detached liquid that has passed through the wall in a step of the host's integrator
+    /// back onto the wall. Its velocity, the common centre of mass and the angular momentum stay as
+    /// they are.
     fn bring_to_wall(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();
@@ -196,7 +202,8 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// Puts the lump on the wall in the state `on_wall`. Returns true if the wall presses on it.
+    /// Puts the detached liquid on the wall in the state `on_wall`. Returns true if the wall
+    /// presses on it.
     fn try_on_wall(&mut self, lump: usize, on_wall: BallState, t: f64) -> bool {
         *self.ball_state(lump) = on_wall;
         self.is_pressed(lump, t)
@@ -217,8 +224,8 @@ pub(crate) trait Carrier {
         *self.dissipated() += (1.0 - e) * j * v_n / 2.0;
     }
 
-    /// Hands the liquid over to the pendulums. Returns true if the hand-over loses energy; otherwise the states are unusable and
-    /// the caller has to restore them.
+    /// Hands the detached liquid over to the tank's pendulums. Returns true if the hand-over loses
+    /// energy, as it must. Otherwise the states are unusable and the caller has to restore them.
     fn settle(&mut self, lump: usize, t: f64) -> bool {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();

@@ -71,18 +71,22 @@ use crate::state::BallState;
 /// Cosine of the largest angle from the axis at which a bob represents liquid.
 pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
-/// Largest coefficient of the liquid's place, m, whose square is formed, so that squares do not overflow.
+/// Largest coefficient of the series of the detached liquid's position, m, whose square is
+/// computed. Larger coefficients could overflow.
 const LARGEST_COEFFICIENT: f64 = 1e75;
 const TOUCHING: f64 = 1e-10;
 const RESTING: f64 = 1e-9;
-/// Value of f'', relative to its terms, 1/s2, below which nothing presses the lump to the wall.
+/// Value of f'', 1/s2, relative to the terms of its sum, below which nothing presses the detached
+/// liquid to the wall. It allows for rounding.
 const PRESSING: f64 = 1e-9;
-/// Distance from an event, relative to its time, over which the slope of an event function is taken.
+/// Distance in time from an event, relative to the event's time, over which the slope of the
+/// function that crosses zero there is computed.
 const NEAR: f64 = 1e-6;
-/// Largest change of an event's time in one iteration, relative to this time, and number of iterations.
+/// Largest change of an event's time in one iteration that improves it, relative to this time.
 const FAR: f64 = 0.1;
 const ITERATIONS: usize = 4;
-/// Square of the sine of 30 degrees, the largest swing at which the pendulums take over the liquid.
+/// Square of the sine of the largest swing, 30 degrees, with which the pendulums take over detached
+/// liquid.
 const SWING: f64 = 0.25;
 
 /// Event of a tank's liquid: it leaves the bottom, meets the wall, is no longer pressed to the wall (`Release`), is pressed
@@ -122,7 +126,8 @@ pub(crate) type Directions = [Vec3; MODES];
 #[derive(Clone, Debug)]
 pub(crate) struct Lump {
     pub tank: usize,
-    /// State for which the motion is set up.
+    /// State of the liquid, such as sliding on the wall, for which the present expansion was
+    /// started.
     pub state: BallState,
     pub m: f64,
     restitution: f64,
@@ -258,7 +263,8 @@ impl Lump {
         })
     }
 
-    /// Returns position and velocity of the centre of the settled liquid at rest, tank axes.
+    /// Returns position and velocity of the liquid's centre when the liquid is settled and at rest,
+    /// six numbers in tank axes.
     pub fn at_rest(&self) -> [f64; 6] {
         [0.0, 0.0, self.height - self.half, 0.0, 0.0, 0.0]
     }
@@ -272,8 +278,8 @@ impl Lump {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
     }
 
-    /// Returns true if drag acts. It is false for d = 0, because otherwise rounding would make a released lump alternate between
-    /// the states `Sliding` and `Light`.
+    /// Returns true if the wall's drag on the liquid acts. It never acts for d = 0, because
+    /// rounding would then make a released lump alternate between the states `Sliding` and `Light`.
     pub fn drags(&self) -> bool {
         self.drag() > 0.0
     }
@@ -282,7 +288,8 @@ impl Lump {
         matches!(self.state, BallState::Sliding | BallState::Light | BallState::Held)
     }
 
-    /// Returns masses and positions from O of the rigid liquid and the bobs, with the rods along `p`.
+    /// Returns for the rigid liquid and each bob the mass and the position from O. The directions
+    /// of the bobs' rods are `p`.
     fn parts(&self, p: &Directions) -> [(f64, Vec3); MODES + 1] {
         core::array::from_fn(|i| match i {
             0 => (self.m_0, self.s),
@@ -300,8 +307,8 @@ impl Lump {
         scale(1.0 / self.m, moment)
     }
 
-    /// Returns the rigid body with the inertia J_a of the liquid's shape with the rods along `p`, about its
-    /// own centre.
+    /// Returns the liquid's shape, with its inertia J_a about its own centre, as a rigid body. The
+    /// directions of the bobs' rods are `p`.
     pub fn shape(&self, p: &Directions) -> Rigid {
         let center = self.common_center(p);
         let around =
@@ -329,14 +336,16 @@ impl Lump {
         self.shape_slope = slope;
     }
 
-    /// Returns the lump's six numbers for its centre at `rho` from O moving with `rate` relative to the tank.
+    /// Returns the six numbers (position and velocity in tank axes) of a lump whose centre is at
+    /// `rho` from O and moves with `rate` relative to the tank.
     pub fn numbers(&self, rho: Vec3, rate: Vec3) -> [f64; 6] {
         let at = transposed_times(&self.axes, sub(rho, self.origin));
         let rate = transposed_times(&self.axes, rate);
         [at[0], at[1], at[2], rate[0], rate[1], rate[2]]
     }
 
-    /// Returns the six numbers moved onto the wall, with the velocity along it.
+    /// Returns the six numbers `x` of the lump (position and velocity in tank axes) after moving
+    /// the position onto the wall and the velocity into the wall's tangent plane.
     fn on_wall(&self, x: &[f64; 6]) -> [f64; 6] {
         let [across, along] = [self.radius, self.half].map(|r| 1.0 / (r * r));
         let at = [x[0], x[1], x[2] - self.height];
@@ -373,8 +382,9 @@ impl Lump {
         self.u[1] = add(rate, add(cross(dw, self.rho[0]), cross(w, at)));
     }
 
-    /// Returns position and rate at `t` after the start at `x`, from the series up to order n; `w` is the
-    /// craft's angular velocity at that time.
+    /// Returns the lump's position and rate at `t`, s, after the start of the expansion, from the
+    /// series up to order n. `x` is its state at that start; `w` is the craft's angular velocity at
+    /// the time `t`.
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (rho, u) = (space::value(&self.rho, n, t), space::value(&self.u, n, t));
         let rate = sub(u, cross(w, rho));
@@ -439,7 +449,8 @@ impl Lump {
         self.x_d[0]
     }
 
-    /// Sets coefficient n of the forces and n + 1 of position and velocity, from coefficient n of [a; w'].
+    /// Sets coefficient n of the forces on the lump, and coefficient n + 1 of its position and
+    /// velocity, from coefficient n of the craft's accelerations [a; w'].
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let specific = add(a, cross(w_d, self.rho[0]));
         if self.slides() {
@@ -489,7 +500,8 @@ impl Lump {
         [force, cross(Self::value_and_slope(&self.rho), force)]
     }
 
-    /// Returns the gradient G of a sliding lump's surface and G.G.
+    /// Returns the gradient G = D x of the function f that describes the wall, at the position of a
+    /// sliding lump, and its square G.G.
     fn gradient<T: Number>(&self) -> (Vec3<T>, T) {
         let g = times(
             &self.d.map(constant),
@@ -498,7 +510,8 @@ impl Lump {
         (g, dot(g, g))
     }
 
-    /// Returns the wrench at a = 0 and w' = 0, with the wall force N for these values.
+    /// Returns force and torque about O of the lump on the craft for the case that the
+    /// accelerations a and w' are 0, with the wall force N that belongs to this case.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
@@ -535,8 +548,9 @@ impl Lump {
         }
     }
 
-    /// Applies an impulse on the craft to the lump's rate. In flight the lump keeps its velocity; on the wall it keeps only its
-    /// velocity along the wall.
+    /// Updates the lump's rate for an impulse on the craft that changes the velocity of O by `dv`
+    /// and the angular velocity by `dw`. In flight the lump keeps its velocity; on the wall it
+    /// keeps only its velocity along the wall.
     pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
         let mut kick = add(dv, cross(dw, self.rho[0]));
         if self.slides() {
@@ -573,15 +587,17 @@ impl Lump {
         self.pull[0] > 0.0
     }
 
-    /// Returns rod directions that put the pendulums' centre as near to the lump as possible.
+    /// Returns directions of the bobs' rods with which the pendulums' common centre is as near to
+    /// the lump as possible.
     pub fn hanging(&self) -> Directions {
         let in_tank = transposed_times(&self.axes, self.x_0);
         let [x, y] = [in_tank[0] / self.gyration, in_tank[1] / self.gyration];
         [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
     }
 
-    /// Returns the impulse on the craft when the tank catches the parts of the lump, and the bobs' rates p'
-    /// afterwards. All parts move with `rate` relative to the tank, with rods along `p`.
+    /// Returns the impulse on the craft when the tank catches the lump's parts, rigid liquid and
+    /// bobs, and the rates p' of the bobs afterwards. Before, all parts move with `rate` relative
+    /// to the tank; the directions of the rods are `p`.
     pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
         let mut impulse = scale(self.m_0, rate);
         let mut torque = cross(self.s, impulse);
@@ -598,8 +614,8 @@ impl Lump {
         ([impulse, torque], rates)
     }
 
-    /// Returns the momentum of the bobs' motion in the tank over the liquid's mass, and its moment about the
-    /// liquid's centre.
+    /// Returns the momentum of the bobs' motion in the tank, divided by the mass of the liquid, and
+    /// the moment of this momentum about the liquid's centre.
     pub fn stirred(&self, center: Vec3, bobs: impl Iterator<Item = BobNow<f64>>) -> [Vec3; 2] {
         bobs.fold([[0.0; 3]; 2], |[rate, moment], bob| {
             let momentum = scale(bob.m, bob.rate);
@@ -608,7 +624,8 @@ impl Lump {
         })
     }
 
-    /// Returns the coefficients below n of the specific force along the tank at the hinge of mode 1.
+    /// Returns the coefficients below n of the specific force along the tank's axis at the hinge of
+    /// mode 1.
     fn axial(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> Series {
         let turned = cross(self.hinge, self.e);
         let height = dot(self.e, self.hinge);
@@ -654,8 +671,8 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// Returns the next event of the liquid within `h` after the start of the expansion up to order n, with its time. `bobs` are
-    /// the bobs of the tank.
+    /// Returns the next event of the liquid within `h`, s, after the start of the expansion, and
+    /// its time. The series are used up to order n. `bobs` are the bobs of the lump's tank.
     pub fn next<'a>(
         &self,
         n: usize,
@@ -820,8 +837,9 @@ impl Lump {
         first_root(&f[..=2 * n], h)
     }
 
-    /// Returns true if a lump on or outside the wall moves or is pressed outwards. `f` has coefficients 0 to
-    /// 2 of f, and `x_2` is coefficient 2 of the position.
+    /// Returns true if a lump on or outside the wall moves outwards or is pressed outwards, so that
+    /// an impact is due. `f` has coefficients 0 to 2 of the function f that describes the wall, and
+    /// `x_2` is coefficient 2 of the position.
     fn meets_wall(&self, f: [f64; 3], x_2: Vec3) -> bool {
         if f[0] > TOUCHING || f[1] > RESTING {
             return false;
@@ -833,10 +851,11 @@ impl Lump {
         f[1] < -RESTING || f[2] < -PRESSING * size
     }
 
-    /// Returns f for hosts that integrate themselves, after order 0 of the expansion. The value is below zero only if an impact
-    /// is due. After an impact the lump may be outside by rounding and move inwards, or be on the wall without being pressed to
-    /// it. In these cases the value is above zero, so that a host that compares signs does not miss a bounce shorter than its
-    /// step.
+    /// Returns the value of f, the function that describes the wall, for hosts that integrate
+    /// themselves. Order 0 of the expansion must be computed. The value is below zero only if an
+    /// impact is due. After an impact the lump may be outside by rounding and move inwards, or be
+    /// on the wall without being pressed to it. In these cases the value is above zero, so that a
+    /// host that compares signs does not miss a bounce shorter than its step.
     fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
         let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
         let f = 1.0 - dot(x, g);
@@ -859,14 +878,15 @@ impl Lump {
         1.0 - dot(self.x_0, times(&self.d, self.x_0)) < -TOUCHING
     }
 
-    /// Returns the point of the wall, from O, in the lump's direction from the surface's centre.
+    /// Returns the point of the wall, as a position from O, at which a ray from the wall's centre
+    /// through the lump meets the wall.
     pub fn on_wall_beside(&self) -> Vec3 {
         let size = libm::sqrt(dot(self.x_0, times(&self.d, self.x_0)));
         add(self.center, scale(1.0 / size, self.x_0))
     }
 
-    /// Returns the coefficients below n of (wall force^2/(twice the drag)^2 - 1) times (twice the drag)^2,
-    /// with the drag that would act.
+    /// Returns the coefficients below n of the squared wall force minus the square of twice the
+    /// drag force that would act. This difference crosses zero where drag begins.
     fn excess(&self, n: usize) -> Series {
         let (mut pull, mut excess) = (ZERO, ZERO);
         for (k, x) in pull.iter_mut().enumerate().take(n) {
@@ -914,7 +934,8 @@ impl Lump {
         }
     }
 
-    /// Returns true if the pendulums may take over the liquid at the start of the expansion.
+    /// Returns true if the pendulums may take over the liquid at the start of the expansion, by the
+    /// conditions on swing, thrust and depth in the module's head.
     pub fn may_settle(&self, a: &Vector, w: &Vector, w_d: &Vector) -> bool {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
@@ -966,7 +987,8 @@ fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// The series are t - 1/4, 1/4 - t, t - 1/4 from far below, and one that only touches zero.
+    /// Three of the power series are t - 1/4, 1/4 - t, and t - 1/4 from far below; another only
+    /// touches zero.
     #[test]
     fn a_power_series_counts_as_rising_if_it_crosses_zero_from_below() {
         let series = |terms: &[f64]| {
@@ -1012,7 +1034,8 @@ mod tests {
         along_x(terms).map(|[x, y, z]| [z, y, x])
     }
 
-    /// Returns the next event within a second of a lump without specific force, which no pendulum takes over.
+    /// Returns the next event within a second of detached liquid in a tank without specific force,
+    /// so that the pendulums cannot take it over.
     fn next(lump: &Lump) -> Option<(f64, Due)> {
         lump.next(4, 1.0, [&ZERO_VECTOR; 3], core::iter::empty())
     }
@@ -1090,8 +1113,8 @@ mod tests {
         assert_eq!(next(&lump), Some((0.0, Due::Impact)));
     }
 
-    /// The scale that the integrator's tolerance refers to is the sum of the speeds of the liquid relative to the tank, of
-    /// the tank, and of the turning lever.
+    /// The allowed error of detached liquid's velocity is relative to the sum of the speeds of the
+    /// liquid in the tank, of the tank, and of the turning lever.
     #[test]
     fn the_speed_scale_of_detached_liquid_adds_the_speeds_of_all_its_motions() {
         let mut lump = lump(BallState::Flying);

@@ -66,8 +66,8 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::spin::SpinSeries;
 use crate::state::{BallState, Inputs, STATES, State, index};
 
-/// Longest time over which a rate scale is estimated, s, because rates change in a step much longer than
-/// this.
+/// Time, s, over which the largest rates of a motion are estimated, because rates change only in a
+/// step much longer than this.
 pub const SCALE_TIME: f64 = 0.1;
 
 /// Returns coefficient n of the matrix w w^T - |w|^2 1, which maps a vector y to w x (w x y). The argument is
@@ -101,11 +101,11 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
-    /// The expansion that `state.kept` holds is continued.
+    /// At the start of the expansion in `state.kept`, which this step continues.
     Kept,
-    /// The expansion starts with the step, from the states in `before`.
+    /// At the start of the step, in `before`, because the expansion starts with the step.
     Step,
-    /// The expansion starts within the step, from the states in `begin`.
+    /// In `begin`, because the expansion starts within the step.
     Within,
 }
 
@@ -139,9 +139,11 @@ pub struct CraftMotion {
     flexing: Option<Box<Flexing>>,
     any_apart: bool,
     has_events: bool,
-    /// Index of the constrained bob that reaches the bound of its surface at the end of the expansion.
+    /// Index of the constrained bob, if any, that is at the end of its surface, the slosh angle up
+    /// to which the model is valid, when the expansion ends.
     beyond: Option<usize>,
-    /// Number of a detached liquid and the event that it has at the end of the expansion, if there is one.
+    /// Number of the detached liquid that has an event at the end of the expansion, and this event,
+    /// if there is one.
     due: Option<(usize, Due)>,
     follows: bool,
     whole: Rigid,
@@ -171,7 +173,7 @@ pub struct CraftMotion {
     start: Start,
     /// States at the start of the step.
     pub before: [f64; STATES],
-    /// States at the start of the expansion, if they are not stored elsewhere.
+    /// States at the start of the expansion if it starts within a step ([`Start::Within`]).
     begin: [f64; STATES],
     /// Derivatives of w and V at the end of a series, body axes.
     slopes: [Vec3; 2],
@@ -266,8 +268,8 @@ impl CraftMotion {
         motion
     }
 
-    /// Sets up craft and liquids at rest as one rigid body. The bobs' drag depends on its acceleration along
-    /// their tanks.
+    /// Computes craft and liquids at rest as one rigid body. The drag of the bobs depends on this
+    /// body's acceleration along their tanks.
     fn freeze(&mut self) {
         let point = |m: f64, at: Vec3| Rigid::new(m, at, &[[0.0; 3]; 3]);
         let constrained = self.constrained.iter().map(|bob| point(bob.m, bob.at_rest()));
@@ -308,8 +310,8 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Computes M at the current directions and factorises it. On a pivot the upper rows of the system hold the given
-    /// acceleration a.
+    /// Computes the mass matrix M with the bobs in their present directions, and factorises it. On
+    /// a pivot the upper rows of the linear system hold the given acceleration a.
     #[inline(always)]
     fn factorise(&mut self) {
         self.matrix = self.mass_matrix;
@@ -365,8 +367,8 @@ impl CraftMotion {
         true
     }
 
-    /// Updates the states, after [`Motion::start`], for an impulse that changes the craft's velocity by dV
-    /// (of O) and dw, body axes.
+    /// Updates the states for an impulse that changes the velocity of O by `dv` and the angular
+    /// velocity of the craft by `dw`, both in body axes. [`Motion::start`] must have been called.
     #[inline(never)]
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let velocity_change = times(&rotation(&self.q.get(0)), dv);
@@ -451,14 +453,14 @@ impl CraftMotion {
         scale(2.0, sum)
     }
 
-    /// Replaces the state by a saved one.
     pub fn set_state(&mut self, state: &State) {
         self.state = *state;
         self.expansion.clear();
     }
 
-    /// Advances the states by `h` > 0 from `before`, or if they have jumped since from the present states. After an error they
-    /// are unusable, and the kept expansion is as it was.
+    /// Advances the states by `h` > 0, s. The step starts from the states in `before`, or, if the
+    /// inputs have jumped (`has_jumped`), from the present states. After an error the states are
+    /// unusable, and the kept expansion is unchanged.
     // Separate from the preparation of a step: compiled together, both take more instructions.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
@@ -629,7 +631,8 @@ impl CraftMotion {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the error of the bobs' v that the series of their drag cause, relative to the allowed error.
+    /// Returns the error of the bobs' velocities v over the allowed error, as far as it arises
+    /// because the series of the drag end at order n.
     #[inline(never)]
     fn drag_defect(&self, n: usize, h: f64) -> f64 {
         let constrained = self.constrained.iter().map(|bob| bob.defect(n, h));
@@ -919,7 +922,8 @@ impl CraftMotion {
         }
     }
 
-    /// Adds coefficient n of force and torque about O with which constrained bobs and lumps act on the craft.
+    /// Adds coefficient n of the force and the torque about O with which constrained bobs and lumps
+    /// act on the craft to the given ones.
     #[inline(never)]
     fn add_reactions_apart(&mut self, n: usize, [mut force, mut torque]: [Vec3; 2]) -> [Vec3; 2] {
         let ww = product_coefficients(n, &self.w);
@@ -946,8 +950,9 @@ impl CraftMotion {
         [force, torque]
     }
 
-    /// Computes coefficient n of the accelerations of constrained bobs, lumps and appendages from coefficient n of the craft's.
-    /// Returns the dissipation with their dissipation added.
+    /// Computes coefficient n of the accelerations of constrained bobs, lumps and appendages from
+    /// coefficient n of the craft's accelerations. Returns the dissipated power `dissipation` plus
+    /// their dissipated power.
     #[inline(never)]
     fn accelerate_apart(&mut self, n: usize, mut dissipation: f64) -> f64 {
         for bob in &mut self.constrained {
@@ -995,7 +1000,8 @@ impl CraftMotion {
             .fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
-    /// Sets up rigid liquids and bobs for the states of the liquids (settled or detached). Does not allocate.
+    /// Adds the rigid liquids and bobs of tanks with settled liquid to the craft, and removes those
+    /// of tanks whose liquid has detached. Does not allocate.
     fn arrange(&mut self) {
         let mut changed = false;
         for lump in &mut self.lumps {
@@ -1035,11 +1041,11 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Advances the states of constrained bobs and lumps by a step of length h. Returns true if they are
-    /// finite and within bounds.
+    /// Advances the states of constrained bobs and lumps by a step of length `h`, s. Returns true
+    /// if the new states are finite and the models are valid for them.
     ///
     /// # Errors
-    /// If a bob is at the bound of its surface, or an appendage beyond its linear model.
+    /// If a bob is at the end of its surface, or an appendage beyond its linear model.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -1068,7 +1074,8 @@ impl CraftMotion {
         Ok(finite)
     }
 
-    /// Refuses deflections of the appendages beyond their linear model.
+    /// Returns an error if the deflection of an appendage is so large that its linear model is not
+    /// valid.
     pub fn check_appendages(&self) -> Result<(), StepError> {
         self.flexing.as_ref().map_or(Ok(()), |flexing| flexing.structure.check(&self.state.x))
     }
@@ -1078,8 +1085,8 @@ impl CraftMotion {
         self.flexing.as_ref().map(|flexing| flexing.now())
     }
 
-    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound
-    /// of its surface.
+    /// Returns the time, s, of the first event within `h`: an event of detached liquid, or a
+    /// constrained bob that reaches the end of its surface.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_lumps(n, h);

@@ -86,7 +86,8 @@ pub struct Outputs {
 }
 
 impl TankOutputs {
-    /// Returns the outputs of a tank's modes from their part of the states, or of a direction.
+    /// Returns the outputs of a tank's modes from the tank's part of the states, or their
+    /// derivatives from a direction of these states.
     pub(crate) fn from_states(x: &[f64]) -> TankOutputs {
         let part = |n: usize, at: usize| {
             let at = 6 * n + at;
@@ -111,8 +112,8 @@ impl TankOutputs {
         }
     }
 
-    /// Sets the outputs that depend on the slosh masses. `liquid` is the rate of the liquid's spin; without it the liquid is
-    /// assumed to turn with the tank.
+    /// Sets the outputs that depend on the slosh masses. `liquid` is the rate at which the liquid
+    /// spins; if it is `None`, the liquid is assumed to turn with the tank.
     pub(crate) fn set_angles<'a, T: Number + 'a>(
         &mut self,
         [a, w, w_d]: [Vec3<T>; 3],

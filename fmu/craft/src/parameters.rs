@@ -321,8 +321,8 @@ impl Tank {
         (0..MODES).any(|n| self.surface(n).is_some())
     }
 
-    /// Returns the message for a bob of mode `n`, which counts from 0, beyond the bound of its surface;
-    /// `name` is the tank's.
+    /// Returns the message for a bob of mode `n`, which counts from 0, at a slosh angle beyond the
+    /// validity of the mode's coefficients. `name` is the tank's name in the FMU.
     pub(crate) fn bound_message(&self, n: usize, name: &str) -> String {
         let pair = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let text = surface::bound_message(pair, self.higher(n), n, name);
@@ -335,7 +335,8 @@ impl Tank {
         }
     }
 
-    /// Returns true if mode `n`, which counts from 0, is planar, or its bob is not a pendulum.
+    /// Returns true if mode `n`, which counts from 0, is planar, or its bob moves on another
+    /// surface than a pendulum's sphere.
     pub(crate) fn is_constrained(&self, n: usize) -> bool {
         self.surface(n).is_some() || self.plane_normal(n).is_some()
     }
@@ -346,7 +347,8 @@ impl Tank {
         self.fill.points > 0 || self.is_planar() || self.has_surface() || self.spin_inertia > 0.0
     }
 
-    /// Returns A', A' and I_zz of the spinning liquid, kg m2 (`spin.rs`); `None` if the liquid has no spin.
+    /// Returns the moments of inertia A', A' and I_zz of spinning liquid, kg m2 (`spin.rs`); `None`
+    /// if the tank's liquid has no spin.
     pub(crate) fn spin_inertias(&self) -> Option<Vec3> {
         let axial = self.spin_inertia;
         let across = if self.spin_inertia_across > 0.0 { self.spin_inertia_across } else { axial };
@@ -413,8 +415,9 @@ impl Tank {
         Rigid::new(2.0 * m, hinge, &own)
     }
 
-    /// Adds the inertia of planar modes' bobs, perpendicular to their planes and along their rods, with rods
-    /// at `angles` (rad) from their positions at rest.
+    /// Adds the inertia of planar modes' bobs to the craft's mass matrix. A planar bob has inertia
+    /// perpendicular to its plane and along its rod. The rods are at `angles`, rad, from their
+    /// positions at rest.
     fn add_planar_bobs(&self, matrix: &mut Mat6, angles: &[f64; MODES]) {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         for n in 0..self.modes {
@@ -460,7 +463,8 @@ impl Tank {
         })
     }
 
-    /// Returns direction and rate of the bob of mode `n`, which counts from 0, at the start, tank axes.
+    /// Returns direction and rate of the bob of mode `n`, which counts from 0, at the start of the
+    /// simulation, in tank axes.
     pub(crate) fn at_start(&self, n: usize) -> [Vec3; 2] {
         let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.plane_normal(n) {
             Some(b) => sub(x, scale(dot(b, x), b)),
@@ -679,14 +683,16 @@ impl Default for Parameters {
 const HEAVIEST: f64 = 1e12;
 const FARTHEST: f64 = 1e9;
 
-/// Smallest inertia of spinning liquid, kg m2, because the equations divide by it.
+/// Smallest moment of inertia of spinning liquid, kg m2, that is accepted. The equations divide by
+/// it.
 const LEAST_SPIN: f64 = 1e-9;
 
 /// Largest allowed ratio of a principal moment of inertia to the sum of the other two moments. A plate has the ratio 1;
 /// the margin is for moments that are given to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
-/// Range of tolerances, from rounding to where error control loses its meaning.
+/// Relative tolerances of the integration that are accepted: from the rounding error to the value
+/// above which error control has no meaning.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
 pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
@@ -1193,7 +1199,8 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
 }
 
 impl Parameters {
-    /// Returns all problems of the parameters; empty if there are none.
+    /// Returns one message for each reason why the parameters are not acceptable; the list is empty
+    /// if they are.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.craft.find_problems("craft", &mut problems);

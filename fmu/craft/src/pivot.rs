@@ -194,8 +194,9 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// The values were computed by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U
-    /// = 3/4 + 5/16.
+    /// The expected values of the pivot's torque, dissipated power and energy were computed by
+    /// hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2
+    /// U = 3/4 + 5/16.
     #[test]
     fn pivot_torque_energy_and_dissipation_equal_those_of_a_spring_and_a_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
@@ -258,8 +259,9 @@ mod tests {
         }
     }
 
-    /// Half of the distance to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t. With D,
-    /// from w = 4 w_s on, it is 2.5/4 of w_s if this is shorter.
+    /// The power series are used up to half of the distance to the nearest pole of tanh, v = i
+    /// pi/2, by v'' t^2/2 alone and by v' t. With an excess D of static friction, from w = 4 w_s
+    /// on, they are used over 2.5/4 of w_s if this is shorter.
     #[test]
     fn power_series_of_dry_friction_are_used_up_to_half_the_distance_to_the_nearest_pole() {
         let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };

@@ -42,8 +42,8 @@ use formulas::third_order;
 /// as rotary.
 const ROTARY: f64 = 0.8;
 
-/// Mass of liquid at which a tank is empty, relative to the first point of its fill table, with a host's
-/// rounding.
+/// Mass of liquid at which a tank counts as empty, relative to the liquid of the first point of its
+/// fill table. It exceeds 1 because a host integrates the mass with rounding errors.
 const EMPTY: f64 = 1.0 + 1e-9;
 
 /// Bounds of a tank's ranges. For a draining tank they belong to its initial contents, except `over_fill`.
@@ -61,8 +61,8 @@ pub(crate) struct Bounds {
     spin: SpinLimit,
 }
 
-/// Bounds of a mode; a bound that is not known is 0. The angles, rad, are the largest slosh angle, the largest angle of rotary
-/// motion, and the angle at which waves begin to break. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
+/// Largest slosh angles of a mode, rad: of any motion, of rotary motion, and the angle at which
+/// waves begin to break; 0 if a limit is not known. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
 #[derive(Clone, Copy, Debug)]
 struct ModeBounds {
     angle: f64,
@@ -81,8 +81,9 @@ struct OverFill {
 }
 
 impl OverFill {
-    /// Returns a mode's limits, interpolated linearly over the mass of liquid. Between a point with a known limit and a point
-    /// with an unknown limit, the limit is 0, that is, unknown.
+    /// Returns the largest slosh angles of mode `n`, rad, interpolated linearly over the mass of
+    /// liquid. Between a point of the fill table with a known limit and a point with an unknown
+    /// limit the result is 0, that is, unknown.
     fn limits_at(&self, n: usize, liquid: f64) -> [f64; 2] {
         let masses = &self.liquid[..self.points];
         let last = self.points - 2;
@@ -131,7 +132,8 @@ impl Bounds {
         }
     }
 
-    /// Returns the ranges for a tank's outputs at the mass of liquid, kg.
+    /// Returns in which ranges of validity the motion of a tank is, from the tank's outputs and its
+    /// mass of liquid, kg.
     pub fn classify(&self, out: &TankOutputs, liquid: f64) -> Ranges {
         if out.ball_state != BallState::Settled {
             let limited_by = LimitedBy::Contact;
@@ -195,15 +197,17 @@ impl Bounds {
         if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
     }
 
-    /// Returns the quantities of mode 1 to which the liquid's spin is related; `None` for a tank without modes.
+    /// Returns the quantities of mode 1 that the outputs `spin_ratio` and `spin_number` need;
+    /// `None` for a tank without modes.
     pub fn spin_scale(&self) -> Option<SpinScale> {
         let ModeBounds { inv_l, k_m, .. } = self.mode[0];
         let scale = SpinScale { inv_l, k_m, g_floor: self.g_floor, limit: self.spin };
         (self.modes > 0).then_some(scale)
     }
 
-    /// Returns true if the motion is physical: the liquid stays at the bottom and the bobs are within 45
-    /// degrees of the axis, from the bobs' p_z and the specific force along the axis.
+    /// Returns true if the motion can be that of liquid: thrust holds the liquid at the bottom and
+    /// the bobs are within 45 degrees of the axis. `heights` are the components p_z of the bobs'
+    /// directions, `axial` is the specific force along the axis, m/s2.
     pub fn contain(&self, heights: [f64; MODES], axial: f64) -> bool {
         self.is_held(axial) && self.are_upright(heights)
     }
@@ -216,7 +220,8 @@ impl Bounds {
     /// the specific force `axial` along the tank no longer holds the liquid of every mode at the bottom, and
     /// never 0.
     pub fn held_indicator(&self, axial: f64) -> f64 {
-        /// Smallest indicator of liquid that is held, because at rest without thrust the margin is 0.
+        /// Smallest value of the indicator while the liquid is held. The margin of liquid at rest
+        /// without thrust is 0, but an indicator must not be 0.
         const HELD: f64 = 1e-9;
         let margins = self.lowest[..self.modes].iter().map(|lowest| axial - lowest);
         let margin = margins.fold(1.0 / HELD, f64::min);

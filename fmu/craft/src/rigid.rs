@@ -12,7 +12,8 @@ use core::ops::Mul;
 use taylor::number::Number;
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
-/// Smallest pivot below which a mass matrix counts as singular.
+/// Smallest element of D in the factorisation L D L^T, relative to the matrix's diagonal, with
+/// which a mass matrix counts as regular.
 pub(crate) const SINGULAR: f64 = 1e-12;
 
 pub type Mat6<T = f64> = [[T; 6]; 6];
@@ -46,7 +47,8 @@ impl Rigid {
         }
     }
 
-    /// Returns the body as numbers with derivatives; its inertia has the derivative `slope`, kg m2.
+    /// Returns the body as numbers with derivatives. Only its inertia changes, with the derivative
+    /// `slope`, kg m2.
     pub fn with_inertia_slope<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
         let element = |i: usize, j: usize| T::with_slope(self.inertia[i][j], slope[i][j]);
         Rigid { inertia: [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j))), ..self.lift() }
@@ -113,9 +115,9 @@ impl<T: Number> Rigid<T> {
     }
 }
 
-/// Adds the inertia of a bob of mass `m` at the end of its rod to a mass matrix. Because the bob moves freely across
-/// the rod, it acts only along the rod's direction: the matrix gains m u u^T with u = [p; P x p], p the direction of
-/// the rod and P its hinge.
+/// Adds the inertia of a bob of mass `m` at the end of a rod to a mass matrix. Because the bob
+/// moves freely across the rod, it has inertia only along the rod: the matrix gains m u u^T with u
+/// = [p; P x p], where p is the direction of the rod and P its hinge.
 #[inline(always)]
 pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     for i in 0..6 {
@@ -147,11 +149,12 @@ pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
 
-/// Largest inverse of mass (1/kg) and inertia (1/(kg m2)). Its products with masses up to 1e12 kg and arms up to 1e9 m do not
-/// overflow.
+/// Largest inverse of a mass, 1/kg, or inertia, 1/(kg m2), that is used. Products of this inverse
+/// with masses up to 1e12 kg and arms up to 1e9 m do not overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
-/// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above [`LARGEST_INVERSE`].
+/// Smallest divisor in the solution of a linear system. With it the factors of any matrix are
+/// finite; its inverse is above [`LARGEST_INVERSE`].
 pub(crate) const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 
 /// Factorisation L D L^T of a symmetric positive definite matrix; L has ones on its diagonal and is used only
@@ -253,8 +256,9 @@ impl<M: Copy, const N: usize> Factors<M, N> {
     }
 }
 
-/// Returns the smallest element of D over the matrix's own diagonal. Returns 0 for a matrix that is not
-/// positive definite, or so nearly singular that its inverse exceeds [`LARGEST_INVERSE`].
+/// Returns the smallest ratio of an element of D, in the factorisation L D L^T, to the matrix's
+/// diagonal element. It is small if the matrix is nearly singular, and 0 for a matrix that is not
+/// positive definite or whose inverse exceeds [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
     let Factors { inverse, .. } = Factors::new(matrix);
     // NaN is outside the range.

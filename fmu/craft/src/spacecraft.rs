@@ -164,19 +164,20 @@ impl Spacecraft {
         outputs
     }
 
-    /// Returns the ranges of the tanks' current motion.
+    /// Returns for each tank the ranges of validity in which its present motion is.
     pub fn ranges(&mut self, inputs: &Inputs) -> [Ranges; TANKS] {
         let mut outputs = self.outputs_held(inputs);
         self.update_ranges(&mut outputs);
         outputs.tank.map(|tank| tank.ranges)
     }
 
-    /// Returns the ranges as they were after the last event.
+    /// Returns for each tank the ranges of validity in which its motion was after the last event.
     pub fn ranges_held(&self) -> [Ranges; TANKS] {
         self.motion.state.ranges
     }
 
-    /// Returns true if the motion of a tank without a model of detached liquid is not physical.
+    /// Returns true if in any tank without a model of detached liquid the motion cannot be that of
+    /// liquid: the thrust no longer holds it, or a bob is more than 45 degrees from the axis.
     pub fn leaves_range(&self, ranges: &[Ranges; TANKS]) -> bool {
         (0..TANKS).any(|i| !ranges[i].is_physical && !self.has_ball(i))
     }
@@ -207,7 +208,8 @@ impl Spacecraft {
         }
     }
 
-    /// Returns [`Spacecraft::outputs`] with the states as the last step or event left them.
+    /// Returns the same outputs as [`Spacecraft::outputs`], but with contact of liquids and jumps
+    /// of inputs as the last step or event has left them.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
@@ -236,7 +238,8 @@ impl Spacecraft {
         &self.motion.state.x
     }
 
-    /// Sets x from the host. Quaternion and directions need not be of unit length.
+    /// Sets the continuous states `x` from the host's integrator. The quaternion and the directions
+    /// need not be of unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.motion.state.x = *x;
         self.motion.state.kept.end();
@@ -319,7 +322,7 @@ impl Spacecraft {
         draining.set_flow(&mut self.motion.state, &inputs.mass_flow) || turned
     }
 
-    /// Returns true if liquid of any tank is detached.
+    /// Returns true if the liquid of any tank is detached.
     pub fn has_lump(&self) -> bool {
         let CraftMotion { lumps, state, .. } = &*self.motion;
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)

@@ -103,8 +103,9 @@ impl Spin {
     }
 }
 
-/// Quantities of mode 1 that relate a spin to the frequency omega_0 of the wave: 1/l, k/m, and the smallest specific force along
-/// the tank, m/s2, that counts in omega_0^2.
+/// Quantities of mode 1 that determine the natural frequency omega_0 with which a spin rate is
+/// compared: 1/l, 1/m; k/m, 1/s2; and the smallest specific force along the tank, m/s2, that is
+/// used in omega_0^2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpinScale {
     pub inv_l: f64,
@@ -135,7 +136,8 @@ pub(crate) struct SpinSeries {
 }
 
 impl SpinSeries {
-    /// Returns `None` for a tank whose liquid has no spin; `index` is the tank's number, which counts from 0.
+    /// Creates the series of the spinning liquid of a tank; `None` if the tank's liquid has no
+    /// spin. `index` is the tank's number, which counts from 0.
     pub fn new(tank: &Tank, index: usize) -> Option<SpinSeries> {
         let [l, momentum, w, slip] = [ZERO_VECTOR; 4];
         Some(SpinSeries { tank: index, spin: Spin::new(tank)?, l, momentum, w, slip })
@@ -181,7 +183,8 @@ impl SpinSeries {
         space::value(&self.l, n, t)
     }
 
-    /// Returns the scale of the liquid's angular momentum L for error control, divided by the inertia, rad/s.
+    /// Returns the scale, rad/s, to which the allowed error of the spin is relative: the magnitude
+    /// of the liquid's angular momentum L divided by the inertia.
     pub fn rate_scale(&self) -> f64 {
         self.coefficient_norm(0)
     }

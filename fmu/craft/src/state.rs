@@ -35,19 +35,22 @@ pub mod index {
     pub const ETA: usize = spin(TANKS);
     pub const ETA_DOT: usize = ETA + APPENDAGES;
 
-    /// Returns the index of the detached liquid's position and rate; `tank` counts from 0.
+    /// Returns the index in x of the position and rate of the detached liquid of tank number
+    /// `tank`, which counts from 0.
     pub const fn ball(tank: usize) -> usize {
         BALLS + 6 * tank
     }
 
     pub const SPINS: usize = BALLS + 6 * TANKS;
 
-    /// Returns the index of the angular momentum of spin; `tank` counts from 0.
+    /// Returns the index in x of the angular momentum of the spinning liquid of tank number `tank`,
+    /// which counts from 0.
     pub const fn spin(tank: usize) -> usize {
         SPINS + 3 * tank
     }
 
-    /// Returns the index of a bob's direction and rate; `tank` and `mode` count from 0.
+    /// Returns the index in x of direction and rate of the bob of this tank and mode; `tank` and
+    /// `mode` count from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
         BOBS + 6 * (tank * MODES + mode)
     }
@@ -80,8 +83,8 @@ pub struct Inputs {
     pub mass_flow: [Line; TANKS],
 }
 
-/// Ranges of a tank's motion. The motion `is_physical` if the liquid is held at the tank's bottom and every
-/// bob is within 45 degrees of the axis.
+/// Ranges of validity in which a tank's motion is. The motion `is_physical` if the liquid is held
+/// at the tank's bottom and every bob is within 45 degrees of the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct Ranges {
@@ -174,7 +177,8 @@ pub(crate) struct Kept {
 impl Kept {
     const REALS: usize = STATES + 4 + INPUTS;
 
-    /// Value without a kept expansion: the next step starts one.
+    /// Value of `Kept` if there is no expansion that the next step could continue; the step then
+    /// starts one.
     pub const NONE: Kept =
         Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
 
@@ -198,7 +202,7 @@ impl Kept {
         self.inputs = inputs.values();
     }
 
-    /// Lets the next step start an expansion.
+    /// Discards the kept expansion, so that the next step starts another one.
     pub fn end(&mut self) {
         (self.clock, self.start) = ([0.0; 2], [0.0; 2]);
     }

@@ -114,7 +114,7 @@ pub(crate) struct Higher {
 }
 
 impl Higher {
-    /// Returns true if the mode has coefficients beyond the third order.
+    /// Returns true if any coefficient of the mode beyond the third order is not 0.
     pub fn is_beyond_third_order(&self) -> bool {
         Higher { gyroscopic: [0.0; 2], ..*self } != Higher::default()
     }
@@ -141,7 +141,8 @@ pub(crate) struct Surface<T = f64> {
 }
 
 impl<T: Number> Surface<T> {
-    /// Returns the surface with s and kappa, even if it is the sphere of a pendulum.
+    /// Returns the surface of a mode with the coefficients s and kappa, even if it is the sphere of
+    /// a pendulum.
     pub fn from_coefficients([s, kappa]: [T; 2]) -> Surface<T> {
         let one = T::constant(1.0);
         Surface { inertia: s - one, stiffness: kappa - one, higher: None }
@@ -240,8 +241,9 @@ impl Surface {
         }
     }
 
-    /// Returns minus the smallest eigenvalue of N within 45 degrees and the bound of the model, or 0. It is
-    /// at most 1.
+    /// Returns the largest inertia by which the bob can reduce the craft's inertia, relative to its
+    /// mass: minus the smallest eigenvalue of N up to 45 degrees and the end of the model, or 0. It
+    /// is at most 1.
     pub fn lent_inertia(&self) -> f64 {
         let at = |k: u32| {
             let u = 0.5 * f64::from(k) / 64.0;
@@ -254,8 +256,8 @@ impl Surface {
         (0..=64).map_while(at).fold(0.0, f64::max)
     }
 
-    /// Returns the inertia across the meridian, relative to a pendulum's, and minus the eigenvalue of N
-    /// there.
+    /// Returns the inertia of the bob across the meridian, relative to a pendulum's, and minus the
+    /// eigenvalue of N in this direction.
     fn around(&self, u: f64) -> [f64; 2] {
         let Some(higher) = &self.higher else { return [1.0, 0.0] };
         let more = higher.rotary_inertia(u) * u;
@@ -271,8 +273,8 @@ impl Surface {
         self.least_inertia(-cos, sin * sin) >= LEAST_INERTIA
     }
 
-    /// Returns the smallest angle from the axis at which the model ends, rad, rounded down to tenths of a
-    /// degree.
+    /// Returns the slosh angle, rad, at which the coefficients s and kappa cease to be valid,
+    /// rounded down to tenths of a degree.
     pub fn largest_angle(&self) -> f64 {
         let angle = |k: u32| ANGLE_STEP * f64::from(k);
         (0..=1800).map(angle).take_while(|angle| self.holds(*angle)).fold(0.0, f64::max)
@@ -295,8 +297,8 @@ impl Surface {
     }
 }
 
-/// Returns the message for a bob of mode `n`, which counts from 0, with s and kappa, beyond the bound of its surface; `name` is
-/// the tank's name.
+/// Returns the message for a bob at a slosh angle beyond the validity of its coefficients s and
+/// kappa. `n` is the mode, which counts from 0, and `name` is the tank's name.
 pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
     let surface = Surface::new(s, kappa, higher);
     let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
@@ -451,7 +453,8 @@ impl<T: Number> Meridian<T> {
         }
     }
 
-    /// Returns the rate of E_i's part of the drag and its square, of coefficients beyond the third order.
+    /// Returns the rate of the bob that determines the drag on the energy E_i, and the square of
+    /// this rate; `None` without coefficients beyond the third order.
     pub fn inner_rate(&self, p_d: Vec3<T>) -> Option<(Vec3<T>, T)> {
         self.surface.higher?;
         let sigma = dot(self.p_perp, p_d);
@@ -513,8 +516,8 @@ impl<T: Number> Meridian<T> {
         }
         lift
     }
-    /// Adds the terms of the coefficients beyond the third order, which only tanks that keep their liquid
-    /// have.
+    /// Adds the terms of the coefficients beyond the third order to a bob's height and internal
+    /// energy. Only tanks that do not drain have such coefficients.
     #[inline(never)]
     fn lift_higher(
         &self,

@@ -17,9 +17,10 @@ use taylor::number::Number;
 
 use crate::sizes::{MODES, POINTS};
 
-/// Shortest pendulum, m, because shorter ones make the equations too stiff.
+/// Shortest pendulum length, m, that a table may have. Shorter pendulums would make the equations
+/// too stiff.
 pub(crate) const SHORTEST: f64 = 1e-6;
-/// Lightest bob, kg, because lighter ones have no effect.
+/// Smallest mass of a bob, kg, that a table may have. Lighter bobs would have no effect.
 pub(crate) const LIGHTEST: f64 = 1e-9;
 
 /// Modes and rigid liquid at some masses of the liquid: the FMUs' parameters `tank[].fill.…`, whose variable tables give meanings
@@ -103,7 +104,8 @@ impl FillTable {
 /// A quantity and its first two derivatives, by the mass of liquid or by time.
 pub(crate) type Jet<T> = [T; 3];
 
-/// Coefficients of each interval's quintic, in powers of the position from 0 to 1 in the interval.
+/// Interpolated curve of a quantity: for each interval the coefficients of its quintic, in powers
+/// of the position from 0 to 1 in the interval.
 #[derive(Clone, Copy, Debug)]
 struct Curve([[f64; 6]; POINTS - 1]);
 
@@ -150,8 +152,8 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Position of a mass of liquid in a table: interval, position in the interval from 0 to 1, and 1 over the width of the
-/// interval, 1/kg.
+/// Position of a mass of liquid, kg, in a fill table: the interval, the position from 0 to 1 in it,
+/// and 1 over the width of the interval, 1/kg.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,
@@ -160,8 +162,8 @@ pub(crate) struct Place<T> {
     inv_h: f64,
 }
 
-/// A tank's contents at a mass of liquid: mass, length and hinge height of each mode, and H_0, I_0 and I_z of the rigid
-/// liquid.
+/// Contents of a tank with a given mass of liquid: mass, length and hinge height of each mode, and
+/// H_0, I_0 and I_z of the rigid liquid.
 #[derive(Clone, Copy)]
 pub(crate) struct Filling<T> {
     pub place: Place<T>,
@@ -185,7 +187,8 @@ impl FillCurves {
         Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * inv_h, inv_h }
     }
 
-    /// Returns the first `modes` modes and the rigid liquid at a mass of liquid, kg.
+    /// Returns the contents of a tank at a mass of liquid, kg: the first `modes` modes and the
+    /// rigid liquid.
     pub fn filling<T: Number>(&self, modes: usize, liquid: T) -> Filling<T> {
         let place = self.place(liquid);
         let mut each = [[[T::constant(0.0); 3]; 3]; MODES];
@@ -199,12 +202,13 @@ impl FillCurves {
         [0, 1, 2].map(|k| self.rigid[k].evaluate(at))
     }
 
-    /// Returns the damping ratio of a mode at `g_ref`, if the table gives it.
+    /// Returns the damping ratio at the specific force `g_ref` of mode `n`, if the table gives it.
     pub fn zeta<T: Number>(&self, n: usize, at: Place<T>) -> Option<T> {
         self.modes[n].zeta.as_ref().map(|curve| curve.evaluate(at)[0])
     }
 
-    /// Returns s and kappa of a mode, if the table gives them.
+    /// Returns the coefficients s and kappa of mode `n`, each with its first two derivatives, if
+    /// the table gives them.
     pub fn surface<T: Number>(&self, n: usize, at: Place<T>) -> Option<[Jet<T>; 2]> {
         self.modes[n]
             .surface
@@ -236,8 +240,8 @@ mod tests {
     use alloc::vec::Vec;
     use taylor::number::Dual;
 
-    /// Uses random monotone data, some with constant stretches: no slope has the wrong sign, and the values and both derivatives
-    /// agree on both sides of a point.
+    /// Interpolation of random monotone data, some with constant stretches: no slope has the wrong
+    /// sign, and the values and both derivatives agree on both sides of a point.
     #[test]
     fn interpolation_is_monotone_and_has_two_continuous_derivatives() {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -266,8 +270,8 @@ mod tests {
         }
     }
 
-    /// The table over the fill gives modal masses, lengths, hinges and inertias with their derivatives by the mass of
-    /// liquid.
+    /// The derivatives of modal masses, lengths, hinges and inertias by the mass of liquid, as the
+    /// fill table computes them, are compared with finite differences.
     #[test]
     fn derivatives_equal_finite_differences() {
         let default = crate::Tank::default().fill;

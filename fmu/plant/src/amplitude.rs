@@ -68,7 +68,8 @@ pub struct Growth {
     omega: Series,
     excess: Series,
     rounded: Series,
-    /// Viscous drag relative to its value at the start of the expansion.
+    /// Viscous drag coefficient over its value at the start of the expansion, as a power series in
+    /// time.
     pub viscous: Series,
     share: f64,
     gain: f64,
@@ -103,8 +104,10 @@ impl Growth {
         Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts an expansion with W and its rate `w`, at [|q|^2, |q'|^2]. `c` is the other drag coefficient,
-    /// whose viscous part follows `viscous`. Returns the coefficient of both together.
+    /// Starts an expansion of the drag with W and its rate `w`, at the squares of slosh angle and
+    /// rate [|q|^2, |q'|^2]. `m` is the slosh mass, kg; `c` is the drag coefficient that does not
+    /// depend on the amplitude, whose viscous part follows the series `viscous`. Returns the
+    /// coefficient of the whole drag.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -146,8 +149,9 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns the relative drag and the quantity u of the module's head, at `h` (s) after the start of the expansion.
-    /// u comes from its series up to order n, and the drag is computed from u and from the other drag (`other`). The
+    /// Returns the drag over its value at the start of the expansion, and the quantity u of the
+    /// module's head, at `h`, s, after that start. u comes from its series up to order n, and the
+    /// drag is computed from u and from the drag `other` that does not depend on the amplitude. The
     /// difference from the drag's own series is therefore the error of this series.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);

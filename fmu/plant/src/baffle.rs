@@ -31,10 +31,12 @@ use taylor::series::{Series, ZERO, mul_ramp, time_within, values};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
-/// Range, over the ring's width, of the wave times exp(-1.84 d/R) in which the law holds.
+/// Range in which the law of Keulegan and Carpenter holds for the ratio of the wave's amplitude,
+/// times exp(-1.84 d/R), to the ring's width.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 as a share of the amplitude at which the range begins; it adds 2e-4 of the damping there.
+/// A_0 as a share of the wave amplitude from which on the baffle's law holds. It adds 2e-4 of the
+/// damping at that amplitude.
 const FLOOR: f64 = 0.03;
 
 /// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
@@ -162,16 +164,17 @@ impl Baffle {
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 
-    /// Returns the amplitude of the motion, rad, and the baffle's damping ratio, at W = `w` and [|q|^2,
-    /// |q'|^2].
+    /// Returns the amplitude A of the slosh angle, rad, and the damping ratio that the baffle adds,
+    /// at W = `w` and the squares of slosh angle and rate [|q|^2, |q'|^2].
     pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
         let w = w + T::constant(self.w_floor);
         let amplitude = (q2 + v2 / w).sqrt();
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts an expansion with W and its rate `w`, at [|q|^2, |q'|^2], with the viscous drag coefficient
-    /// `c`, which follows `viscous`. Returns the coefficient of both together.
+    /// Starts an expansion of the drag with W and its rate `w`, at the squares of slosh angle and
+    /// rate [|q|^2, |q'|^2]. `m` is the slosh mass, kg; `c` is the viscous drag coefficient, which
+    /// follows the series `viscous`. Returns the coefficient of baffle and viscous drag together.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -199,16 +202,16 @@ impl Baffle {
         self.share * self.viscous[n] + self.gain * self.root[n]
     }
 
-    /// Returns the time, s, over which the series converge, from coefficients 0 to 2. Singularities are at W
-    /// = 0 and where the bracket is 0.
+    /// Returns the time, s, over which the series of the baffle's drag converge, from coefficients
+    /// 0 to 2. Singularities are at W = 0 and where the bracket W (|q|^2 + A_0^2) + |q'|^2 is 0.
     pub fn convergence_radius(&self) -> f64 {
         let sum = time_within(self.sum[0], self.sum[1].abs(), self.sum[2].abs());
         sum.min(time_within(self.w[0], self.w[1].abs(), 0.0))
     }
 
-    /// Returns the relative drag and the bracket at `h` after the start of the expansion. Both come from the
-    /// series of the bracket and of the viscous drag up to order n, so that the error of the drag's own
-    /// series follows.
+    /// Returns the drag over its value at the start of the expansion, and the bracket W (|q|^2 +
+    /// A_0^2) + |q'|^2, at `h`, s, after that start. Both come from the series of the bracket and
+    /// of the viscous drag up to order n, so that the error of the drag's own series follows.
     pub fn drag_at(&self, n: usize, h: f64) -> [f64; 2] {
         let [sum, viscous] = values([&self.sum, &self.viscous], n, h);
         let (sum, w) = (sum.max(0.0), f64::max(self.w[0] + self.w[1] * h, 0.0));

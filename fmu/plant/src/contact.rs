@@ -1,5 +1,3 @@
-//! Contact state of the bearing: stick or slip.
-
 /// Contact between hub and bearing under a friction law that switches at rest. The numbers are the values of the output
 /// `friction_mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,9 +17,9 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Share of the largest g on a ramp below which the factor is replaced by its mean, because its power series
-/// converge only up to g = 0. The time below this share is so short that the error, of second order in the
-/// time, is below rounding.
+/// Share of the largest specific force g on a ramp below which the factor c/c_0 is replaced by its
+/// mean, because its power series converge only up to g = 0. The time below this share is so short
+/// that the error, of second order in the time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
 /// Largest step as a share of the series' radius of convergence, the time to g = 0.
@@ -38,8 +38,8 @@ pub struct Damping {
 }
 
 impl Damping {
-    /// Creates the damping. `calculated` must belong to the specific force `reference`, m/s2, at which every
-    /// mode has a restoring force.
+    /// Creates the damping of all modes. The damping ratios in `calculated` must be those at the
+    /// specific force `reference`, m/s2, at which every mode must have a restoring force.
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
         let by_correlation =
             p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;
@@ -58,8 +58,9 @@ impl Damping {
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// Returns the damping ratio of mode `n` at g. It is 0 without restoring force, and where it overflows
-    /// close to that point, because it has no meaning there.
+    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. It is 0 without
+    /// restoring force, and so close to that point that the formula overflows, because the ratio
+    /// has no meaning there.
     pub fn ratio(&self, n: usize, g: f64) -> f64 {
         let (zeta, a) = (self.zeta[n], self.centring[n]);
         match self.exponent == 0.25 {
@@ -75,9 +76,10 @@ impl Damping {
         if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
-    /// Gives the pendulum of mode `n` its restoring specific force and the series of its damping from here
-    /// on. Returns the time, s, for which the series holds. If g + a is below `floor`, the factor is its mean
-    /// until the ramp ends or g + a reaches twice `floor`.
+    /// Sets the restoring specific force of mode `n` and the series of its drag factor c/c_0 in the
+    /// mode's `pendulum`, from the specific force `g` and its slope. Returns the time, s, for which
+    /// the series hold. If g + a_n is below `floor`, the factor is its mean until the ramp ends or
+    /// g + a_n reaches twice `floor`.
     pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
         let a = self.centring[n];
         let x = g.value + a;
@@ -98,14 +100,14 @@ impl Damping {
         reach
     }
 
-    /// Returns the specific force, m/s2, below which the factor is held while g follows a ramp for `h`
-    /// seconds.
+    /// Returns the specific force, m/s2, below which the drag factor c/c_0 is replaced by its mean
+    /// while g follows a ramp for `h` seconds.
     pub fn floor(g: Ramp, h: f64) -> f64 {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.value_at(h)) }
     }
 
-    /// Writes the binomial series of the factor relative to its first value into `c`. `relative` is the
-    /// ramp's slope over its first value, 1/s.
+    /// Writes the binomial series of the drag factor c/c_0, divided by its value at the start, into
+    /// `c`. `relative` is the slope of the specific force over its value at the start, 1/s.
     fn series(&self, relative: f64, c: &mut Series) {
         for n in 0..RAMP_ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;

@@ -19,8 +19,8 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples that are taken at one instant. A host that has passed more of them ignores
-/// time events.
+/// Largest number of gyro samples that are taken at one instant. A host that has passed more
+/// samples in one step does not handle the FMU's time events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
@@ -264,7 +264,6 @@ impl Plant {
         self.next_sample().map(|due| self.state.time + due)
     }
 
-    /// Takes the gyro's next sample if it is due at the host's present time. Returns true if it was.
     pub(crate) fn takes_sample(&mut self) -> bool {
         let is_due = |due| self.imu.is_due(due, self.resolution);
         let takes = self.next_sample().is_some_and(is_due);
@@ -606,7 +605,8 @@ mod tests {
         assert!(plant.take_event(&inputs).is_err());
     }
 
-    /// A step of 1e12 s with the gyro enabled would take 5e13 samples.
+    /// A step of 1e12 s with the gyro enabled would take 5e13 samples, more than `solver.max_steps`
+    /// allows.
     #[test]
     fn a_step_with_more_samples_than_allowed_is_refused_at_once() {
         let mut p = Parameters::default();

@@ -14,7 +14,8 @@
 
 use crate::parameters::Imu;
 
-/// Part of a sampling period by which a sample may be early, besides the resolution of the host's clock.
+/// Share of a sampling period by which the gyro may take a sample early, in addition to the
+/// resolution of the host's clock.
 const SLACK: f64 = 1e-6;
 
 pub(crate) const FLICKERS: usize = 8;
@@ -46,9 +47,10 @@ impl Imu {
         gyro
     }
 
-    /// Takes the samples that fall due within `length` from `since_start` on, both s, but at most one more
-    /// than `allowed`. `omega` is the hub's rate as a function of the time within `length`. Returns the
-    /// number of samples.
+    /// Takes all gyro samples that fall due within `length`, s, after `since_start`, s since the
+    /// start of the simulation. It stops after one sample more than `allowed`, so that the caller
+    /// can refuse the step. `omega` is the hub's rate as a function of the time within `length`.
+    /// Returns the number of samples.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
@@ -102,8 +104,9 @@ impl Imu {
         gyro.next += 1;
     }
 
-    /// Moves all processes of the flicker noise by sample `k`; `keep` returns the part of a process that
-    /// remains, from its correlation time, s.
+    /// Advances all processes of the flicker noise by one sample, number `k`. `keep` maps the
+    /// correlation time of a process, s, to the fraction of the process that remains after one
+    /// sample.
     fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;
@@ -266,8 +269,8 @@ mod tests {
         }
     }
 
-    /// A reading is the rate plus the bias plus a multiple of the normal number of (seed, k); the bias
-    /// continues with the pair's other number.
+    /// A gyro reading at rest is the rate plus the bias plus a multiple of the first of the two
+    /// normal numbers that the seed gives for sample k; the second number drives the bias.
     #[test]
     fn a_reading_is_rate_bias_and_the_seed_s_own_noise() {
         let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };

@@ -57,8 +57,8 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Returns the tilt of the bench at the start; `None` for an upright bench and for a tank given by a
-    /// table.
+    /// Returns the tilt of the bench at the start of the motion; `None` for an upright bench and
+    /// for modes given by a table.
     pub fn from_parameters(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
@@ -67,14 +67,16 @@ impl Leaning {
         })
     }
 
-    /// Returns f of mode `n`, which counts from 0, along the tangent and across it.
+    /// Returns the factors f by which the tilt changes the squared frequency of mode `n`, which
+    /// counts from 0, along the tangent and across it.
     fn factors(self, n: usize, fill: f64) -> [f64; 2] {
         let [along, across] = factors(n, fill, self.slope);
         let mixed = |part: f64| along * part + across * (1.0 - part);
         [mixed(self.tangential), mixed(1.0 - self.tangential)]
     }
 
-    /// Returns mode `n`, which counts from 0, for the pendulum `upright` of the upright tank.
+    /// Returns mode `n`, which counts from 0, of the tilted tank from its pendulum `upright` in an
+    /// upright tank.
     pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
         let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
         let oblique = self.oblique(n, p);
@@ -119,7 +121,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Relative error of a common frequency in the radial direction above which a warning follows.
+/// Relative error of a mode's frequency in the radial direction above which a warning follows.
+/// Models with one pendulum for both directions have such an error.
 const APART: f64 = 0.01;
 
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {

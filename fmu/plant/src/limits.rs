@@ -29,7 +29,8 @@ const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 pub(crate) struct Limits {
     mode: [ModeLimits; MODES],
     spin: SpinLimit,
-    /// Bond number over g, s2/m; 0 if surface tension has no effect.
+    /// Bond number of the tank over g, s2/m; 0 if surface tension does not limit the range of the
+    /// modes.
     bond_per_g: f64,
 }
 
@@ -81,8 +82,9 @@ impl Limits {
         }
     }
 
-    /// Returns the reason, if any, why modes at these angles, with their squared frequencies, do not
-    /// represent the liquid on a hub with the rate `omega`, rad/s.
+    /// Returns the reason, if any, why the modes do not represent the liquid on a hub with the rate
+    /// `omega`, rad/s. `modes` yields for each mode its slosh angles, its squared frequency, 1/s2,
+    /// and its pendulum length, m.
     pub fn reason(&self, modes: impl Iterator<Item = (Angles, f64, f64)>, omega: f64) -> LimitedBy {
         let mut reason = LimitedBy::None;
         for (n, (angles, omega2, l)) in modes.enumerate() {

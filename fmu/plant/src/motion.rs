@@ -74,13 +74,15 @@ pub(crate) struct Motion {
     pub law: Law,
     pub suspension: Suspension,
     pub damping: Damping,
-    /// True if drag or weight change along an expansion at constant g: with amplitude-dependent drag, on a
-    /// tilted bench, and with modes in other directions than the tangent.
+    /// True if drag or weight of a slosh mass changes along an expansion although g is constant:
+    /// with amplitude-dependent drag, on a tilted bench, and with modes in other directions than
+    /// the tangent.
     pub varies: bool,
     with_amplitude: bool,
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// The g and its rate set in the modes; NaN if none is set, or if it is valid only for an instant.
+    /// The specific force g, m/s2, and its rate with which the modes were last expanded; NaN if
+    /// there was no expansion, or if it is valid only for an instant.
     g: [f64; 2],
     near_weightless: f64,
     tolerance: f64,
@@ -258,8 +260,8 @@ impl Motion {
         self.derivatives(0, (true, self.suspension.exists), modes, contact);
     }
 
-    /// Returns the contact from the hub's rate or, at rest, from the torque that the bearing would have to
-    /// hold.
+    /// Returns the contact of hub and bearing: from the hub's rate if it turns, and at rest from
+    /// the torque that the bearing would have to hold.
     pub fn contact<M: SloshMode>(&mut self, modes: &mut [M], state: &State) -> Contact {
         let omega = state.x[x::OMEGA];
         if !self.law.switches_at_rest() || omega > 0.0 {
@@ -282,7 +284,8 @@ impl Motion {
         Steps::new(self.max_steps, ADVICE)
     }
 
-    /// Returns the time within `h` at which the hub comes to rest, from the series of order n.
+    /// Returns the time within `h`, s, at which the hub comes to rest, from the series of its rate
+    /// up to order n; `None` if it keeps turning.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
         let omega = &self.hub.omega;
         let change = omega[1..=n].iter().rev().fold(0.0, |sum, x| (sum + x.abs()) * h);
@@ -298,8 +301,8 @@ impl Motion {
         first_root(&rate[behind..=n], h)
     }
 
-    /// Returns the time within `h` at which the torque exceeds the bearing's static friction, and the
-    /// direction of the motion that follows.
+    /// Returns the time within `h`, s, at which the torque on a stuck hub exceeds the bearing's
+    /// static friction, and the direction of the motion that follows; `None` if it stays stuck.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.law.holding_torques(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
@@ -587,7 +590,8 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 }
 
-/// Returns the larger of two magnitudes. A NaN may get lost here, because it ends the step elsewhere.
+/// Returns the larger of two magnitudes. A NaN may get lost, which is harmless because other code
+/// ends a step with NaN.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }

@@ -78,7 +78,8 @@ impl Plant {
         outputs
     }
 
-    /// Returns [`Plant::outputs`] with contact and regime as they were after the last event.
+    /// Returns the same outputs as [`Plant::outputs`], but with contact and regime as they were
+    /// after the last event, for hosts that handle events.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);
@@ -195,7 +196,8 @@ impl Plant {
         self.present::<Dual>(dx, tau_cmd, work_axial)
     }
 
-    /// Updates the ranges among the outputs to the current outputs.
+    /// Updates those outputs that say in which range of validity the plant is (regime, baffle,
+    /// limiting reason), from the other values in `outputs`.
     pub fn update_ranges(&self, outputs: &mut Outputs) {
         let Ranges { regime, baffle, limited_by } = self.evaluate_ranges(outputs);
         outputs.discrete.regime = regime;

@@ -1,5 +1,3 @@
-//! Finds parameters whose value another parameter replaces.
-
 use alloc::format;
 use alloc::string::String;
 

@@ -1,5 +1,3 @@
-//! One slosh mode as a pendulum: its constants, its restoring force and its drag.
-
 use alloc::format;
 use alloc::string::String;
 
@@ -87,7 +85,9 @@ impl Pendulum {
         self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
     }
 
-    /// Sets the viscous coefficient, `factor` times that at the reference g, and its further course.
+    /// Sets the viscous drag coefficient of the slosh mass to `factor` times its value at the
+    /// reference g. `course` is the series of the coefficient over its value at the start of the
+    /// expansion.
     pub fn set_damping(&mut self, factor: f64, course: Series) {
         self.c = factor * self.c_0;
         self.c_m = self.c / self.m;
@@ -99,8 +99,8 @@ impl Pendulum {
         self.baffle.zeta > 0.0 || self.growth.acts
     }
 
-    /// Adds the drag of the baffle and the amplitude-dependent drag at [|q|^2, |q'|^2], the squares of angle
-    /// and rate.
+    /// Adds the drag of the baffle and of waves of finite height to the viscous drag. `at` holds
+    /// |q|^2 and |q'|^2, the squares of slosh angle and rate.
     pub fn add_amplitude_drag(&mut self, at: [f64; 2]) {
         let w = self.g.map(|g| g * self.inv_l);
         if self.baffle.zeta > 0.0 {

@@ -33,7 +33,8 @@ use crate::wheel::{self, Piece};
 pub struct Plant {
     calculated: Calculated,
     pub(crate) hub_inertia: f64,
-    /// Mass and inertia of the rigid liquid, kg, kg m2, and distance of the tank, m.
+    /// Mass of the rigid liquid, kg, followed by the inertia of the rigid liquid, kg m2, and the
+    /// distance of the tank from the bearing axis, m.
     pub(crate) m_0: f64,
     pub(crate) i_0: f64,
     pub(crate) r: f64,
@@ -46,7 +47,7 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
-    /// Times of the host that differ by less than this, s, are the same.
+    /// Two times of the host that differ by less than this, s, count as equal.
     pub(crate) resolution: f64,
     pub(crate) stopped: Option<StoppedStep>,
 }
@@ -408,8 +409,9 @@ impl Plant {
         self.work_axial_at(change, self.height())
     }
 
-    /// Computes [`Plant::work_axial`] from g_axial's change since the last accepted step and from the
-    /// liquid's mass times height.
+    /// Computes the work of changes of g_axial, J, as [`Plant::work_axial`] returns it. `change` is
+    /// g_axial's change since the last accepted step; the array holds the liquid's mass times
+    /// height and its rate.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
         let c = T::constant;

@@ -51,8 +51,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns the amplitude at the end of the model's range: an angle, rad, or a displacement over the
-    /// length.
+    /// Returns the largest amplitude for which the slosh model is defined: an angle, rad, or for
+    /// `liquid` a displacement over the pendulum length.
     pub(crate) fn largest_amplitude(self) -> f64 {
         match self {
             SloshModel::Frozen
@@ -74,8 +74,10 @@ impl SloshModel {
         }
     }
 
-    /// Returns F and M of a pendulum with the coefficients s and kappa that hangs obliquely by the slope
-    /// `slope`, whose tangential part, squared, is `n2`.
+    /// Returns the factor F of the squared frequency and the factor M of the slosh mass
+    /// (`leaning.rs`) of a pendulum that hangs obliquely on a tilted bench. s and kappa are its
+    /// large-wave coefficients, `slope` is the tangent of the tilt, and `n2` the square of the tilt
+    /// direction's tangential component.
     pub(crate) fn oblique(self, slope: f64, n2: f64, (s, kappa): (f64, f64)) -> Oblique {
         let s2 = slope * slope;
         match self {

@@ -77,9 +77,9 @@ pub struct State {
     pub(crate) gyro: Gyro,
 }
 
-/// Work done by a changing g_axial since the start, J, and the g_axial, m/s2, up to which it is known.
-/// `accepted` is the last accepted step of a host that integrates itself; after a step of the plant's own it
-/// is empty, because g_axial then changes at an instant.
+/// Work done by a changing g_axial since the start, J, and the g_axial, m/s2, up to which this work
+/// is known. `accepted` holds the last accepted step of a host that integrates itself. It is empty
+/// after a step that the plant has integrated, because g_axial then changes only at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
     pub work: f64,
@@ -87,7 +87,8 @@ pub(crate) struct Axial {
     pub accepted: Option<Accepted>,
 }
 
-/// The liquid at the end of an accepted step: mass times height, kg m, and its rate.
+/// The liquid at the end of a step that a Model Exchange host has accepted: mass times height, kg
+/// m, and the rate of this product.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Accepted {
     pub time: f64,
@@ -204,7 +205,8 @@ impl State {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Moves the clock to `t` after `begin`, which is a time of the host and the time since the start, s.
+    /// Moves the clock to `t`, s, after `begin`. `begin` holds the host's time, s, and the time
+    /// since the start with its rounding error, s.
     pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
         let (time, elapsed) = begin;
         self.time = time + t;

@@ -222,8 +222,9 @@ impl Slosh {
         self.zeta_amplitude > 0.0 || self.zeta_breaking > 0.0
     }
 
-    /// Returns the parameters of breaking waves for mode `n`, which counts from 0, whose wave at the wall is `wave` per
-    /// angle, m/rad. If the table gives no wave number, the wave number of an upright cylinder of this radius, m, is used.
+    /// Returns the parameters of breaking waves for mode `n`, which counts from 0. `wave` is the
+    /// elevation at the wall per slosh angle, m/rad. If the table of modes gives no wave number,
+    /// the wave number of an upright cylinder of this `radius`, m, is used.
     pub(crate) fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
         let k = match self.source {
             SloshSource::Table if self.table.wave_number[n] > 0.0 => self.table.wave_number[n],

@@ -13,8 +13,9 @@ use alloc::vec::Vec;
 use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
-/// A part of a step along which the wheel's torque is linear in time: its length, s, the rotor's speed at its
-/// end, rad/s, and the torque limit, or zero, that the command passes there.
+/// A part of a step along which the wheel's torque is linear in time: its length, s, the rotor's
+/// speed at its end, rad/s, and the level, a torque limit or zero, that the torque command passes
+/// at its end.
 pub(crate) struct Piece {
     pub length: f64,
     pub torque: Ramp,
@@ -22,8 +23,9 @@ pub(crate) struct Piece {
     pub passed: Option<f64>,
 }
 
-/// Returns a command after `t`, when it has reached the level `passed`. Rounding may leave it before this
-/// level by an ulp, so that it would pass it again after no time, and again.
+/// Returns the torque command after `t`, s, when it has just reached the level `passed`, a torque
+/// limit or zero. Rounding may leave the command one unit in the last place before this level. It
+/// would then pass the level again after no time, and again, so it is set to the level.
 pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp {
     let now = command.shifted(t);
     match passed {
@@ -114,8 +116,8 @@ mod tests {
         (impulse, speed, pieces)
     }
 
-    /// Rounding must not let a command pass the same limit twice, because pieces of no length would then
-    /// follow each other until the step is refused.
+    /// A torque command passes each limit of the wheel once although times are rounded. Otherwise
+    /// parts of a step with no length would follow each other until the step is refused.
     #[test]
     fn a_torque_command_passes_each_limit_once_despite_rounding() {
         let mut rng = fastrand::Rng::with_seed(1);
@@ -131,7 +133,8 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
-    /// A torque command, constant or rising from 0, at the lowest and at the highest speed of the rotor.
+    /// A wheel whose rotor has reached its lowest or highest speed, under a torque command that is
+    /// constant or rises from 0.
     #[test]
     fn a_wheel_at_a_speed_limit_gives_only_torque_that_leads_away_from_the_limit() {
         let w = wheel();
@@ -227,8 +230,8 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit at the right time, on a ramp and with a
-    /// constant torque.
+    /// From the impulse, I_w (W_0 - W) = a t + b t^2/2 with the torque a + b t: the rotor meets its
+    /// speed limit at the right time, on a ramp and with a constant torque.
     #[test]
     fn the_rotor_reaches_its_speed_limit_at_the_time_that_the_impulse_of_the_torque_gives() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };

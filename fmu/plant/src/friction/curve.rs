@@ -8,8 +8,9 @@ use taylor::series::{self, Series, ZERO};
 
 use crate::parameters::Friction;
 
-/// Rate over w_s up to which the excess over Coulomb friction is above 1e-4 of d, so that every usual
-/// tolerance sees its terms.
+/// Ratio of the hub's rate to the Stribeck speed w_s up to which the excess over Coulomb friction
+/// is above 1e-4 of its value d at rest. Every usual tolerance then sees the terms of its power
+/// series.
 const VISIBLE: f64 = 3.0;
 
 /// Ratio of the rate to the Stribeck speed w_s above which the excess d exp(-(w/w_s)^2) is below 1e-12 d, so that it counts as 0.

@@ -34,7 +34,8 @@ impl OneWay {
         self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
     }
 
-    /// Returns a lower bound of B over all angles, which is low by at most 2e-6 of the harmonics' size.
+    /// Returns a lower bound of B over all angles. It is below the true minimum by at most 2e-6 of
+    /// the amplitude of the terms that depend on the angle.
     fn lowest(&self) -> f64 {
         if self.harmonics == [0.0; 4] {
             return self.mean;
@@ -77,7 +78,8 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Lists problems of the combined parameters: dry friction must not drive the hub at any angle.
+    /// Returns one message for each reason why the parameters are not acceptable. Dry friction must
+    /// not drive the hub at any angle, so B must be positive.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
@@ -94,7 +96,8 @@ impl DirectionalFactor {
             .collect()
     }
 
-    /// Returns the smallest and the largest B over both directions and all angles.
+    /// Returns the smallest and the largest value of the factor B over both directions of rotation
+    /// and all angles of the hub.
     pub fn bounds(&self) -> (f64, f64) {
         let both = [self.forward, self.backward];
         let mirrored = both.map(|b| OneWay { mean: -b.mean, harmonics: b.harmonics.map(|h| -h) });
@@ -110,7 +113,7 @@ impl DirectionalFactor {
         self.trig.is_some()
     }
 
-    /// Returns B of the hub's direction of rotation without its harmonics.
+    /// Returns the mean of the factor B over the angle, for the hub's direction of rotation.
     pub fn mean(&self, contact: Contact) -> f64 {
         self.one_way(contact).mean
     }

@@ -142,8 +142,8 @@ impl FrictionLaw for Lugre {
         [*z] = series::values([&self.z], n, t);
     }
 
-    /// Returns the coefficient of the deflection relative to the largest deflection, so that torques have the
-    /// same tolerance as dry friction.
+    /// Returns coefficient n of the bristles' deflection over the largest deflection. The error of
+    /// the friction torque then has the same tolerance as under dry friction.
     fn coefficient_norm(&self, n: usize) -> f64 {
         self.z[n].abs() * self.inv_deflection
     }

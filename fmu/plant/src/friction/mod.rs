@@ -38,7 +38,8 @@ pub trait FrictionLaw {
         Vec::new()
     }
 
-    /// Sets coefficient n of the law's own state: 0 is its value, 1 its direction for a partial derivative.
+    /// Sets coefficient n of the series of the law's own state, for example the deflection of the
+    /// bristles: coefficient 0 is its value, coefficient 1 its direction for a partial derivative.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
     /// Returns coefficient n of the friction torque tau_f while the hub is not stuck. It follows from the coefficients
@@ -62,7 +63,8 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Advances the law's own state z by `t` seconds with its series up to order n.
+    /// Advances the law's own state z, for example the deflection of the bristles, by `t` seconds
+    /// with its series up to order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
     #[inline(always)]
@@ -89,7 +91,8 @@ pub trait FrictionLaw {
     }
 }
 
-/// Dispatches over the law of every [`FrictionModel`]. The compiler reports a missing law.
+/// Passes a call on to the friction law that the plant uses. There is one for every
+/// [`FrictionModel`]; the compiler reports a missing one.
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
         /// The friction law in use, with the functions of [`FrictionLaw`]. The plant has one law, which is stored together

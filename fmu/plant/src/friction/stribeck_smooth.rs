@@ -35,7 +35,8 @@ pub struct StribeckSmooth {
 }
 
 impl FrictionLaw for StribeckSmooth {
-    /// Four, because three successive terms of tanh(w/eps) vanish by symmetry if the motion starts with w = w' = 0.
+    /// Four terms, because three successive terms of tanh(w/eps) vanish by symmetry if the motion
+    /// starts with w = w' = 0.
     const NEGLIGIBLE_TERMS: usize = 4;
 
     fn new(p: &Friction) -> StribeckSmooth {

@@ -31,7 +31,8 @@ use planar::Planar;
 use spherical::Spherical;
 use third_order::ThirdOrder;
 
-/// Defines the functions of [`SloshMode`] that are alike in all models that store their pendulum in the field `p`.
+/// Defines those functions of [`SloshMode`] that are alike in all models that store their pendulum
+/// in the field `p`.
 macro_rules! own_pendulum {
     () => {
         fn pendulum(&self) -> &Pendulum {
@@ -181,8 +182,8 @@ pub trait SloshMode {
     }
     fn pendulum(&self) -> &Pendulum;
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Returns the squares of angle and angular rate, rad2, rad2/s2, after `start`. `ThirdOrder` has
-    /// displacement over length instead of the angle.
+    /// Returns the squares of slosh angle, rad2, and its rate, rad2/s2, at the start of the
+    /// expansion. In the model `ThirdOrder`, displacement over length takes the place of the angle.
     fn amplitude2<T: Number>(&self) -> [T; 2];
     fn coordinates(&self, at: &Angles) -> [f64; 4];
     fn angles<T: Number>(&self) -> Angles<T>;
@@ -209,16 +210,17 @@ pub trait SloshMode {
     /// from their series up to order n. `varies` is true if g, drag or weight change along the expansion; otherwise the
     /// modes move along the tangent.
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
-    /// Returns mass times height above rest, kg m, and its rate.
+    /// Returns the slosh mass times its height above rest, kg m, which is the potential energy over
+    /// g, and the rate of this product.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
     /// Returns the force of the slosh mass on the tank, N, radial and tangential.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
-    /// Returns the torque of the slosh mass on the hub, N m.
+    /// Returns the torque about the bearing axis with which the slosh mass acts on the hub, N m.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T;
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns the angular momentum about the bearing axis, kg m2/s.
+    /// Returns the angular momentum of the slosh mass about the bearing axis, kg m2/s.
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns the reason, if any, why the coordinates are outside the model's range.
+    /// Returns the reason, if any, why the slosh model is not valid at these coordinates of a mode.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

@@ -59,7 +59,9 @@ pub struct Spherical {
     dir: Vector2,
     dir_z: Series,
     dir_d: Vector2,
-    /// The rate p' times the course of the damping: horizontal with exchanged components, and upwards.
+    /// The rate p' of the slosh mass's direction times the drag coefficient over its value at the
+    /// start of the expansion: the horizontal part with exchanged components, and then the upward
+    /// component.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,
@@ -345,7 +347,8 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// Returns the torque, of the tension at the hinge and of the drag at the slosh mass.
+    /// Returns the torque about the bearing axis: of the tension, which acts at the hinge, and of
+    /// the drag, which acts at the slosh mass.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
@@ -417,8 +420,8 @@ mod tests {
         }
     }
 
-    /// The direction p and its velocity v must describe the same motion as the coordinates, for angles
-    /// between hanging and 20 degrees from straight up.
+    /// Checks that the direction p of the slosh mass and its velocity v describe the same motion as
+    /// the coordinates xi, for angles between hanging and 20 degrees from straight up.
     #[test]
     fn direction_and_velocity_follow_lagranges_equations() {
         let mut rng = fastrand::Rng::with_seed(3);
