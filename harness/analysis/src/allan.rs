@@ -29,7 +29,8 @@ pub use self::fit::{Estimate, Fit, Octaves, Outlier};
 
 use std::f64::consts::{LN_2, PI};
 
-/// Flat part of the Allan deviation of flicker noise over B; the FMU's bias has sigma = B/0.664.
+/// Ratio of the flat part of the Allan deviation of flicker noise to the bias instability B. The
+/// FMU's Gauss–Markov bias has the standard deviation B/0.664.
 pub const FLICKER: f64 = 0.664;
 
 const PER_DECADE: f64 = 15.0;
@@ -40,7 +41,7 @@ pub struct Point {
     pub variance: f64,
 }
 
-/// The longest averaging time is the length of the record divided by this number.
+/// Ratio of a record's length to the longest averaging time of its Allan variances.
 const LONGEST: usize = 10;
 
 /// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally spaced in
@@ -148,7 +149,7 @@ impl Noise {
         all.into_iter().filter(|term| self.coefficient(*term) > 0.0).collect()
     }
 
-    /// Returns the Allan variance at averaging time `tau` (s), (rad/s)².
+    /// Returns the Allan variance of this noise, (rad/s)², at the averaging time `tau`, s.
     pub fn variance(&self, tau: f64) -> f64 {
         let part = |term: Term| self.coefficient(term) * term.variance(tau, self.bias_time);
         self.terms().into_iter().map(part).sum()

@@ -39,9 +39,9 @@ pub struct Demodulated<const N: usize> {
     pub noise_gain: Vec<f64>,
 }
 
-/// Returns the standard deviation of |H| relative to |H|, which is also the standard deviation of the phase in rad.
-/// `unexplained` is the two-sided power spectral density of the part of the output that the response does not
-/// explain.
+/// Returns the standard deviation of |H| over |H|, which is also the standard deviation of the
+/// phase in rad. `unexplained` is the two-sided power spectral density of the part of the output
+/// that the response does not explain, such as noise.
 pub fn deviation(
     response: &FrequencyResponse,
     unexplained: &[f64],

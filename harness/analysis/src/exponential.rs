@@ -2,13 +2,14 @@
 
 use std::ops::Mul;
 
-/// Largest sum of absolute values that is passed to nalgebra's exponential, which uses powers up to the 27th
-/// and never returns if one of them overflows.
+/// Largest sum of the absolute values of a matrix's elements with which the matrix is passed to
+/// nalgebra's exponential. That function uses powers up to the 27th and never returns if one of
+/// them overflows.
 const LARGEST: f64 = 1e9;
 
-/// Returns the exponential of `matrix`, whose absolute values add up to `size`; `exp` is nalgebra's
-/// exponential. A larger matrix is halved n times and its exponential squared n times. The result is NaN if
-/// the matrix is not finite.
+/// Returns the exponential of `matrix`, the absolute values of whose elements add up to `size`.
+/// `exp` is nalgebra's exponential. A matrix that is too large for `exp` is halved n times, and the
+/// exponential of the result is squared n times. The result is NaN if the matrix is not finite.
 pub fn exponential<M>(matrix: M, size: f64, exp: impl Fn(&M) -> M) -> M
 where
     M: Clone + Mul<M, Output = M> + Mul<f64, Output = M>,

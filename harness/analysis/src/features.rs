@@ -121,7 +121,8 @@ impl Features {
     }
 }
 
-/// Number of simulated errors, which determines a standard deviation to 7 %.
+/// Number of responses with simulated errors from which a standard deviation of a feature is
+/// computed; 100 determine it to 7 %.
 const DRAWS: usize = 100;
 const WAVES: usize = 8;
 

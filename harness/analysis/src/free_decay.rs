@@ -94,7 +94,8 @@ pub struct Start {
 }
 
 const FINE: usize = 4;
-/// The phasor is not used where its amplitude is below this fraction of the largest amplitude.
+/// Ratio of the phasor's amplitude to its largest amplitude in the record, below which the phasor
+/// is not used because noise dominates it.
 const LEAST_PART: f64 = 0.02;
 
 impl Start {

@@ -21,8 +21,8 @@ pub const LAGS: usize = 50;
 pub const WINDOW: usize = 1000;
 const BANDS: usize = 100;
 const FEWEST_LINES: usize = 4;
-/// Limit of each test in standard deviations: the chance of exceeding it is 1e-6 for one test and about 1e-4
-/// for about a hundred tests.
+/// Limit of each test, in standard deviations. If the residual is the gyro's noise, one test
+/// exceeds it with the probability 1e-6, and any of about a hundred tests with 1e-4.
 pub const LIMIT: f64 = 5.0;
 
 /// Results of the tests, in standard deviations of the results that chance would give.
@@ -110,8 +110,9 @@ fn normal(chi_squared: f64, n: f64) -> f64 {
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the largest excess over the median, in standard deviations, and its position. Each level is a mean
-/// of `n` squares; the excess is converted to a normal deviate, so that it is equally rare for every n.
+/// Returns the largest excess of a level over the median of all levels, as a standard normal
+/// deviate, and the position (time or frequency) of this level. Each level is a mean of `n`
+/// squares; the conversion makes an excess equally rare for every n.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
     // The median of χ² is below its mean.

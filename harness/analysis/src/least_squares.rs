@@ -5,7 +5,8 @@ pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
 /// Function that returns the derivatives of the residuals at x, one row per residual; `None` ends the search.
 pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
-/// Minimum of the sum of squares. `converged` is false if the search reached its limit of iterations.
+/// Minimum of a sum of squares, as [`minimise`] found it: the unknowns `x` and the `cost` there.
+/// `converged` is false if the search reached its limit of iterations.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     pub x: Vec<f64>,
@@ -14,8 +15,9 @@ pub struct Minimum {
     pub reason: String,
 }
 
-/// Returns the x of smallest norm that minimises |a x − b|. Singular values up to `least` count as 0. Returns
-/// `None` if an entry is NaN or infinite, because the iteration for the singular values would not end.
+/// Returns the solution x with the smallest norm of the least-squares problem |a x − b|. Singular
+/// values up to `least` count as 0. Returns `None` if an entry is NaN or infinite, because the
+/// iteration for the singular values would not end.
 pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector<f64>> {
     if !a.iter().chain(b.iter()).all(|entry| entry.is_finite()) {
         return None;

@@ -64,8 +64,8 @@ impl Linear {
         self.propagate(&|_| step, torque, &slopes, start)
     }
 
-    /// Simulates the rate at the times `time` (s) for a torque given by its value (N·m) there and its slope
-    /// (N·m/s) until the next.
+    /// Simulates the hub's rate, rad/s, at the times `time`, s. The torque is given by its value at
+    /// each time, N·m, and by its slope until the next time, N·m/s.
     pub fn simulate_ramps(
         &self,
         time: &[f64],
@@ -77,10 +77,10 @@ impl Linear {
         self.propagate(&step, torque, slopes, start)
     }
 
-    /// Simulates the rate for a torque given by its value (N·m) at the beginning of each step and its slope
-    /// (N·m/s) over the step. `step` is the length of each, s. The matrix exponential of the state and the
-    /// input's value and slope makes it exact. The state is ω, y = l α and y' for each mode, and the angle
-    /// from the start.
+    /// Simulates the hub's rate for a torque given by its value at the beginning of each step, N·m,
+    /// and its slope over the step, N·m/s. `step` returns the length of each step, s. The result is
+    /// exact, because it uses the matrix exponential of the states and of the torque's value and
+    /// slope. The states are ω, for each mode y = l α and y', and the hub's angle.
     fn propagate(
         &self,
         step: &dyn Fn(usize) -> f64,

@@ -20,7 +20,7 @@ use signals::fourier::Complex64;
 
 const SIDE: usize = 6;
 const LINES: usize = 2 * SIDE + 1;
-/// Number of unknowns: b0, b1, b2, t0, t1, t2, a.
+/// Number of unknowns of the local rational model: b0, b1, b2, t0, t1, t2, a.
 const UNKNOWNS: usize = 7;
 
 /// Returns the two-sided power spectral density of V (unit of the output squared, times s) at `frequencies`
@@ -56,7 +56,8 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
     frequencies.iter().map(at).collect()
 }
 
-/// Returns the mean of |V|² over the lines, or `None` without input or output.
+/// Returns the mean of |V|² over the spectral lines around one frequency, from the spectra `u` of
+/// the input and `y` of the output; `None` if one of them is 0.
 fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let mean = |x: &[Complex64]| x.iter().map(|x| x.norm()).sum::<f64>() / LINES as f64;
     let (scale_u, scale_y) = (mean(u), mean(y));
@@ -90,7 +91,8 @@ mod tests {
 
     const STEP: f64 = 0.02;
 
-    /// Returns the thesis's sweep with some amplitude, N·m, and the rate of the linear bench.
+    /// Returns the thesis's sweep with this torque amplitude, N·m, its torque, and the rate of the
+    /// linear bench under it.
     fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
         let sweep = Sweep { amplitude, ..Sweep::THESIS };
         let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();

@@ -27,7 +27,8 @@ pub struct OffAxis {
 }
 
 impl OffAxis {
-    /// Computes the figures from the forces (N) at every sample and the leakage over the sweep.
+    /// Computes the off-axis figures of a sweep from the radial and tangential force, N, at every
+    /// sample, and from the leakage at every frequency.
     pub fn from_forces(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
         let (mut off, mut all) = (0.0, 0.0);
         let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());

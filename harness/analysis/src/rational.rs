@@ -21,7 +21,8 @@ use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use signals::fourier::Complex64;
 
-/// Largest number of frequencies in a fit; of more frequencies an equally spaced selection is used.
+/// Largest number of spectral lines in a fit. If the band has more, lines at equal distances are
+/// selected.
 const POINTS: usize = 1500;
 const LEAST: usize = 20;
 const ROUNDS: usize = 20;
@@ -40,8 +41,9 @@ pub struct Rational {
 }
 
 impl Rational {
-    /// Fits the transfer function to torque and rate, sampled every `step` s, between two frequencies, Hz.
-    /// Returns `None` without data.
+    /// Fits the transfer function to torque, N·m, and rate, rad/s, sampled every `step` s, with
+    /// their spectra between the frequencies `from` and `to`, Hz. Returns `None` if the spectra
+    /// have no lines in between.
     pub fn fit(step: f64, torque: &[f64], rate: &[f64], (from, to): (f64, f64)) -> Option<Self> {
         let count = torque.len();
         let bin = 1.0 / (step * count as f64);

@@ -9,7 +9,8 @@ use crate::statistics::{deviation, mean, variance};
 
 const QUANTILES: usize = 200;
 const CHUNKS: usize = 1000;
-/// Largest magnitude in the histogram, and the usual width of its bins, in standard deviations.
+/// Largest magnitude that the histogram shows, and the usual width of its bins, both in standard
+/// deviations of the readings.
 const BINS: (f64, f64) = (5.0, 0.1);
 /// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat.
 /// Assoc. 69, 1974, table 1A, case 3: mean and variance estimated).
@@ -136,17 +137,18 @@ impl Rest {
         1.96 / (self.count as f64).sqrt()
     }
 
-    /// Returns the fraction of the autocorrelation, without lag 0, outside the 95 % interval of white noise.
-    /// It is 0.05 for white noise.
+    /// Returns the fraction of the lags, without lag 0, at which the autocorrelation is outside the
+    /// 95 % interval of white noise. It is 0.05 for white noise.
     pub fn outside(&self) -> f64 {
         let rest = &self.autocorrelation[1..];
         let out = rest.iter().filter(|r| r.abs() > self.white_bound()).count();
         out as f64 / rest.len().max(1) as f64
     }
 
-    /// Returns two ratios for chunks of `chunk` samples: the scatter of their means relative to white noise
-    /// with the record's standard deviation, and the scatter of their variances relative to normal noise
-    /// (√(2/n) of the variance). Both are 1 for white, stationary noise.
+    /// Returns two ratios for chunks of `chunk` samples: the standard deviation of the chunks'
+    /// means over the value that white noise would have, and the standard deviation of the chunks'
+    /// variances over the value that normal noise would have (√(2/n) of the variance). Both are 1
+    /// for white, stationary noise.
     pub fn scatter(&self, chunk: usize) -> [f64; 2] {
         let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
         let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();

@@ -15,14 +15,15 @@ use signals::fourier::Complex64;
 /// Swirl number above which motion counts as rotary; this is an ellipse with axes 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
 
-/// Smallest amplitude that is evaluated, rad. Below it the small radial part of a planar wave would make the
-/// swirl number meaningless.
+/// Smallest slosh angle, rad, at which the swirl number is evaluated. At smaller angles the small
+/// radial part of a planar wave would make it meaningless.
 pub const LEAST: f64 = 0.02;
 
 const PERIODS: f64 = 10.0;
 
-/// Rotary motion in a run: its duration, s, the swirl number with the largest magnitude, and for a sweep the
-/// first and last frequency with rotary slosh, Hz.
+/// Rotary motion in a run: its duration, s, the swirl number with the largest magnitude, and for a
+/// sweep the first and the last frequency, Hz, at which the slosh was rotary; `None` if there was
+/// none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
     pub from: Option<f64>,
@@ -31,7 +32,9 @@ pub struct Rotary {
     pub swirl: f64,
 }
 
-/// Returns the swirl number at each frequency, or 0 where the amplitude at this torque (N·m) is too small.
+/// Returns the swirl number at each frequency of the responses of the slosh angles, radial and
+/// tangential, to the torque. It is 0 where the slosh angle under a torque with the amplitude
+/// `torque`, N·m, is below [`LEAST`].
 pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque: f64) -> Vec<f64> {
     let number = |(x, y): (&Complex64, &Complex64)| {
         let power = x.norm_sqr() + y.norm_sqr();

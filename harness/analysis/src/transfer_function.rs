@@ -163,7 +163,8 @@ impl TransferFunction {
     }
 }
 
-/// Returns the fit in the time domain, %: 100 (1 − |y − ŷ| / |y − mean y|) (thesis 6.14).
+/// Returns how well the output of a model reproduces a measured signal, %: 100 (1 − |y − ŷ| / |y −
+/// mean y|) with the measured signal y and the model's output ŷ (thesis 6.14).
 pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     let mean = mean(measured);
     let miss: f64 = measured.iter().zip(model).map(|(y, m)| (y - m).powi(2)).sum();
@@ -225,8 +226,9 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
     })
 }
 
-/// Returns real pole, frequency and damping of s³ + c2 s² + c1 s + c0; unstable poles are mirrored to the
-/// left half plane.
+/// Returns the real pole, 1/s, and frequency, rad/s, and damping ratio of the pole pair of s³ + c2
+/// s² + c1 s + c0. Unstable poles are mirrored to the left half plane. `None` if the roots cannot
+/// be computed.
 fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     let cubic = |s: f64| ((s + c2) * s + c1) * s + c0;
     // One real root lies within Cauchy's bound; it is found by bisection.

@@ -23,7 +23,8 @@ pub const SEGMENTS: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
-    /// Length in seconds; it is reduced if [`SEGMENTS`] of them do not fit into the record.
+    /// A length in seconds. It is reduced if [`SEGMENTS`] segments of this length do not fit into
+    /// the record.
     Seconds(f64),
     Longest,
 }

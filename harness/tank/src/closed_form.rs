@@ -12,7 +12,7 @@ use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
 
 /// Number of terms in the sums over all modes; [`tail`] estimates the rest of the sum.
 const TERMS: usize = 400;
-/// Error of the closed forms from the tails of the sums and from rounding.
+/// Relative error of the closed forms, from rounding and from the terms that the sums leave out.
 const ERROR: f64 = 1e-11;
 
 /// Returns the remainder of a series: the sum of tanh(k h/2)/k^5 over all wave numbers k beyond `last`, which are
@@ -64,7 +64,8 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
     )
 }
 
-/// Returns the shape of a mode of wave number k, sampled over the surface.
+/// Returns the elevation of a mode with the wave number `k`, 1/m, sampled over the free surface
+/// between the radii `inner` and `outer`, m.
 fn sampled([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
@@ -214,8 +215,8 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
     upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Returns the result for a tank of revolution with vertical walls; `inertias` are rigid across and about the
-/// axis, and effective.
+/// Returns the modal data of a tank of revolution with vertical walls. `inertias` are the inertia
+/// of the rigid liquid across the axis, that about the axis, and the effective inertia.
 fn upright(
     [r_inner, r_outer]: [f64; 2],
     h: f64,

@@ -35,8 +35,9 @@ pub struct Coefficients {
     pub planar: f64,
     pub circular: Option<f64>,
     pub wave_second: f64,
-    /// Slosh angle above which the mode is out of range, rad: the smaller of the angles at which its
-    /// frequency errs by 0.3 % and a forced response by 3 %.
+    /// Slosh angle, rad, above which the equivalent mass does not represent the mode: the smaller
+    /// of the angle at which its frequency errs by 0.3 % and the angle at which a forced response
+    /// errs by 3 %.
     pub angle_limit: f64,
     pub angle_limit_from: LimitSource,
     pub frequency_limit: Option<f64>,
@@ -71,7 +72,8 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// Returns s, kappa, s_2, kappa_2, t and t_2 with the names of their parameters in the FMUs.
+    /// Returns the coefficients s, kappa, s_2, kappa_2, t and t_2, each with the name of its
+    /// parameter in the FMUs.
     pub fn parameters(&self) -> [(&'static str, f64); 6] {
         [
             ("nonlinear_inertia", self.nonlinear_inertia),
@@ -107,11 +109,12 @@ impl EnergySource {
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
     PotentialFlow,
-    /// The difference of the frequency from free waves of fully nonlinear potential flow in this tank or, for spheres, in a
-    /// sphere.
+    /// The limit follows from a comparison of the slosh mass's frequency with free waves of fully
+    /// nonlinear potential flow, in this tank or, for spheres, in a sphere.
     FreeWaves,
-    /// A share of the angle at which the second-order wave is half of the first-order wave: the smallest
-    /// share that upright cylinders have; at most the largest angle of an upright cylinder.
+    /// The limit is estimated without such a comparison: it is a share of the angle at which the
+    /// second-order wave is half of the first-order wave. The share is the smallest that upright
+    /// cylinders have, and the limit is at most the largest angle of an upright cylinder.
     Estimate,
 }
 

@@ -12,8 +12,8 @@ pub struct Problems(pub Vec<String>);
 
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// Reads the text of a regular file, because a named pipe could block and a device may never end. Errors do
-/// not name the file.
+/// Reads a text file. It must be a regular file, because a named pipe could block and a device may
+/// never end. Errors do not name the file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
     let problem = |why: String| Problems::from(format!("the file cannot be read: {why}"));
     let about = std::fs::metadata(path).map_err(|error| problem(error.to_string()))?;
@@ -46,9 +46,10 @@ impl From<&str> for Problems {
     }
 }
 
-/// Largest size, m. Larger tanks are probably drawn in millimetres.
+/// Largest height or diameter of a tank, m. A larger tank was probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
-/// Largest distance of the ends of two segments that are joined, over the tank's size.
+/// Largest distance between the end of a segment and the start of the next, over the tank's size,
+/// at which both are taken as one point.
 const JOINED: f64 = 1e-6;
 const LEVEL: f64 = 1e-9;
 
@@ -74,8 +75,8 @@ pub struct Wall {
     pub z_surface: f64,
 }
 
-/// Distance from the free surface, over the tank's size, within which a horizontal part of the wall is
-/// refused.
+/// Distance between the free surface and a horizontal part of the wall, over the tank's size,
+/// within which a fill is refused.
 const SHOULDER: f64 = 1e-6;
 const STEEP: f64 = 1e-3;
 
@@ -172,7 +173,8 @@ impl Contour {
         self.bottom
     }
 
-    /// Returns the lowest point as its height, m, and its smallest radius, m.
+    /// Returns the height of the lowest point of the tank and its smallest distance from the axis,
+    /// both in m.
     pub(crate) fn lowest(&self) -> (f64, f64) {
         let outline = Outline::new(&self.segments);
         let points = || outline.points.iter().flatten();
@@ -195,7 +197,8 @@ impl Contour {
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
-    /// Returns the volume below `fill`, m above the lowest point, m3, of all pools together.
+    /// Returns the volume of the liquid, m3, if the free surface is at `fill`, m above the lowest
+    /// point. If the liquid forms several pools, it is the volume of all together.
     fn volume_below(&self, fill: f64) -> f64 {
         let z = self.bottom + fill;
         let surface = |height: f64| if height < z { 0.0 } else { f64::INFINITY };
@@ -250,7 +253,8 @@ impl Contour {
         pools
     }
 
-    /// Returns the short pieces of the wall that are wet, in their order, each as segment and range of its parameter.
+    /// Returns the wet pieces of the wall in their order. Each is a short part of a segment, given
+    /// by the segment and the range of its parameter.
     fn wetted_pieces(
         &self,
         surface: impl Fn(f64) -> f64,
@@ -303,8 +307,8 @@ impl Contour {
         bisect(0.0, depth, |fill| self.volume_below(fill) < volume)
     }
 
-    /// Returns the whole wall if the tank can be full, which means that the wall ends at the axis or at its
-    /// start.
+    /// Returns the contour as a wall that is wet everywhere, if the tank can be full, which means
+    /// that the contour ends at the axis or at its start.
     pub(crate) fn closed(&self) -> Option<Wall> {
         let (start, end) = (self.segments[0].start(), self.segments[self.segments.len() - 1].end());
         let on_axis = start[0] <= LEVEL * self.size && end[0] <= LEVEL * self.size;
@@ -518,15 +522,16 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Returns the place between two, at whose first `holds` is true or false and at whose second it is not, where it
-/// changes, by bisection.
+/// Returns the position between `first` and `second`, by bisection, at which the condition `holds`
+/// changes from its value at `first` to the opposite.
 pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let here = holds(first);
     narrowed([first, second], |at| holds(at) == here)[0]
 }
 
-/// Bisects between two places until both are closest to the place at which `is_near` changes, and returns them.
-/// `is_near` is true at the first place and false at the second.
+/// Bisects between two positions until both are as close as possible to the position at which
+/// `is_near` changes, and returns them. `is_near` is true at the first position and false at the
+/// second.
 fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..80 {
         let middle = 0.5 * (near + far);
@@ -535,8 +540,8 @@ fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f6
     [near, far]
 }
 
-/// Narrows an interval by golden-section search to the part around its best place, by the comparison `better`, and returns the ends of this
-/// part.
+/// Narrows the interval from `a` to `b` by golden-section search to the part around its best
+/// position, as `better` compares two positions, and returns the ends of this part.
 pub(crate) fn golden(
     [mut a, mut b]: [f64; 2],
     steps: usize,
@@ -704,8 +709,9 @@ mod tests {
         }
     }
 
-    /// The cases are two walls that lean towards each other, a micrometre apart at the brim, and the tip of a
-    /// cone. In a tank of 1.5 m a free surface has a width from 1.5 micrometres on.
+    /// A free surface without width is refused: between two walls that lean towards each other, a
+    /// micrometre apart at the brim, and in the tip of a cone. In a tank of 1.5 m a free surface
+    /// has a width from 1.5 micrometres on.
     #[test]
     fn a_free_surface_without_width_is_refused_with_its_width() {
         let gap = |width: f64| {
@@ -726,8 +732,8 @@ mod tests {
         assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
     }
 
-    /// A ring is closed if its ends agree to 1e-6 of its size, for a model's tank and a large one. It then
-    /// begins at its top. The axis counts as reached to 1e-9.
+    /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, for a model's tank
+    /// and for a large one. It then begins at its top. The axis counts as reached to 1e-9.
     #[test]
     fn a_tank_is_closed_to_a_share_of_its_size() {
         for size in [1.0 / 64.0, 1.0, 16.0] {

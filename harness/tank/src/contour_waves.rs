@@ -42,8 +42,8 @@ use crate::third_order::circle_basis;
 /// mode has 2e-5 of its motion there.
 const DEEP: f64 = 3.0;
 
-/// Smallest eigenvalue of the kinetic energy's matrix over the largest for a combination of harmonics that is
-/// not rounding noise.
+/// Smallest ratio of an eigenvalue of the kinetic energy's matrix to the largest one at which the
+/// combination of harmonics is used. At smaller ratios it consists of rounding errors.
 const NOISE: f64 = 1e-13;
 
 /// Periodic waves of the first mode, with lengths over the radius of the surface: lambda_1 = omega_1^2/g, the
@@ -324,7 +324,8 @@ struct First {
     slope: Vec<f64>,
 }
 
-/// A field of the second order: elevations p and r, potential d, and its share of L_4.
+/// A field of the second order in the amplitude: the coefficients p and r of its elevation and d of
+/// its potential, and its part of L_4.
 struct Second {
     l_4: f64,
     p: DVector<f64>,

@@ -196,7 +196,8 @@ impl Segment {
         self.curve.point_at(self.from + s * (self.to - self.from))
     }
 
-    /// Returns the angle through which the tangent turns, rad (an upper bound for ellipses).
+    /// Returns the angle, rad, through which the tangent turns along the segment; for an ellipse an
+    /// upper bound of it.
     pub(crate) fn turn(&self) -> f64 {
         let count = 32;
         let mut total = 0.0;

@@ -159,8 +159,8 @@ impl Nearest {
         Nearest::new(shape, 1.0, nu, g, first.laminar(nu))
     }
 
-    /// Creates the shape of a share of the wall, at the specific force `g`, by solving for the shape's own
-    /// layer.
+    /// Solves for the laminar layer at the wall of a measured shape, which has this `share` of the
+    /// tank's wall. `nu` is the kinematic viscosity, m2/s, and `g` the specific force, m/s2.
     fn solve(found: Recognised, share: f64, nu: f64, g: f64) -> Option<Nearest> {
         let shape = found.measured().at_measured_depth();
         let fill = match shape {

@@ -10,7 +10,8 @@ use crate::modal::ModalData;
 use crate::parameters::ParameterSet;
 use crate::table::{short, significant};
 
-/// Largest error between two points, over 1 + |s| or 1 + |kappa|, without a warning.
+/// Largest interpolation error of s over 1 + |s|, or of kappa over 1 + |kappa|, between two points
+/// of a fill table that gives no warning.
 const LARGEST: f64 = 0.05;
 
 /// A fill, m above the lowest point, with its mass of liquid, kg, and the parameters of the tank there.
@@ -42,7 +43,8 @@ impl<'a> AtFill<'a> {
 
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
-/// Columns of a mode, s and kappa at the points of a table, with notes about their source, errors and gaps.
+/// Columns of s and kappa of one mode in a fill table, with notes about their source, their errors
+/// and the fills without known values.
 pub(crate) struct Columns {
     pub values: [Vec<f64>; 2],
     pub notes: Vec<String>,

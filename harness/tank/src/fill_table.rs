@@ -25,7 +25,8 @@ use crate::tank::Tank;
 
 const CANDIDATES: usize = 97;
 
-/// Unit of the errors: 0.5 % of a frequency, a mass or the largest radius of the surface.
+/// Unit in which the interpolation errors of a fill table are given: 0.5 % of a frequency, of a
+/// mass, or of the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
 /// Fills of a table between two ends, m above the lowest point: the rows of the table and its errors between
@@ -44,7 +45,8 @@ pub struct Between {
     pub rows: Vec<ModalData>,
 }
 
-/// A mode at the candidate fills: mass of liquid, omega^2/g, slosh mass, share of mass.
+/// Curves of a mode over the fills from which the points of a table are chosen: mass of the liquid,
+/// kg; omega^2/g, 1/m; height of the slosh mass at rest, m; share of the slosh mass in the liquid.
 struct Curves {
     liquid: Vec<f64>,
     modes: Vec<[Vec<f64>; 3]>,
@@ -100,7 +102,8 @@ impl Curves {
     }
 }
 
-/// Returns the height of the slosh mass, or of the liquid's centre for a mode without mass, whose height is not defined.
+/// Returns the height of the slosh mass of mode number `n` at rest, m. For a mode without mass,
+/// whose height is not defined, it is the height of the liquid's centre of mass.
 fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
@@ -111,7 +114,7 @@ fn count_carrying_modes(rows: &[ModalData]) -> usize {
     (1..most.min(MODES)).take_while(carries).last().map_or(1, |n| n + 1)
 }
 
-/// Places [`POINTS`] fills between two, m above the lowest point, including the ends.
+/// Chooses [`POINTS`] fills from `low` to `high`, m above the lowest point, including both ends.
 ///
 /// # Errors
 /// Ends without a free surface, and the errors of [`Tank::solve`].

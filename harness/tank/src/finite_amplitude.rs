@@ -28,12 +28,14 @@ use crate::tank::{Geometry, Shape, Tank};
 use crate::third_order::{DETUNING, Overlaps};
 
 const WORST: f64 = 0.05;
-/// Largest distance of a vertical wall and a flat bottom from the tank's, over its size.
+/// Largest distance between the tank's contour and a vertical wall with a flat bottom, over the
+/// tank's size, at which the method for such tanks is used.
 const SAME: f64 = 1e-6;
 const ROUNDING: f64 = 1e-7;
 const COUNTS: [usize; 2] = [10, 20];
 const DEGREES: [usize; 2] = [18, 24];
-/// Difference of a box's lengths, relative, below which the modes along both exchange energy.
+/// Relative difference of a box's two lengths below which the first modes along both directions
+/// exchange energy, so that the coefficients of one direction are not valid.
 const NEARLY_SQUARE: f64 = 0.1;
 /// Largest lambda over the wave number, tanh kh, of a ring of liquid between vertical walls.
 const DEEP: f64 = 0.999;
@@ -61,7 +63,8 @@ const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: ome
 pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 impl Coefficients {
-    /// Combines the results of two truncations, the finer one last, for a wave at the wall per angle, m/rad.
+    /// Combines the results of two computations, the second one with more functions, whose
+    /// difference gives the error. `wave` is the elevation at the wall per slosh angle, m/rad.
     fn new([rough, fine]: [Found; 2], wave: f64) -> Coefficients {
         let [s, kappa] = fine.equivalent;
         let differ = |i: usize| {

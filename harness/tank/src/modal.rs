@@ -239,16 +239,16 @@ pub struct ModalData {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spin {
-    /// Rate Omega about the axis, rad/s.
+    /// Rate Omega at which tank and liquid rotate about the axis, rad/s.
     pub omega: f64,
     /// Specific force along the axis, m/s².
     pub gravity: f64,
-    /// Height of the centre of mass, m from the contour's own zero.
+    /// Height of the centre of mass of the rotating liquid, m from the contour's own zero.
     pub z_cg: f64,
-    /// Inertia about the axis, kg·m².
+    /// Inertia of the rotating liquid about the tank's axis, kg·m².
     #[serde(rename = "I_axis")]
     pub i_axis: f64,
-    /// Inertia across the axis about the centre of mass, kg·m².
+    /// Inertia of the rotating liquid across the axis about its centre of mass, kg·m².
     #[serde(rename = "I_cg")]
     pub i_cg: f64,
     /// Height of the surface on the axis, m from the contour's own zero; `None` if the axis is dry.
@@ -330,8 +330,8 @@ impl Mode {
 }
 
 impl ModalData {
-    /// Creates the result. `inertias` are rigid across the axis about the centre of mass, rigid about the
-    /// axis, and effective.
+    /// Creates the modal data of a tank. `inertias` are the inertia of the rigid liquid across the
+    /// axis about the centre of mass, that about the axis, and the effective inertia.
     pub(crate) fn new(
         kind: &'static str,
         rho: f64,
@@ -442,7 +442,8 @@ const WANTED: f64 = 2e-7;
 const ENOUGH: f64 = 1e-6;
 const WORST: f64 = 1e-2;
 const ROUNDING: f64 = 1e-10;
-/// Rounding for beta, which is larger than elsewhere because its integrand is not smooth at corners.
+/// Rounding error of beta, which is larger than that of other quantities because its integrand is
+/// not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
 struct Pair {

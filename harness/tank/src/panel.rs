@@ -119,7 +119,8 @@ impl Boundary {
         }
     }
 
-    /// Returns y - x, to full relative accuracy also if both are near a corner.
+    /// Returns the vector y - x between two points of the boundary. It has full relative accuracy
+    /// even if both are near a corner.
     pub(crate) fn difference(&self, x: &BoundaryPoint, y: &BoundaryPoint) -> Point {
         if x.segment == y.segment {
             let segment = &self.segments[x.segment];

@@ -16,7 +16,7 @@ const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
 pub const FAINT: &str = "#999";
 
-/// A rectangle of the page, px, with the values at its edges.
+/// Area of a diagram on the page, px, with the values that its edges stand for.
 #[derive(Clone, Copy)]
 pub struct Frame {
     pub left: f64,

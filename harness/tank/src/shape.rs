@@ -9,12 +9,14 @@ use crate::contour::Wall;
 use crate::curve::{Point, Segment, norm, sub};
 use crate::tank::Shape;
 
-/// Largest distance of the wetted wall from a shape, over its size.
+/// Largest distance of the wetted wall from a sphere, cylinder, cone or torus, over its size, at
+/// which the wall counts as this shape.
 const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
 
-/// A shape with measured damping, large enough for the fill, and the fill, m above the lowest point.
+/// A shape with measured damping that the wetted wall has, and the fill, m above the lowest point.
+/// The shape is made large enough for the fill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
     pub shape: Shape,

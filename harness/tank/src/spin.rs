@@ -30,7 +30,8 @@ use crate::contour::{Contour, Problems, bisect};
 use crate::modal::{ModalData, Spin};
 use crate::tank::{Geometry, Shape, Tank};
 
-/// Error of the frequency of a pendulum that does not spin, (1 - C) Omega/omega_0, above which a warning says so.
+/// Error of the frequency of a pendulum, (1 - C) Omega/omega_0, above which a warning says that
+/// pendulums do not take part in the spin of the liquid.
 const PENDULUM_ERROR: f64 = 0.05;
 
 /// Computes the steady rotation of a tank's liquid, solved as `data`, about the tank's axis at `omega`, rad/s, under the specific
@@ -132,7 +133,7 @@ pub fn spin(
     })
 }
 
-/// The surface g z - Omega^2 r^2/2 = c.
+/// Free surface of the rotating liquid, g z - Omega^2 r^2/2 = c.
 struct Surface {
     omega: f64,
     gravity: f64,
@@ -140,7 +141,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns the surface that leaves `volume`, m3, in the tank.
+    /// Returns the surface of the rotating liquid below which `contour` contains `volume`, m3.
+    /// `omega` is the rate, rad/s, `gravity` the specific force, m/s2.
     fn holding(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();

@@ -426,8 +426,8 @@ impl Tank {
         data
     }
 
-    /// Returns the result for the full closed tank, without free surface and modes; `None` if `fill` is not
-    /// full.
+    /// Returns the modal data of the full closed tank, which has neither a free surface nor modes;
+    /// `None` if `fill` is not the full height.
     fn full(&self, fill: f64) -> Option<ModalData> {
         let contour = self.contour()?;
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
@@ -437,7 +437,8 @@ impl Tank {
     }
 }
 
-/// Returns the result if there are no problems, and otherwise an error with these and its own.
+/// Returns the value of `result` if there are no problems, and otherwise an error that lists
+/// `problems` and those of `result`.
 fn with_problems<T>(mut problems: Vec<String>, result: Result<T, Problems>) -> Result<T, Problems> {
     match result {
         Ok(value) if problems.is_empty() => return Ok(value),

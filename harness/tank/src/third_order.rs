@@ -276,7 +276,7 @@ fn inverse(m: Matrix2<f64>) -> Matrix2<f64> {
     Matrix2::new(d, -b, -c, a) / (a * d - b * c)
 }
 
-/// Returns the stationary value of x.M x/2 + v.x.
+/// Returns the stationary value of the quadratic function x.M x/2 + v.x over all x.
 fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     -0.5 * v.dot(&(inverse(m) * v))
 }

@@ -16,12 +16,14 @@ use nalgebra::DMatrix;
 use super::Term;
 use std::f64::consts::PI;
 
-/// Number of lags per averaging time in the sum over lags; up to this number of samples the sum is exact.
+/// Number of lags per averaging time over which the sum for a covariance runs. Up to this number of
+/// samples per averaging time the sum includes every lag and is exact.
 const PER_TIME: usize = 8;
 /// Range of the lags in multiples of the sum of both averaging times. Beyond 1 only flicker noise
 /// contributes, and its terms fall as s⁻².
 const RANGE: usize = 2;
-/// Largest ratio of two averaging times whose estimates count as correlated.
+/// Largest ratio of two averaging times at which the Allan variances are treated as correlated. At
+/// larger ratios their covariance is set to 0.
 const RATIO: usize = 32;
 
 /// Tables of the covariance C_mn for coefficients of 1, for all pairs of averaging times: the number of pairs
@@ -67,8 +69,8 @@ impl Covariance {
         Covariance { terms: terms.to_vec(), size: factors.len(), pairs }
     }
 
-    /// Returns the covariance matrix of the Allan variances for these coefficients, in the order of the
-    /// terms.
+    /// Returns the covariance matrix of the Allan variances at all averaging times, for noise with
+    /// these coefficients (N², B², K², …), which are in the order of the terms.
     pub fn matrix(&self, coefficients: &[f64]) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(self.size, self.size);
         let ramp = self.terms.iter().zip(coefficients).find(|(term, _)| **term == Term::Ramp);

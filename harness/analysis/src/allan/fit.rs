@@ -15,15 +15,16 @@ use super::covariance::Covariance;
 use super::{LONGEST, Noise, Term, overlapping};
 
 const NORMAL: f64 = 1.96;
-/// Standard normal quantile of the fit's χ² above which the fit is rejected; noise that fits exceeds it once
-/// in 1,000 records.
+/// Standard normal deviate of the fit's χ² above which the fit is rejected. If the noise model is
+/// true, 1 record in 1,000 exceeds it.
 const MISFIT: f64 = 3.1;
 const ITERATIONS: usize = 12;
-/// Largest number of short averaging times that may be left out of the fit, and the longest of them, s.
+/// Largest number of short averaging times that a fit may leave out, and the longest averaging
+/// time, s, that it may leave out.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
-/// Number of octaves that are left out in addition to those that the test of the fit requires. The effect of
-/// a filter on the variance halves with each octave, so that an octave which passes the test can still shift
-/// N by several standard deviations.
+/// Number of octaves of averaging times that a fit leaves out in addition to those whose removal
+/// makes the fit pass its test. The effect of a filter on the variance halves with each octave, so
+/// that an octave which passes the test can still shift N by several standard deviations.
 const BEYOND: usize = 2;
 /// Shortest correlation time of a Gauss–Markov bias, in averaging times. A shorter one cannot be
 /// distinguished from white noise.
@@ -44,12 +45,13 @@ pub struct Octaves {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
-    /// Lower end of the 95 % interval; 0 if the record does not show the term, NaN if no value could be
-    /// tested.
+    /// Lower end of the 95 % interval of the coefficient; 0 if the record does not show this noise,
+    /// NaN if no value could be tested.
     pub low: f64,
-    /// Upper end of the interval; infinite if the record is too short, NaN if no value could be tested.
+    /// Upper end of the 95 % interval of the coefficient; infinite if the record is too short, NaN
+    /// if no value could be tested.
     pub high: f64,
-    /// Standard error; NaN for an estimate of 0.
+    /// Standard error of the coefficient; NaN if its estimate is 0.
     pub error: f64,
 }
 
@@ -68,7 +70,8 @@ pub struct Fit {
     pub bias_time: Option<Estimate>,
     pub from: f64,
     pub chi_squared: (f64, usize),
-    /// True if at most one of 1,000 records with this noise would have a larger misfit.
+    /// True if the noise model passes the test of the fit: at most 1 of 1,000 records with exactly
+    /// this noise would deviate more from it.
     pub fits: bool,
     pub worst: Outlier,
 }
@@ -186,7 +189,8 @@ impl Problem<'_> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns the best fit with weights from relative errors, with which the iterations start.
+    /// Returns the best fit of the coefficients with the same relative error assumed for every
+    /// octave. The iterations of the weights start from it.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
@@ -443,8 +447,8 @@ impl Problem<'_> {
 }
 
 const BISECTIONS: usize = 14;
-/// Ratio of successive values that are tested below an estimate, and the smallest tested value relative to
-/// the estimate.
+/// Ratio of successive coefficients that are tested below an estimate to find the lower end of its
+/// interval; the second number is the smallest tested coefficient relative to the estimate.
 const DOWN: f64 = 0.7;
 const LEAST: f64 = 1e-4;
 
@@ -476,8 +480,8 @@ fn pearson(normal: f64, skewness: f64) -> f64 {
     2.0 / skewness * (base.powi(3) - 1.0)
 }
 
-/// Returns the least-squares solution whose coefficients, except those at `either`, are not negative, and its
-/// squared error. All subsets of the columns are tried.
+/// Returns the least-squares solution in which no coefficient is negative, except those at
+/// `either`, which may be, and its squared error. All subsets of the columns are tried.
 fn not_negative(
     columns: &DMatrix<f64>,
     values: &DVector<f64>,
