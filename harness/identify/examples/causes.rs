@@ -23,12 +23,13 @@ use identify::input::reading::prepare;
 use identify::input::recording::Recording;
 use identify::methods::output_error::identify;
 
-/// A way in which a bench leaves the model.
+/// A way in which a simulated bench differs from every fitted model, for example by a lagging
+/// actuator.
 struct Way {
     name: &'static str,
     effects: &'static [Unmodelled],
     settings: &'static [(&'static str, &'static str)],
-    /// Torque under which the effect shows.
+    /// Name of the torque under which the difference from the models shows.
     torque: &'static str,
     /// Change of the gyro's readings, if the effect is a fault of the gyro.
     gyro: fn(&mut Recording),

@@ -21,8 +21,9 @@ impl Estimated {
         Estimated { value, std, std_noise: std, interval, determined: true, unit: unit.into() }
     }
 
-    /// Returns a number as a percentage of the value; `None` if the value is zero within its standard deviation, because a
-    /// percentage would then mean nothing.
+    /// Returns `of`, for example a standard deviation, as a percentage of the estimated value.
+    /// `None` if the value is zero within its standard deviation, because a percentage would then
+    /// mean nothing.
     pub fn percent(&self, of: f64) -> Option<f64> {
         (self.value.abs() > self.std).then(|| 100.0 * of / self.value)
     }

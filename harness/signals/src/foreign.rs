@@ -9,7 +9,8 @@ use anyhow::{Context, Result, bail};
 use files::input;
 use files::temporary::Folder;
 
-/// The error for a file that is not read here but perhaps by the Python package.
+/// The error for a file of a kind that only the Python package may be able to read; the text is the
+/// reason.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Foreign(pub String);

@@ -94,7 +94,7 @@ impl Table {
         Some(&self.columns[index])
     }
 
-    /// Returns a table with only the columns `names`, in this order.
+    /// Returns a table that has only the columns `names` of this one, in the order of `names`.
     ///
     /// # Panics
     /// If a column does not exist.
@@ -243,8 +243,8 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
         .with_context(|| format!("the table {} cannot be used", path.display()))
 }
 
-/// Returns true if HubSlosh wrote a table in Parquet. The file names our library, which importers in other
-/// languages do not use.
+/// Returns true if HubSlosh wrote the Parquet file. The file then names our Parquet library, which
+/// programs in other languages do not use.
 pub fn is_ours(path: &Path) -> bool {
     let writer = parquet_file::writer(path).ok().flatten();
     writer.is_none_or(|writer| writer.starts_with("parquet-rs"))

@@ -15,9 +15,10 @@ const STEP: f64 = 0.02;
 const LEAD_IN: f64 = 5.0;
 /// Standard deviation of the gyro's noise and its quantisation, rad/s (thesis 5.5: N = 5.75e-5 rad/s/√Hz at 50 Hz).
 pub const GYRO: (f64, f64) = (4.066e-4, 1.527e-4);
-/// Part by which the bearing brakes forward motion more and backward motion less.
+/// Fraction by which the dry friction of the bearing is larger when the hub turns forwards and
+/// smaller when it turns backwards.
 pub const ASYMMETRY: f64 = 0.15;
-/// Rates of the platform about x and y over the hub's rate.
+/// Ratios of the platform's rates about x and y, with which it tilts, to the hub's rate about z.
 const TILT: [f64; 2] = [0.03, 0.02];
 const EMPTY: f64 = 1e-9;
 
@@ -109,7 +110,8 @@ impl Day<'_> {
         std::fs::write(directory.join("day.toml"), manifest)
     }
 
-    /// Returns the text of one log. The torque (N·m) is a function of the time from the end of the lead-in.
+    /// Returns the text of one log. `torque` is the torque, N·m, as a function of the time since
+    /// the end of the lead-in at rest.
     fn log(&self, number: u64, bench: &Bench, torque: &dyn Fn(f64) -> f64, seconds: f64) -> String {
         let rows = ((LEAD_IN + seconds) / STEP).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| STEP * k as f64).collect();
@@ -137,7 +139,8 @@ impl Day<'_> {
     }
 }
 
-/// The thesis's sweep from 1.25 to 3.5 Hz, exponential in time.
+/// The thesis's sweep from 1.25 to 3.5 Hz, whose frequency grows exponentially: its sine at the
+/// time `t` of `duration`, s.
 fn chirp(t: f64, duration: f64) -> f64 {
     let (from, ratio): (f64, f64) = (1.25, 3.5 / 1.25);
     (TAU * from * duration / ratio.ln() * (ratio.powf(t / duration) - 1.0)).sin()

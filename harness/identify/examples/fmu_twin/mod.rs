@@ -29,7 +29,7 @@ impl Default for SensorErrors {
     }
 }
 
-/// Effects of a bench that no tried model has.
+/// Effects of a simulated bench that none of the fitted models has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unmodelled {
     /// The bearing's axis leans by 1°: gravity turns hub and liquid back to where they began.
@@ -48,18 +48,19 @@ pub enum Unmodelled {
     GyroLag,
 }
 
-/// Frequency of rocking, Hz.
+/// Frequency at which the hub rocks on its bearing, Hz.
 const ROCKING: f64 = 4.1;
 const ROCKING_DAMPING: f64 = 0.01;
-/// Rate of rocking that the gyro sees far below resonance, relative to the hub's rate.
+/// Rate of the rocking that the gyro reads, relative to the hub's rate, at frequencies far below
+/// the frequency of rocking.
 const ROCKING_SEEN: f64 = 0.01;
-/// Part by which the friction of a warm bearing is smaller.
+/// Fraction by which the friction of a warm bearing is smaller than that of a cold one.
 const WARM: f64 = 0.3;
 /// Coefficient of the air's drag torque, which is quadratic in the rate, N·m·s².
 const AIR: f64 = 0.02;
-/// Time constant of wheel or gyro, s.
+/// Time constant of the lagging wheel or of the gyro's filter, s.
 const LAG: f64 = 0.03;
-/// Parts of the way from row to row in which a lag is computed.
+/// Number of parts of the time from row to row in which the lagging torque is computed.
 const LAG_PARTS: usize = 8;
 const WARMING: f64 = 600.0;
 
@@ -124,7 +125,7 @@ impl Default for Twin {
 }
 
 impl Twin {
-    /// Returns the settings of the FMU, together with the setting that causes the unmodelled effect.
+    /// Returns the settings of the FMU, with the settings that cause the unmodelled effect added.
     fn settings(&self, torque: &[f64], seed: Option<u32>) -> Vec<(String, String)> {
         let mut all = self.settings.clone();
         let mut set = |name: &str, value: String| all.push((name.into(), value));
@@ -143,7 +144,8 @@ impl Twin {
         all
     }
 
-    /// Records the twin under a torque; `seed` is the seed of the gyro's noise, `None` without noise.
+    /// Records the simulated bench under a torque. `seed` is the seed of the gyro's noise; without
+    /// it there is no noise.
     pub fn record(&self, fmu: &Fmu, torque: &Torque, seed: Option<u32>) -> Result<Recording> {
         let (start, stop) = torque.span();
         let (step, late) = (1.0 / self.rate, self.sensor_errors.delay);
@@ -261,7 +263,8 @@ struct Lag {
 }
 
 impl Lag {
-    /// Returns y after a step during which u changes linearly from its last value, by the trapezoidal rule.
+    /// Returns the output y of the lag after `step`, s, during which its input changes linearly
+    /// from its last value to `u`, by the trapezoidal rule.
     fn step(&mut self, u: f64, step: f64) -> f64 {
         let half = 0.5 * step / LAG;
         self.y = ((1.0 - half) * self.y + half * (self.u + u)) / (1.0 + half);
@@ -270,7 +273,8 @@ impl Lag {
     }
 }
 
-/// Returns the torque that lags its command, at [`LAG_PARTS`] instants from row to row.
+/// Returns the torque of an actuator that lags the command `torque`, at [`LAG_PARTS`] instants from
+/// row to row.
 fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     let mut lag = Lag::default();
     let (mut time, mut tau) = (vec![rows[0]], vec![0.0]);
@@ -311,7 +315,8 @@ impl Rocking {
     }
 }
 
-/// Records the FMU under a torque at 50 Hz; `seed` is the seed of the gyro's noise, `None` without noise.
+/// Records the FMU under a torque at 50 Hz. `seed` is the seed of the gyro's noise; without it
+/// there is no noise.
 pub fn record(
     fmu: &Fmu,
     settings: &[(&str, &str)],

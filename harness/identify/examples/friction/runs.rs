@@ -11,10 +11,10 @@ use crate::bench::{Bearing, Bench, Drive, Liquid};
 /// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, and the gyro's least step, rad/s.
 const GYRO: (f64, f64) = (4.066e-4, 1.53e-4);
 
-/// Torque of a run, N·m, over time, s.
+/// Torque of a test run, N·m, as a function of time, s.
 pub type Course = fn(f64) -> f64;
 
-/// A ramp, a step and a sweep of the torque, each `seconds` long.
+/// A set of test runs: a ramp, a step and a sweep of the torque, each `seconds` long.
 pub struct Set {
     pub name: &'static str,
     pub seconds: u32,

@@ -20,7 +20,7 @@ use analysis::least_squares::{differences, minimise};
 use identify::bench::nominal::Bench;
 use identify::input::recording::Recording;
 
-/// Friction that is known beforehand; SI units.
+/// Friction of the bearing that the method assumes to be known; SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct Friction {
     pub b: f64,

@@ -19,9 +19,9 @@ use ode_solvers::{OutputType, SVector, System};
 
 const XI: f64 = 1.841_183_781_340_659;
 const TOLERANCE: f64 = 1e-11;
-/// Instants closer than this are the same, s.
+/// Two instants closer than this, s, count as the same.
 const SAME: f64 = 1e-13;
-/// Rate of a hub that rests, rad/s.
+/// Rate below which the hub counts as resting, rad/s.
 const REST: f64 = 1e-13;
 /// Largest torque beyond static friction at which the hub still counts as held, N·m.
 const TOUCH: f64 = 1e-12;
@@ -35,11 +35,11 @@ const TIME: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Liquid {
-    /// All liquid turns with the hub.
+    /// All liquid is rigid and turns with the hub.
     Frozen,
-    /// A mass on a spring.
+    /// The liquid's first mode is a mass on a spring, linear in its displacement.
     Linear,
-    /// A bob on a rod.
+    /// The liquid's first mode is a bob on a rod, which swings in every direction.
     Spherical,
 }
 
@@ -70,7 +70,8 @@ pub struct Bench {
     pub liquid: Liquid,
     /// An appendage on a spring (with the linear liquid): its inertia, kg·m², and its frequency on a hub that is held, Hz.
     pub appendage: Option<(f64, f64)>,
-    /// A torque that no model has, N·m, as a function of time (s), angle (rad) and rate (rad/s).
+    /// A torque that none of the fitted models has, N·m, as a function of time, s, angle, rad, and
+    /// rate, rad/s.
     pub besides: fn(f64, f64, f64) -> f64,
 }
 
@@ -100,7 +101,7 @@ impl Default for Bench {
     }
 }
 
-/// The torque as it acts.
+/// The torque that acts on the hub, in one of three forms.
 pub enum Drive<'a> {
     /// Rows of time (s) and torque (N·m), joined by straight lines.
     Lines(&'a [f64], &'a [f64]),
@@ -117,7 +118,7 @@ impl Drive<'_> {
         }
     }
 
-    /// Torque within the piece after knot `k`.
+    /// Returns the torque, N·m, at the time `t` between knot `k` and the next.
     fn within(&self, k: usize, t: f64) -> f64 {
         match self {
             Drive::Held(_, tau) => tau[k],
@@ -130,10 +131,10 @@ impl Drive<'_> {
     }
 }
 
-/// Relative motion of bearing and hub.
+/// Contact of bearing and hub: the hub slips or sticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Contact {
-    /// With the sign of ω.
+    /// The hub slips; the number has the sign of its rate ω.
     Slips(f64),
     Sticks,
     Smooth,
@@ -160,7 +161,7 @@ struct Equations<'a> {
     contact: Contact,
 }
 
-/// Derivatives of the state, and the torque on a hub at rest that is not the bearing's.
+/// Derivatives of the state, and the torque on a hub at rest from everything except the bearing.
 struct Rates {
     state: State,
     driving: f64,
@@ -240,7 +241,7 @@ impl Equations<'_> {
         Rates { state, driving }
     }
 
-    /// Returns the torque at which a hub at rest breaks away in a direction, N·m.
+    /// Returns the torque, N·m, at which a hub at rest breaks away in a direction, 1 or −1.
     fn holds(&self, direction: f64) -> f64 {
         let Bearing { c, d, asymmetry, .. } = self.bench.bearing;
         (c + d) * (1.0 + asymmetry * direction.signum())
@@ -380,7 +381,8 @@ impl Bench {
     }
 }
 
-/// Integrates from t to `end`, or to the instant at which the contact changes if it comes first.
+/// Integrates the motion from `t` to `end`, or to an earlier instant at which the hub sticks or
+/// slips.
 fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -> (f64, State) {
     match now.contact {
         Contact::Smooth => (end, now.integrate(t, end, &y)),

@@ -20,7 +20,7 @@ use signals::recording::Columns;
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 use crate::habits::Written;
 
-/// Relative spread of truths around the nominal bench.
+/// Relative spread of the true parameters of the twins about those of the nominal bench.
 const SPREAD: f64 = 0.3;
 /// White noise of a MEMS gyro, rad/s/√Hz; its drift, rad/s, with its correlation time, s; its least step, rad/s.
 const GYRO: (f64, f64, f64, f64) = (5.75e-5, 7.85e-5, 100.0, 1.53e-4);
@@ -146,7 +146,8 @@ impl Twin {
         self
     }
 
-    /// Returns the intersample behaviour that the fit receives; `None` for half of the twins, where the fit has to find it.
+    /// Returns the course of the torque between rows that is given to the fit; `None` for half of
+    /// the twins, for which the fit has to find it.
     pub fn told(&self) -> Option<Hold> {
         (self.seed.is_multiple_of(2)).then_some(self.between)
     }
@@ -231,7 +232,8 @@ impl Twin {
         (0..self.drift.len()).map(|k| k as f64 / self.rate).collect()
     }
 
-    /// Returns the times that the recording's clock shows at these instants, s.
+    /// Returns the times that the recording's clock, which runs fast or slow, shows at these true
+    /// instants, s.
     pub fn stamps(&self, instants: &[f64]) -> Vec<f64> {
         instants.iter().map(|t| self.clock * t).collect()
     }
@@ -270,7 +272,8 @@ impl Twin {
         Measured { torque, rate, angle }
     }
 
-    /// Identifies its recording as a user would, with these slosh models; `hear` receives each message.
+    /// Identifies the recording of the twin, as a user would, with these slosh models. `hear`
+    /// receives each message.
     pub fn identify(
         &self,
         fmu: &Fmu,

@@ -51,7 +51,8 @@ struct Row {
     angle: Option<f64>,
 }
 
-/// Returns a twin whose measurement has the habit.
+/// Returns a twin whose measurement has the property that a logger's habit requires, for example a
+/// slow gyro.
 pub fn of(mut twin: Twin, habit: &str) -> Twin {
     match habit {
         "ms-33hz" | "us-33hz" => twin = twin.with_rate(33.0),
@@ -233,7 +234,7 @@ fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
     Ok(text)
 }
 
-/// Returns a number with three decimals and commas between thousands.
+/// Formats a number as spreadsheets do: three decimals, and commas between thousands.
 fn grouped(value: f64) -> String {
     let text = format!("{:.3}", value.abs());
     let (whole, rest) = text.split_once('.').unwrap_or((&text, ""));

@@ -25,8 +25,9 @@ use habits::HABITS;
 use host::fmu::Fmu;
 use identify::bench::identification::Identification;
 
-/// Standard deviations beyond which an estimate of a described recording counts as wrong, unless its interval contains the true value: an
-/// open interval states that the end is not known.
+/// Error of an estimate, in stated standard deviations, from which on it counts as wrong, if the
+/// model fits the recording and the estimate's interval does not contain the true value. An
+/// interval with an infinite end states that the end is not known.
 const WRONG: f64 = 5.0;
 
 /// Results for one parameter over all twins.

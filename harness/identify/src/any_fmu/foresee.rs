@@ -25,7 +25,8 @@ pub struct Bound {
     pub decided_by_solver: bool,
     /// Names of the unknowns that the recordings cannot distinguish from this one.
     pub inseparable_from: Vec<String>,
-    /// Least standard deviation if all other unknowns were known.
+    /// Least standard deviation of an unbiased estimate of this unknown if all other unknowns were
+    /// known.
     pub std_alone: f64,
     pub prior: Option<f64>,
     pub unit: String,
@@ -35,8 +36,10 @@ pub struct Bound {
     pub is_parameter: bool,
 }
 
-/// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at the start values. `noise` is the standard
-/// deviation of one sample of each output; tolerances of the question count. `warn` receives the FMU's warnings.
+/// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at
+/// the start values. `noise` is the standard deviation of one sample of each output. Values that
+/// the question states with tolerances are unknowns with a prior. `warn` receives the FMU's
+/// warnings.
 ///
 /// # Errors
 /// If the question has a fault (the message lists all), or the FMU refuses a call.

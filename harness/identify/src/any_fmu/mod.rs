@@ -33,9 +33,12 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
-/// Standard deviations by which the minimum may lie beyond a bound by chance.
+/// Distance, in standard deviations, by which the minimum may lie beyond a bound of an unknown by
+/// chance.
 const PRESSED: f64 = 3.0;
-/// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
+/// Second difference of a simulated output that counts as a jump: the multiple of the standard
+/// deviation of the output's noise, and the multiple of the median of all second differences, that
+/// it must exceed.
 const JUMP: (f64, f64) = (8.0, 20.0);
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -44,12 +47,13 @@ pub struct Details {
     pub not_determined: Vec<String>,
     pub cannot_tell_apart: Vec<Inseparable>,
     pub decided_by_solver: Vec<String>,
-    /// Shift of each estimate by the errors of the solver, in its unit.
+    /// For each estimate, by name, how far it shifts because of the errors of the FMU's solver, in
+    /// the estimate's unit.
     pub solver_shift: BTreeMap<String, f64>,
     pub at_bound: Vec<String>,
     /// Estimates whose likelihood is not a parabola, so that their interval is not the value ± 1.96 standard deviations.
     pub not_quadratic: Vec<String>,
-    /// −2 ln L up to a constant.
+    /// −2 ln L of the likelihood L at the estimates, up to a constant.
     pub deviance: f64,
     pub starts: usize,
     /// Newton decrement: the distance of the estimates from the minimum of −2 ln L, in standard deviations, that one further Newton step
@@ -72,7 +76,8 @@ pub struct Output {
     /// Fit of the simulated ŷ to the measured y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_percent: f64,
     pub tests: Tests,
-    /// Mean of the whitened residual over the standard deviation of this mean.
+    /// Mean of the whitened residual of an output over the standard deviation of this mean. A large
+    /// value shows that the residual has an offset.
     pub mean: f64,
 }
 
@@ -187,7 +192,8 @@ fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     }
 }
 
-/// A 95 % interval and how it was found: whether each end is one of the likelihood or a bound, and whether the likelihood is a parabola.
+/// A 95 % interval of an estimate and how it was found: for each end whether it follows from the
+/// likelihood or is a bound of the unknown, and whether the likelihood is a parabola there.
 struct Interval {
     ends: [f64; 2],
     ended: [bool; 2],

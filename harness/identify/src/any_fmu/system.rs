@@ -11,7 +11,8 @@ use crate::model::overridden::{near, refuse};
 use crate::model::simulate::{Finer, Model, Setup, Value};
 use crate::model::unknown::Target;
 
-/// Least noise that is assumed before there is a residual, relative to an output's spread: recordings from a simulation have none.
+/// Smallest noise of an output, relative to the output's spread, that is assumed before there is a
+/// residual, because recordings from a simulation have no noise.
 const LEAST_NOISE: f64 = 1e-3;
 /// Expected drift of an output of unknown kind. Its width is large because next to nothing is known of the sensor.
 const DRIFT: Drift = Drift { size: 0.3, time: 30.0, width: 3.0 };

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// Mean of torque less inertia times acceleration over rows of similar rate.
+/// Measured friction at one rate: the mean, over rows of similar rate, of the torque less inertia
+/// times acceleration.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FrictionPoint {
     pub rate: f64,
@@ -26,7 +27,8 @@ pub struct Braking {
     pub rmse: f64,
     pub r_squared: f64,
     pub rows: usize,
-    /// Number of stretches of these rows: parts of one decay within one revolution of the hub.
+    /// Number of parts of the decays from which the coefficients were computed. A part is one
+    /// revolution of the hub within one decay.
     pub stretches: usize,
     /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! Effects that a misfit asks for, in words, with the options that estimate them.
+//! Effects that would explain why no model fits, in words, with the options that estimate them.
 
 use names::hubslosh::{hub, slosh, wheel};
 use serde::Serialize;
@@ -13,7 +13,7 @@ pub struct Cause {
     pub flags: String,
     /// Size of the effect, if it has one number: name, value and unit.
     pub size: Option<(String, f64, String)>,
-    /// Decrease of −2 ln L by the effect.
+    /// Decrease of −2 ln L, with the likelihood L, if the effect is added to the model.
     pub gain: f64,
 }
 
@@ -33,7 +33,8 @@ impl Cause {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missing {
     pub follows: String,
-    /// Factor k; `std` is its standard deviation, in the same `unit`.
+    /// Factor k of the missing torque, which is k times a quantity of the motion; `std` is its
+    /// standard deviation, in the same `unit`.
     pub factor: f64,
     pub std: f64,
     pub unit: String,

@@ -7,9 +7,11 @@ use crate::engine::draws::Derived;
 use crate::engine::{PAIR, VAGUE};
 use crate::words::combination::Combination;
 
-/// Standard deviation of the friction's asymmetry above which the recordings do not show it.
+/// Standard deviation of an estimated asymmetry of the friction above which the recordings do not
+/// determine it.
 pub const ONE_WAY: f64 = 0.25;
-/// Ratio of a hub's path against its main direction to its path along it, above which the hub turns both ways.
+/// Ratio of the angle that the hub turns against its main direction to the angle that it turns in
+/// it, above which the hub counts as turning both ways.
 const BOTH_WAYS: f64 = 0.05;
 
 /// Returns the direction of a hub that turns only one way (1: counter-clockwise, −1: clockwise), from its rates. `None` if it

@@ -9,10 +9,10 @@
 
 use crate::tuning::LAG_PARTS;
 
-/// Sizes of the effects; an effect of size 0 is absent.
+/// Sizes of the effects that the FMU does not have; an effect of size 0 is absent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects<'a> {
-    /// Torque on the hub besides the recorded one at the recording's rows, N·m.
+    /// Torque on the hub in addition to the recorded torque, at the recording's rows, N·m.
     pub torque: Option<&'a [f64]>,
     pub actuator_lag: f64,
     pub gyro_lag: f64,

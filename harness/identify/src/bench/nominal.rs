@@ -29,13 +29,15 @@ pub const PARAMETERS: [&str; 8] = [
     friction::OMEGA_S,
 ];
 
-/// Start of a search: estimated values of the bench in the time domain; SI units.
+/// Start values of the parameters of the bench for a search in the time domain, estimated from the
+/// data; SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
 pub struct Start {
     /// Length of the first mode's pendulum, m.
     pub length: f64,
-    /// Inertia of the first mode's mass about the hub over the inertia that turns with the hub.
+    /// Ratio of two inertias about the hub's axis: of the first mode's mass, and of everything that
+    /// turns with the hub.
     pub mass_ratio: f64,
     /// Inertia that turns with the hub, without the first mode's mass, kg·m².
     pub inertia: f64,
@@ -92,7 +94,10 @@ pub struct Nominal {
     pub period: f64,
 }
 
-/// Returns an instance of the FMU that is initialised with settings. It refuses a name that is neither a parameter nor an input.
+/// Returns an instance of the FMU that is initialised with these settings.
+///
+/// # Errors
+/// If a name is neither a parameter nor an input, or the FMU refuses a value.
 pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Result<Instance<'fmu>> {
     let mut instance = rest::instantiate(fmu, "identify")?;
     for (name, value) in settings {

@@ -35,11 +35,13 @@ const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
 pub const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
 /// Standard deviation of the prior of the dry friction's asymmetry, which is small against 1.
 const ASYMMETRY: f64 = 0.5;
-/// Standard deviation of the prior of each friction coefficient b, c and d, relative to its start.
+/// Standard deviation of the prior of each friction coefficient b, c and d, over the coefficient's
+/// start value.
 const FRICTION_WIDTH: f64 = 10.0;
-/// Lower bound of a friction coefficient, relative to its start.
+/// Lower bound of each friction coefficient b, c and d, over the coefficient's start value.
 pub const LEAST_FRICTION: f64 = 1e-4;
-/// Standard deviation of the prior of ln ω_s (Stribeck speed), and the largest factor between ω_s and its start.
+/// Standard deviation of the prior of ln ω_s, where ω_s is the Stribeck speed, and the largest
+/// factor between ω_s and its start value.
 const SPEED: (f64, f64) = (1.5, 30.0);
 /// Least and largest factor by which a known value may differ from its nominal value.
 const WIDEST: (f64, f64) = (0.6, 1.6);
@@ -60,7 +62,8 @@ impl List<'_> {
         self.add(Target::Parameter(unknown.name.clone()), unknown);
     }
 
-    /// Returns a parameter of the FMU: its unit, and its bounds within `least` to `largest`.
+    /// Returns the unit of a parameter of the FMU, and its bounds: those of the FMU within `least`
+    /// and `largest`.
     fn variable(&self, name: &str, (least, largest): (f64, f64)) -> (String, (f64, f64)) {
         let description = self.fmu.description();
         let Ok(variable) = description.variable(name) else {
@@ -75,7 +78,8 @@ impl List<'_> {
         Unknown::positive(name, &unit, Role::Run(None), start, bounds)
     }
 
-    /// Returns a parameter of the FMU that may be 0 as an unknown. The search varies the value itself, because a logarithm cannot reach 0.
+    /// Returns a parameter of the FMU that may be 0, such as a friction coefficient, as an unknown.
+    /// The search varies the value itself, because a logarithm cannot reach 0.
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (unit, bounds) = self.variable(name, (0.0, f64::INFINITY));
         Unknown::linear(name, &unit, Role::Run(None), (start, start), bounds)
@@ -364,7 +368,7 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
     Unknown { part, ..Unknown::linear(name, unit, Role::Run(None), (start, reach), bounds) }
 }
 
-/// Adds the effects that are tried if the models do not fit.
+/// Adds the effects that are tried if no model fits, for example a lag of the actuator.
 fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
     let mut all: Vec<(Target, Unknown)> = Vec::new();
@@ -393,7 +397,8 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     }
 }
 
-/// Refuses unknowns that have no effect because of the settings.
+/// Returns an error if the settings make an unknown ineffective, because another parameter replaces
+/// it.
 fn refuse_overridden(
     fmu: &Fmu,
     settings: &[(String, String)],

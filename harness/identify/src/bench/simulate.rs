@@ -29,7 +29,8 @@ pub struct Motion {
     pub slosh_angle: Vec<f64>,
 }
 
-/// Parts of a [`Motion`] that are read in every row; all other parts stay empty.
+/// The parts of a [`Motion`] that a run reads from the FMU in every row; all other parts stay
+/// empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Read {
     All,

@@ -22,12 +22,12 @@ use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS};
 pub struct Response {
     pub slosh_frequency: f64,
     pub slosh_damping: f64,
-    /// Frequency of the pair of poles (resonance), Hz.
+    /// Frequency of the transfer function's pair of poles, which is the resonance, Hz.
     pub resonance_frequency: f64,
     pub slosh_mass: f64,
     /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
-    /// Fit of the transfer function, %.
+    /// Share of the measured response that the fitted transfer function explains, %.
     pub fit: f64,
 }
 
@@ -117,13 +117,15 @@ fn balances(
     found.into_iter().map(|(_, response)| response).collect()
 }
 
-/// Returns the frequencies between which the torque of a recording has its power, Hz.
+/// Returns the lowest and the highest frequency, Hz, between which the torque of a recording has
+/// its power.
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
     let (step, torque, rate) = recording.even().ok()?;
     excited_band(step, &torque, &rate)
 }
 
-/// Returns bands of two octaves between two frequencies, Hz; each begins an octave above the band before.
+/// Returns frequency bands of two octaves between `low` and `high`, Hz. Each band begins one octave
+/// above the one before.
 fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
     let count = ((high / low).log2() as u32).saturating_sub(1);
     (0..count).map(|k| low * f64::from(1u32 << k)).map(|f| (f, 4.0 * f)).collect()
@@ -142,7 +144,8 @@ impl Response {
         )
     }
 
-    /// Returns true if a search from the other start would reach the same minimum.
+    /// Returns true if the two responses are so similar that searches that start from them would
+    /// reach the same minimum.
     fn is_near(&self, other: &Response) -> bool {
         let ratio = |a: f64, b: f64| (a / b).ln().abs();
         ratio(self.slosh_frequency, other.slosh_frequency) < 0.05

@@ -56,7 +56,8 @@ pub enum Target {
     Gravity,
     Arm,
     Density,
-    /// Difference of the largest command and the actuator's limit, relative to the largest command.
+    /// Difference between the largest torque command and the torque at which the actuator
+    /// saturates, over the largest command.
     Limit,
     /// Compliance of the bearing before it slips, rad/(N·m).
     Compliance,
@@ -77,7 +78,7 @@ pub struct Row {
 pub struct Besides {
     pub follows: &'static str,
     pub unit: &'static str,
-    /// The torque at a row for a factor of 1.
+    /// The torque in one row of the recording if its factor is 1.
     pub torque: fn(&Row) -> f64,
 }
 

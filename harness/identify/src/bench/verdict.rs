@@ -22,7 +22,7 @@ pub struct Question<'a> {
 pub struct Findings {
     pub torque: Option<String>,
     pub tests: Vec<Tests>,
-    /// True if the residual asks for effects that were not estimated.
+    /// True if the residual shows that effects are missing which were not estimated.
     pub asks: bool,
     pub alike: Vec<String>,
     /// The torque that the model lacks, if it is the cause.

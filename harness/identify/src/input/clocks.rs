@@ -7,7 +7,8 @@ use std::f64::consts::PI;
 
 use crate::tuning::{FINE_TORQUE, KERNEL_HALF, LOST_SPACING, UNEVEN};
 
-/// Values at all rows, and which rows had a value of their own; `None`: all.
+/// Values of a signal at all rows, and for each row whether the value was measured there; `None` if
+/// all were.
 pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
 
 /// Completes values that are NaN in rows without a value.
@@ -55,7 +56,7 @@ pub fn usual(time: &[f64]) -> f64 {
     }
 }
 
-/// Returns true if all times between rows are the mean time.
+/// Returns true if all times between rows equal their mean within a small tolerance.
 pub fn is_even(time: &[f64]) -> bool {
     let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     time.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < UNEVEN * step)
@@ -127,7 +128,8 @@ pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (fine_time, fine)
 }
 
-/// Returns the sinc at x samples under a Kaiser window with side lobes of 80 dB.
+/// Returns the interpolation kernel at a distance of `x` samples: the sinc function times a Kaiser
+/// window with side lobes of −80 dB.
 fn kernel(x: f64) -> f64 {
     let shape = 0.1102 * (80.0 - 8.7);
     let bessel = |z: f64| {

@@ -19,7 +19,8 @@ use crate::tuning::{
     SHORTEST_RECORDING, UNEVEN,
 };
 
-/// Number of samples on each side of a gap to which the autoregressive model is fitted.
+/// Number of torque samples on each side of a gap to which the autoregressive model that predicts
+/// the missing samples is fitted.
 const GAP_SIDE: usize = 8 * GAP_ORDER;
 
 /// Fills the gaps that can be filled, and returns the rows before the other gaps, after which the recording has to be cut. `done`
@@ -134,7 +135,8 @@ fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     if squares.len() < GAP_TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
 }
 
-/// Predicts the `lost` samples between two stretches; `None` if the stretches are too short.
+/// Predicts the `lost` samples of the torque between the samples on the `left` and on the `right`;
+/// `None` if these are too few.
 fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     let order = GAP_ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
     if order < 4 {

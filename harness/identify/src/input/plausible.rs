@@ -8,7 +8,8 @@ use crate::tuning::WHEEL_WINDOW;
 use analysis::innovations;
 use analysis::statistics::{deviation, mean, median, noise_level};
 
-/// Returns true if an inertia and the nominal one differ by less than a factor of 8: a larger factor means a wrong unit.
+/// Returns true if an estimated inertia differs from the nominal one by less than a factor of 8. A
+/// larger factor means that a column was read in a wrong unit.
 pub fn is_size(inertia: f64, nominal: f64) -> bool {
     // revolutions per minute are a factor of 9.5
     (0.125..8.0).contains(&(nominal / inertia))

@@ -17,13 +17,13 @@ use crate::input::{gaps, spikes};
 use crate::tuning::{DECAY_ROWS, LATE_SENSOR, LONG_RECORDING, MOVING_SPREAD, SHORTEST_RECORDING};
 
 pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
-/// Columns that are used if they are there.
+/// Columns of a recording that are read if the file has them.
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
 
 #[derive(Clone, Debug)]
 pub struct Source {
     pub columns: Columns,
-    /// First and last time, s.
+    /// First and last time, s, of the rows that are read; `None` for all rows.
     pub trim: Option<(f64, f64)>,
 }
 
@@ -481,8 +481,8 @@ mod tests {
         assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);
     }
 
-    /// For each fault of a recording, such as swapped columns or a constant torque, the error is a sentence about
-    /// this fault.
+    /// A recording with a fault, such as swapped columns or a constant torque, gives an error that
+    /// names this fault.
     #[test]
     fn each_fault_has_a_sentence_of_its_own() {
         type Change = fn(&mut Recording);

@@ -89,7 +89,8 @@ impl Record {
         self.outputs[output].iter().copied().filter(|y| !y.is_nan()).collect()
     }
 
-    /// Returns the standard deviation of an output's values; if all values are the same, their size, at least 1.
+    /// Returns the standard deviation of an output's values. If all values are equal, it is their
+    /// magnitude, at least 1.
     pub fn spread(&self, output: usize) -> f64 {
         let values = self.values(output);
         let spread = deviation(&values);

@@ -42,9 +42,10 @@ pub struct Recording {
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     pub time: f64,
-    /// Index of the row in the recording; `None` if the row is added.
+    /// Index of this row in the recording; `None` for a row that is added between the recording's
+    /// rows.
     pub own: Option<usize>,
-    /// Torque that is filled in, N·m.
+    /// Torque that replaces a missing torque in this row, N·m.
     pub filled: Option<f64>,
 }
 
@@ -91,7 +92,8 @@ impl Recording {
         }
     }
 
-    /// Returns the rows `from..to`, whose initial state is unknown.
+    /// Returns the rows `from..to` as a recording, whose initial state is unknown because it begins
+    /// within a motion.
     pub(crate) fn rows(&self, from: usize, to: usize) -> Recording {
         let part = self.mapped(|x| x[from..to].to_vec(), |mask| Some(mask[from..to].to_vec()));
         Recording { from_rest: false, ..part }
@@ -106,7 +108,8 @@ impl Recording {
         (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
     }
 
-    /// Returns the recording on other rows. Values that a signal does not have in them are interpolated.
+    /// Returns the recording on other rows. If a signal has no value in such a row, its value is
+    /// interpolated.
     pub fn with_rows(&self, rows: &[Row]) -> Recording {
         let time: Vec<f64> = rows.iter().map(|row| row.time).collect();
         let of = |values: &[f64], mask: Option<&[bool]>| {

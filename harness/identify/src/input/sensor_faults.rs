@@ -15,7 +15,7 @@ pub struct Faults {
     pub words: Vec<String>,
 }
 
-/// Reading of a sensor while the hub rests.
+/// Value that a sensor reads while the hub rests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rest {
     /// A rate reads this value (the gyro's bias), if it is known.
@@ -107,7 +107,8 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     found
 }
 
-/// Returns true if the largest and the least value are opposite, as the ends of a sensor's range are.
+/// Returns true if the largest and the smallest value are opposite numbers, like the ends of a
+/// sensor's range.
 fn is_opposite(values: &[f64]) -> bool {
     let ends = values
         .iter()
@@ -115,8 +116,8 @@ fn is_opposite(values: &[f64]) -> bool {
     (ends.0 + ends.1).abs() <= SENSOR_ROUNDING * peak(values)
 }
 
-/// Returns the rows with the largest value (or the least, if `sign` is −1) if they are many and adjacent: the sensor clips there,
-/// or the hub rests.
+/// Returns the rows with the largest value (or the smallest, if `sign` is −1), if they are many and
+/// adjacent, because the sensor is clipped there, or the hub rests.
 fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
@@ -133,7 +134,8 @@ fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize
     if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
 }
 
-/// Returns the median jump with which the values leave the end of the range that they have in these rows.
+/// Returns the median of the jumps by which the values leave the end of the sensor's range that
+/// they have in `rows`.
 fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
     let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
     let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();

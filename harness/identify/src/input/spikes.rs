@@ -20,7 +20,8 @@ use analysis::statistics::{median, noise_level, peak};
 use crate::input::clocks::weights;
 use crate::tuning::{SPIKE_AROUND, SPIKE_NEAR_STEP, SPIKE_SHARE, TORQUE_STEP};
 
-/// Returns the standard deviation of r over the standard deviation σ of white noise.
+/// Returns the ratio of the standard deviation of the difference r (see the module's head) to the
+/// standard deviation σ of white noise in the values.
 fn gain() -> f64 {
     (1.0_f64 + 34.0 / 36.0).sqrt()
 }
@@ -107,7 +108,8 @@ fn near(sound: &BTreeSet<usize>, k: usize) -> Vec<usize> {
     sound.range(..k).rev().take(2).chain(sound.range(k + 1..).take(2)).copied().collect()
 }
 
-/// Returns the difference of row k from the cubic through other rows, scaled to the noise of even rows, and the cubic there.
+/// Returns the difference of the value in row `k` from the cubic through the rows `nodes`, scaled
+/// so that its noise is that of evenly spaced rows, and the cubic's value in row `k`.
 fn off((time, y): (&[f64], &[f64]), nodes: &[usize], k: usize) -> (f64, f64) {
     let times: Vec<f64> = nodes.iter().map(|j| time[*j]).collect();
     let weights = weights(&times, time[k]);
@@ -116,7 +118,8 @@ fn off((time, y): (&[f64], &[f64]), nodes: &[usize], k: usize) -> (f64, f64) {
     ((y[k] - cubic) * gain() / own.max(gain()), cubic)
 }
 
-/// Returns true if the torque changes by more than `step` from one row to the next near a row.
+/// Returns true if the torque changes by more than `step`, N·m, from one row to the next in the
+/// neighbourhood of `row`.
 fn near_step(torque: &[f64], row: usize, step: f64) -> bool {
     let near = row.saturating_sub(SPIKE_NEAR_STEP)..(row + SPIKE_NEAR_STEP).min(torque.len() - 1);
     near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)

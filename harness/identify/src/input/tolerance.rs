@@ -1,4 +1,5 @@
-//! Tolerances of values that are not estimated: relative standard deviations.
+//! Tolerances of known values, such as the torque's scale, that are not estimated: relative
+//! standard deviations.
 
 use anyhow::{Context, Result, ensure};
 use names::hubslosh::{G_AXIAL, fluid, tank};
@@ -8,7 +9,8 @@ use crate::tuning::TOLD_SHARE;
 /// Relative standard deviations of numbers that the recording cannot show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
-    /// Scale of the torque: torque that acts over the recorded torque.
+    /// Relative standard deviation of the torque's scale, the ratio of the acting torque to the
+    /// recorded torque.
     pub torque: f64,
     pub clock: f64,
     pub gravity: f64,
@@ -19,14 +21,15 @@ pub struct Tolerances {
 pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
-    /// Tolerances of a bench with a calibrated wheel, a quartz, a rule and a thermometer: 1 %, 0.01 %, 0.1 % (the latitude is
-    /// known, the axis is upright to 2.5°), 0.4 % (1 mm) and 0.3 % (some 10 K).
+    /// Tolerances of a bench with a calibrated wheel, a quartz clock, a rule and a thermometer: 1 %
+    /// for the torque, 0.01 % for the clock, 0.1 % for gravity (the latitude is known, the axis is
+    /// upright to 2.5°), 0.4 % for the arm (1 mm) and 0.3 % for the density (some 10 K).
     fn default() -> Self {
         Tolerances { torque: 0.01, clock: 1e-4, gravity: 1e-3, arm: 4e-3, density: 3e-3 }
     }
 }
 
-/// Reads a relative tolerance, `1%` or `0.01`; `None`: the text is not a number.
+/// Reads a relative tolerance, `1%` or `0.01`; `None` if the text is not a number.
 ///
 /// # Errors
 /// If the tolerance is outside 0 to 50 %.
@@ -47,7 +50,8 @@ pub struct Share {
     pub most: String,
 }
 
-/// Returns the sentence on estimates whose uncertainty is due to tolerances more than to the recording; `known`: the tolerances in words.
+/// Returns the sentence that names the estimates whose uncertainty comes more from tolerances than
+/// from the recording. `known` describes the tolerances in words.
 pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
     let large = shares.iter().filter(|share| share.share > TOLD_SHARE);
     let large: Vec<String> = large
@@ -71,7 +75,8 @@ impl Tolerances {
         [self.torque, self.clock, self.gravity, self.arm, self.density]
     }
 
-    /// Sets the tolerances that a text names, for example `torque=1%,tank.r=0.002`.
+    /// Returns these tolerances with those replaced that a text names, for example
+    /// `torque=1%,tank.r=0.002`.
     pub fn with(mut self, text: &str) -> Result<Self> {
         for item in text.split(',') {
             let (name, value) = item

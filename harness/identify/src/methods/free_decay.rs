@@ -19,13 +19,14 @@ use crate::news::News;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::failed;
 
-/// If the residual contains another oscillation whose amplitude exceeds this fraction of the decaying oscillation, the
-/// verdict names it.
+/// Ratio of the amplitude of another oscillation in the residual to the amplitude of the decaying
+/// oscillation, above which the verdict names the other one.
 const NAMED: f64 = 0.02;
 /// Prior of the drift of a wave probe. Its width is large because almost nothing is known about this drift.
 const DRIFT: Drift = Drift { size: 0.3, time: 1.0, width: 3.0 };
 
-/// Result; `measurement` has the frequency f, the damping ratio ζ, its growth ζ_A with the amplitude, and the hardening κ.
+/// Result of a free decay. Its `measurement` has the frequency f, the damping ratio ζ, the growth
+/// of ζ with the amplitude, ζ_A, and the hardening κ.
 pub type Found = Identified<Details>;
 
 #[derive(Clone, Debug, Serialize)]
@@ -58,7 +59,7 @@ impl FreeDecay {
     }
 }
 
-/// Unknowns that all records share, and unknowns that each record has for itself.
+/// Unknowns of the oscillation that have the same value in all records of a free decay.
 const COMMON: [&str; 4] = ["frequency", "zeta", "zeta_amplitude", "hardening"];
 const OWN: [&str; 4] = ["amplitude", "phase", "offset", "slope"];
 

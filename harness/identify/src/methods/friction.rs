@@ -120,8 +120,8 @@ pub fn identify(
     Ok(found)
 }
 
-/// Returns the settings of a bench without liquid: the least density that the FMU accepts, with which the bench's tank has 2e-9
-/// kg of liquid.
+/// Returns the settings of a bench without liquid: the smallest density that the FMU accepts, with
+/// which the bench's tank has 2e-9 kg of liquid.
 pub fn empty() -> [(String, String); 1] {
     [(fluid::RHO.into(), "1e-6".into())]
 }
@@ -192,7 +192,8 @@ fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Ve
     bins.into_values().filter(|bin| bin.2 >= fewest).map(point).collect()
 }
 
-/// Fewest stretches from whose scatter the uncertainty of five coefficients is computed.
+/// Smallest number of stretches, parts of a decay within one revolution, from whose scatter the
+/// uncertainty of the five coefficients of [`Braking`] is computed.
 pub const LEAST_STRETCHES: usize = 10;
 
 /// Fits [`Braking`] in both directions; a direction with too few rows is left out.
@@ -237,7 +238,8 @@ struct FreeRow {
     angle: f64,
     speed: f64,
     acceleration: f64,
-    /// Number of the part of a decay within one revolution of the hub.
+    /// Number of the stretch to which the row belongs: a part of one decay within one revolution of
+    /// the hub.
     stretch: usize,
 }
 

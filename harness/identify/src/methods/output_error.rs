@@ -88,7 +88,8 @@ pub fn identify(
     Ok(found)
 }
 
-/// Returns a sentence on the longest beginning of a recording that a model fits; `None` if no model fits a beginning.
+/// Returns a sentence that says up to which time a model fits a recording, if one fits its
+/// beginning but not the whole; `None` if no model fits a beginning.
 fn fitting_beginning(
     fmu: &Fmu,
     recording: &Recording,
@@ -250,8 +251,8 @@ fn identify_whole(
     Ok(found)
 }
 
-/// Returns a start of a problem at the minimum of another model. Unknowns that the other model lacks keep the problem's own
-/// start.
+/// Returns a start of the search for `problem` at the minimum that was found for another model.
+/// Unknowns that the other model lacks keep the start that the problem has for them.
 fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
     let values = from.solution.fit.values(&from.solution.minimum.point.z);
     let mut start = problem.starts[0].clone();

@@ -1,4 +1,5 @@
-//! Second stage: unknowns, and the FMU's answer for their values.
+//! Second stage of an identification: the unknowns, and the outputs that the FMU computes for their
+//! values.
 
 pub mod overridden;
 pub mod simulate;

@@ -21,8 +21,8 @@ pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Returns a value near `start` within the bounds that is not `start`. It is needed because the FMU does not warn about a
-/// parameter that keeps its default.
+/// Returns a value close to `start`, but different from it, within the bounds. It is needed because
+/// the FMU does not warn about a parameter that keeps its default.
 pub fn near(start: f64, (low, high): (f64, f64), reach: f64) -> f64 {
     let by = 1e-6 * reach;
     if start + by <= high { start + by } else { (start - by).max(low) }

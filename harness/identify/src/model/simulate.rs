@@ -19,8 +19,8 @@ use crate::tuning::{
     SLOPE_PROBES,
 };
 
-/// Returns the bound for `solver.max_steps` in runs over these instants, s; `None` where the FMU has no such parameter, the
-/// settings set it, or its default is less.
+/// Returns the value of `solver.max_steps` for runs over these instants, s; `None` if the FMU has
+/// no such parameter, the settings set it, or its default is smaller.
 pub fn most_steps<'n>(
     description: &ModelDescription,
     mut set: impl Iterator<Item = &'n str>,
@@ -92,13 +92,13 @@ pub struct Setup {
 
 pub struct Finer {
     pub setup: Setup,
-    /// The FMU opened for another solver; `None` if the solver stays the same.
+    /// The FMU, opened again for another solver; `None` if the solver stays the same.
     pub model: Option<Model>,
 }
 
 #[derive(Clone, Debug)]
 struct Output {
-    /// Index of its first variable in [`Setup::reads`].
+    /// Index of the sensor's first variable in [`Setup::reads`].
     from: usize,
     quantity: Quantity,
     channel: usize,
@@ -113,7 +113,8 @@ impl Output {
     }
 }
 
-/// An instance that is ready for its first step.
+/// An instance of the FMU that is ready for its first step, for the FMU's own solver or for the
+/// host's.
 enum Initialised<'m> {
     Own(Instance<'m>),
     Host(exchange::Run<Box<Instance<'m>>>),
@@ -122,7 +123,8 @@ enum Initialised<'m> {
 pub type Value = (u32, f64);
 
 impl Setup {
-    /// Returns the setup for a question.
+    /// Returns what runs for a question need: the value references of its variables and the
+    /// settings of the solver.
     ///
     /// # Errors
     /// If the FMU lacks a variable of the question; the message lists all such names.
@@ -179,9 +181,10 @@ impl Setup {
         })
     }
 
-    /// Returns the same runs with smaller errors of the solver: with a finer tolerance, with shorter communication steps, and by the
-    /// host's solver if it can integrate the FMU ([`Setup::can_exchange`]). An FMU may refuse or ignore the first two. The host's
-    /// solver refuses what would take long.
+    /// Returns setups for the same runs with smaller errors of the solver: with a finer tolerance,
+    /// with shorter communication steps, and with the host's solver if it can integrate the FMU
+    /// ([`Setup::can_exchange`]). The FMU may refuse or ignore a finer tolerance and shorter steps.
+    /// The host's solver refuses runs that would take long.
     pub fn finer(&self, model: &Model) -> Vec<Finer> {
         let setup = |setup: Setup| Finer { setup, model: None };
         let Model::Own(fmu) = model else {

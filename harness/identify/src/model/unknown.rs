@@ -9,11 +9,11 @@ use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad,
 use crate::input::record::Record;
 use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 
-/// Place at which an unknown acts in the FMU's run.
+/// Quantity of the FMU's run that an unknown changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     Parameter(u32),
-    /// Error x of an input's scale: the recorded values times 1 + x act.
+    /// Relative error x of an input's recorded values: the values times 1 + x act on the FMU.
     Scale(usize),
     /// Error x of the clock's rate: true intervals are the recorded intervals times 1 + x.
     Clock,
@@ -174,7 +174,7 @@ impl Question {
         }
     }
 
-    /// Returns the error of the scale of an input, an output or the clock as an unknown.
+    /// Returns the relative error of the scale of an input, an output or the clock as an unknown.
     fn scale(&self, of: &str, recording: Option<usize>) -> Result<Targeted> {
         let input = self.inputs.iter().position(|name| name == of);
         let output = self.outputs.iter().position(|name| name == of);
@@ -248,7 +248,8 @@ impl Question {
         known(parameter(&free, description, recording)?, value, std).with_context(|| flag)
     }
 
-    /// Returns a variable's value in a recording: the value of `--set`, otherwise the start in the model description.
+    /// Returns the value that a variable has in a recording: the value of `--set` if there is one,
+    /// otherwise the start value in the model description.
     fn set_value(
         &self,
         variable: &Variable,
@@ -298,7 +299,8 @@ fn deviation(variable: &Variable, description: &ModelDescription, text: &str) ->
     Ok(number(text)? - number(&zero)?)
 }
 
-/// Returns the name of an unknown; with the number of its recording if only one has it, for example `bias(w)@2`.
+/// Returns the name of an unknown. If only one recording has it, the number of this recording is
+/// added: `bias(w)@2`.
 fn numbered(name: &str, recording: Option<usize>) -> String {
     recording.map_or(name.into(), |k| format!("{name}@{}", k + 1))
 }

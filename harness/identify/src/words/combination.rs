@@ -1,5 +1,3 @@
-//! Two unknowns of which only a sum or a product is known.
-
 use serde::Serialize;
 
 use crate::estimate::prose;

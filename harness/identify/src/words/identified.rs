@@ -1,5 +1,3 @@
-//! Result of an identification, the same for every method.
-
 use std::collections::BTreeMap;
 
 use anyhow::Result;
@@ -16,8 +14,8 @@ pub struct Identified<D> {
     pub settings: BTreeMap<String, String>,
     pub correlations: (Vec<String>, Vec<Vec<f64>>),
     pub converged: bool,
-    /// True if the model fits: the residual is the gyro's noise. If false, no interval can be trusted. `None`: the method does
-    /// not test it.
+    /// True if the model fits, because the residual is the gyro's noise. If false, no interval can
+    /// be trusted. `None` if the method does not test it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fits: Option<bool>,
     pub verdict: Vec<String>,
@@ -37,7 +35,7 @@ pub struct Residual {
     pub residual: Vec<f64>,
     /// Standard deviation of the signal's white noise, if known.
     pub noise: Option<f64>,
-    /// Torque at the same times, N·m, if the signal is the rate that answers to it.
+    /// Torque at the times of the signal, N·m, if the signal is the hub's rate under this torque.
     pub torque: Option<Vec<f64>>,
 }
 

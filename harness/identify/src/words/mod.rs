@@ -1,4 +1,4 @@
-//! Fifth stage: the results in words, as a page and as JSON.
+//! Fifth stage of an identification: the results in words, as a page and as JSON.
 
 pub mod combination;
 pub mod identified;

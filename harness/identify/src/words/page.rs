@@ -106,7 +106,8 @@ fn parameters<D>(found: &Identified<D>, combinations: &[Combination]) -> Markup 
     html! { h2 { "Parameters" } (table(head, rows)) }
 }
 
-/// Largest value in each of [`PAGE_POINTS`] windows, measured and modelled, and the residual's root mean square.
+/// Draws the largest measured and modelled value, and the root mean square of the residual, in each
+/// of [`PAGE_POINTS`] windows of time.
 fn envelope(signals: &Residual) -> Chart {
     let width = (signals.time.len() / PAGE_POINTS).max(1);
     let windows = |of: &dyn Fn(usize) -> f64, mean: bool| -> Vec<(f64, f64)> {
@@ -130,7 +131,7 @@ fn envelope(signals: &Residual) -> Chart {
     axis_chart("Measurement, model and residual", "time, s", &signals.label, lines, true)
 }
 
-/// The 8 s around the fastest motion, row by row.
+/// Draws the 8 s around the fastest motion, measured and modelled, row by row.
 fn stretch(signals: &Residual) -> Chart {
     let fastest = (0..signals.measured.len())
         .max_by(|a, b| signals.measured[*a].abs().total_cmp(&signals.measured[*b].abs()))
@@ -176,7 +177,8 @@ fn spectrum(signals: &Residual) -> Chart {
     axis_chart("Amplitude density", "frequency, Hz", &format!("{}/√Hz", signals.label), lines, true)
 }
 
-/// Residual over time, thinned out so that the chart has at most 2 [`PAGE_POINTS`] points.
+/// Draws the residual over time, thinned out so that the chart has at most 2 [`PAGE_POINTS`]
+/// points.
 fn residual(signals: &Residual) -> Chart {
     let every = signals.time.len().div_ceil(2 * PAGE_POINTS);
     let rows = (0..signals.time.len()).step_by(every);
@@ -205,8 +207,8 @@ fn autocorrelation(signals: &Residual) -> Chart {
     axis_chart(title, "lag, s", "autocorrelation", lines, false)
 }
 
-/// Gain and phase from torque to rate, estimated in the same way from measurement and model; `None` without a torque that excites
-/// a band.
+/// Draws gain and phase from torque to rate, estimated in the same way from measurement and model;
+/// `None` without a torque that excites a band.
 fn bode(signals: &Residual) -> Option<[Chart; 2]> {
     let simulated = signals.measured.iter().zip(&signals.residual).map(|(y, e)| y - e).collect();
     let of = |rate: Vec<f64>| {

@@ -1,13 +1,12 @@
-//! Sentences that every verdict may have.
-
 use analysis::innovations::{self, Tests};
 
 pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
 pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
-/// Beginning of the sentence about errors of the solver that leave no judgement.
+/// Beginning of the verdict's sentence that the solver's errors are too large for a judgement of
+/// the fit.
 pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
-/// Beginnings of sentences that say that the numbers cannot be trusted.
+/// Beginnings of those sentences of a verdict that say that the numbers cannot be trusted.
 pub const DOUBTS: [&str; 3] = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED];
 
 /// Returns a phrase for each test that a residual fails, with the size of the failure in standard deviations of chance; `input`

@@ -57,8 +57,9 @@ impl Kind {
     }
 }
 
-/// Columns that were read; NaN marks missing values. If the times are dates, `origin` is the date of the
-/// first row in RFC 3339, and the times count from that row, in seconds.
+/// Columns that were read from a Parquet file; NaN marks missing values. If the times are dates,
+/// `origin` is the date of the first row in RFC 3339, and the times count from that row, in
+/// seconds.
 pub struct Found {
     pub columns: Vec<Vec<f64>>,
     pub origin: Option<String>,
@@ -198,8 +199,9 @@ fn pairs(reader: &SerializedFileReader<File>) -> BTreeMap<String, String> {
     pairs.map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default())).collect()
 }
 
-/// Appends the values of a column to `into`. `level` is the definition level at which a value is present.
-/// Dates are counted from `first`, which the first row sets.
+/// Appends the values of a column to `into`; a row without a value becomes NaN. `level` is the
+/// Parquet definition level at which a value is present. Dates are counted from `first`, which the
+/// first row sets.
 fn values(
     reader: ColumnReader,
     rows: usize,

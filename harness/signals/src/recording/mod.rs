@@ -30,8 +30,9 @@ use crate::foreign::{self, Foreign, Kind};
 use crate::parquet_file::{self, Found};
 use crate::table::Table;
 
-/// Names and units of a file's columns: `full` are the names as they are in the file, `names` those without a
-/// unit in brackets at the end, and `row` the units from a row below the names.
+/// Names and units of a file's columns. `full` are the names as they are in the file, `names` are
+/// the names without a unit in brackets at the end, and `row` holds the units from a row below the
+/// names.
 struct Header {
     names: Vec<String>,
     full: Vec<String>,
@@ -51,7 +52,8 @@ impl Header {
         header
     }
 
-    /// Adds columns without a name up to the number `width`; they are called `#4`, `#5`, … by their numbers.
+    /// Adds columns without a name until there are `width` columns. Such a column is called `#4`,
+    /// `#5`, … by its number.
     fn widen(&mut self, width: usize) {
         for k in self.names.len()..width {
             self.names.push(format!("#{}", k + 1));
@@ -87,8 +89,8 @@ impl Header {
         }
     }
 
-    /// Returns the unit of a signal in its column, and the factor to the unit in which the signal is wanted;
-    /// `None` if the file states no unit.
+    /// Returns the unit that the file states for a signal's column, and the factor from this unit
+    /// to the unit of the returned values; `None` if the file states no unit.
     fn unit(&self, place: usize, signal: &Signal) -> Result<Option<(String, f64)>> {
         let row = match &self.row[place] {
             Some(unit) => Some((unit.clone(), factor(signal, unit)?)),
@@ -179,8 +181,8 @@ pub struct Signal<'a> {
     pub unit: Option<&'a str>,
 }
 
-/// Signals to read in addition to time. The first one is the rows' signal, unless it may be missing
-/// ([`Between::Missing`]).
+/// Signals to read from a recording in addition to time. A row is read if the first signal has a
+/// value there, unless this signal may be missing ([`Between::Missing`]).
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
     pub signals: &'a [Signal<'a>],
@@ -190,20 +192,23 @@ pub struct Wanted<'a> {
 /// Times later than this, s, are counted from the beginning of the recording, because they are probably
 /// seconds since 1970.
 const LATE: f64 = 1e6;
-/// Latest time that may have no stated unit, s since 1970: the year 5138. Milliseconds since 1970 are later.
+/// Latest time, s since 1970, for which a file need not state a unit: the year 5138. Milliseconds
+/// since 1970 are later.
 const LATEST: f64 = 1e11;
-/// Time between rows, s, above which a unit must be stated, because slosh has periods of about a second.
+/// Longest time between rows, s, for which a file need not state the unit of time, because slosh
+/// has periods of about a second.
 const SLOWEST: f64 = 1.0;
-/// Time between rows, s, below which a unit must be stated: no slosh is recorded at 20 kHz, but rows at 50 Hz
-/// with times in days are 2e-7 apart.
+/// Shortest time between rows, s, for which a file need not state the unit of time: no slosh is
+/// recorded at 20 kHz, but rows at 50 Hz with times in days are 2e-7 apart.
 const FASTEST: f64 = 5e-5;
-/// Largest magnitude of a value in SI. Its fourth power, which statistics need, is finite in sums over all
-/// rows.
+/// Largest magnitude of a value in SI that is accepted. Its fourth power, which statistics need, is
+/// finite in sums over all rows.
 const LARGEST: f64 = 1e60;
-/// Longest gap of a slow signal that is completed, in units of the signal's usual spacing. Gaps up to
-/// [`SHORT`] are always completed.
+/// Longest gap of a slow signal that is filled, over the usual time between the signal's values.
+/// Gaps up to [`SHORT`] are always filled.
 const LOST: f64 = 10.0;
-/// Spacing, in units of the usual one, above which a value must have been lost.
+/// Ratio of the time between two values of a signal to the usual time, above which a value must
+/// have been lost.
 const LATE_BY: f64 = 1.5;
 const SHORT: f64 = 0.25;
 
@@ -291,8 +296,8 @@ impl File {
     }
 }
 
-/// Lets `work` read a file, or the text to which the Python package converts the file if it is of another
-/// kind.
+/// Calls `work` with the file `path` or, if only the Python package can read it, with the text to
+/// which that package converts it.
 fn with_text_file<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T> {
     let read = match work(path) {
         Err(error) if error.is::<Foreign>() => {
@@ -303,7 +308,8 @@ fn with_text_file<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> R
     read.with_context(|| format!("the file {} cannot be used", path.display()))
 }
 
-/// Reads a recording, or histories of inputs if `inputs` is given; it then lists those that are Booleans.
+/// Reads a recording. If `inputs` is given, the file holds histories of inputs instead, and
+/// `inputs` lists those that are Booleans.
 fn read_as(
     path: &Path,
     wanted: &Wanted,
@@ -527,14 +533,15 @@ fn plausible(time: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the unit that is assumed for a signal whose file states none; `None` for a variable of an FMU
-/// without a unit.
+/// Returns the unit that is assumed for a signal if the file states none; `None` for a variable of
+/// an FMU that has no unit.
 fn unstated<'a>(signal: &Signal<'a>) -> Option<&'a str> {
     let own = signal.unit.or_else(|| Some(quantity(signal.name).ok()?.unit()));
     own.filter(|unit| !unit.is_empty())
 }
 
-/// Returns the dimension of a signal, and the value in SI of the unit in which it is wanted.
+/// Returns the dimension of a signal, and the SI value of the unit in which its values are
+/// returned.
 fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
     match signal.unit {
         Some(unit) => unit::parse_unit(unit),
@@ -542,7 +549,7 @@ fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
     }
 }
 
-/// Returns the factor from `unit` to the unit in which a signal is wanted.
+/// Returns the factor from `unit` to the unit in which the values of a signal are returned.
 ///
 /// # Errors
 /// If `unit` is not a unit of the signal's quantity.
@@ -558,11 +565,11 @@ fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     known.with_context(|| format!("\"{unit}\" cannot be converted to {}'s \"{own}\"", signal.name))
 }
 
-/// Selects the rows with a value of the rows' signal, and completes the other signals there by their
-/// [`Between`].
+/// Selects the rows in which the first signal has a value, and fills missing values of the other
+/// signals there as their [`Between`] says.
 ///
 /// # Errors
-/// If a gap is too long to complete.
+/// If a gap is too long to be filled.
 fn complete(
     signals: &[Signal],
     mut columns: Vec<Vec<f64>>,

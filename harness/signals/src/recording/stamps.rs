@@ -13,10 +13,11 @@ pub struct Grid {
 }
 
 const DECIMALS: i32 = 6;
-/// Fraction of the quantum by which a time may differ from a multiple of it, because times since 1970 have
-/// only 52 binary digits.
+/// Largest difference between a time and a multiple of the unit of its last digit, over this unit,
+/// that is explained by floating-point rounding: times since 1970 have only 52 binary digits.
 const OFF: f64 = 1e-2;
-/// Fraction of the quantum by which the spread of the stamps about the grid may exceed the quantum.
+/// Fraction of the unit of the last digit by which the times may spread more about an even grid
+/// than rounding to this digit explains.
 const BEYOND: f64 = 0.02;
 const FEWEST: usize = 20;
 
@@ -30,7 +31,8 @@ pub enum Stamps {
     Unknown(String),
 }
 
-/// Largest accepted relative error of a grid's step. Every logger's clock has an error of this size.
+/// Largest accepted relative error of the step of an even grid. The clock of every logger has an
+/// error of this size.
 const LARGEST_ERROR: f64 = 1e-4;
 /// If more than this fraction of the rows has the same time as the row before, the times are not the times of the
 /// measurements.
@@ -62,7 +64,8 @@ pub fn regular(time: &[f64]) -> Stamps {
     }
 }
 
-/// Returns the even grid that explains rounded times, and the largest relative error that its step may have.
+/// Returns the even grid that explains printed times, and the largest relative error that its step
+/// may have; `None` if there is no such grid.
 fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let quantum = quantum(time)?;
     let units: Vec<f64> = time.iter().map(|t| ((t - time[0]) / quantum).round()).collect();
@@ -94,8 +97,9 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     Some((grid, uncertainty(&units, &counts, step) / step))
 }
 
-/// Returns the largest difference from `step`, in quanta, at which a grid still explains all stamps. The
-/// spread of the stamps about the grid is a convex function of the step, which makes the bounds unique.
+/// Returns the largest difference from `step` at which an even grid still explains all times. Times
+/// and steps are in units of the last printed digit. The spread of the times about the grid is a
+/// convex function of the step, so that the result is unique.
 fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
     let spread = |step: f64| {
         let off = units.iter().zip(counts).map(|(unit, count)| unit - step * count);
@@ -181,8 +185,8 @@ mod tests {
         }
     }
 
-    /// From whole seconds the step of a minute is known to 0.03 %, and of twenty minutes to the error of any
-    /// clock.
+    /// The step of the grid behind times in whole seconds is known to 0.03 % after a minute of
+    /// rows, and after twenty minutes to the error of any clock.
     #[test]
     fn a_grid_counts_only_if_its_step_is_known() {
         let whole =

@@ -21,7 +21,8 @@ const NAMED: usize = 5;
 const SEPARATORS: [(u8, &str); 4] =
     [(b';', "semicolons"), (b'\t', "tabs"), (b',', "commas"), (b' ', "blanks")];
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
-/// Words for missing values, including those that C libraries and spreadsheets print for NaN.
+/// Words in a field that stand for a missing value, including those that C libraries and
+/// spreadsheets print for NaN.
 const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
 /// Reason why a field is not read, as a phrase that a message puts after the text of the field.
@@ -65,8 +66,8 @@ impl Value {
         !matches!(self, Value::Missing | Value::Other)
     }
 
-    /// Parses a field. `decimal` is the decimal sign of the fields before, and is set by the first number
-    /// that has one.
+    /// Parses a field as a number, a time or a missing value. `decimal` is the decimal sign of the
+    /// fields before it, and is set by the first number that has one.
     fn parse(field: &str, separator: u8, decimal: &mut Option<char>) -> Value {
         match number(field, separator, decimal) {
             Ok(Some(number)) => Value::Number(number),

@@ -136,7 +136,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     })
 }
 
-/// Parses ISO 8601 without separators, such as 20260131T120000.020.
+/// Parses a date with a clock time in ISO 8601 without separators, such as 20260131T120000.020.
 fn basic(field: &str) -> Result<Option<Moment>, Unreadable> {
     let Some((day, clock)) = field.split_once(['T', ' ', '_']) else { return Ok(None) };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
@@ -153,7 +153,8 @@ fn basic(field: &str) -> Result<Option<Moment>, Unreadable> {
     })
 }
 
-/// Splits a clock time into the time with its half of the day (am, pm) and the offset from UTC, ns.
+/// Splits a clock time such as `1:00 pm +01:00` into the time with its half of the day (am, pm) and
+/// the offset from UTC, ns.
 fn zoned(clock: &str) -> Result<Option<(String, i64)>, Unreadable> {
     let end = clock.find(|c: char| !matches!(c, '0'..='9' | ':' | '.')).unwrap_or(clock.len());
     let (time, rest) = clock.split_at(end);

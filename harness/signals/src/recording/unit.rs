@@ -21,7 +21,6 @@ pub enum Quantity {
 
 use Quantity::{Acceleration, Angle, Force, Length, Rate, Time, Torque};
 
-/// Exponents of kg, m, s and rad.
 pub(super) type Dimension = [i8; 4];
 
 const GRAVITY: f64 = 9.80665;
@@ -30,7 +29,8 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// 1959).
 const POUND: f64 = 0.453_592_37 * GRAVITY;
 
-/// A symbol: its name, its dimension, its value in SI, and the prefixes that it takes.
+/// A symbol of a unit such as `N`: its name, its dimension, its value in SI, and the prefixes with
+/// which it may occur.
 type Symbol = (&'static str, Dimension, f64, &'static str);
 
 const SYMBOLS: [Symbol; 20] = [
@@ -71,8 +71,8 @@ const WORDS: &str = "sec=s second=s msec=ms milli=ms usec=us micro=us nsec=ns na
 
 type Product = (Dimension, f64);
 
-/// Finds the symbol `name`, also with a prefix. With `fold` the case of letters does not count, which may
-/// give several results.
+/// Finds the unit symbol `name`, also with a prefix such as m for milli. With `fold` the case of
+/// letters does not count, which may give several results.
 fn symbol(name: &str, fold: bool) -> Vec<Product> {
     let same = |a: &str, b: &str| if fold { a.eq_ignore_ascii_case(b) } else { a == b };
     let mut found = Vec::new();
@@ -90,7 +90,8 @@ fn symbol(name: &str, fold: bool) -> Vec<Product> {
     found
 }
 
-/// Finds a unit written as a word in any case, also in the plural and with a prefix: `Milliseconds`.
+/// Finds a unit that is written as a word, in any case, also in the plural and with a prefix:
+/// `Milliseconds`.
 fn word(name: &str) -> Vec<Product> {
     let lower = name.to_lowercase();
     let mut found = Vec::new();
@@ -110,7 +111,8 @@ fn word(name: &str) -> Vec<Product> {
     found
 }
 
-/// Reads a run of letters: a symbol, a word, or two of them without a sign between (`mNm`, `inlb`).
+/// Reads a run of letters within a unit: a symbol, a word, or two of them without a sign in between
+/// (`mNm`, `inlb`).
 fn run(name: &str, fold: bool) -> Vec<Product> {
     let either = |name: &str| [symbol(name, fold), word(name)].concat();
     let mut found = either(name);
@@ -268,7 +270,8 @@ pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
     Vec::new()
 }
 
-/// Units of quantities that the bench does not measure, such as volts. They help to recognise a row of units.
+/// Units of quantities that the bench does not measure, such as volts. They help to recognise the
+/// row of units below the names of a file's columns.
 const OTHERS: [&str; 42] = [
     "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "°C", "degF", "Pa",
     "hPa", "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "l", "m/s", "km/h", "mph", "km", "T",
@@ -276,8 +279,8 @@ const OTHERS: [&str; 42] = [
     "grad",
 ];
 
-/// Returns true for the name of a unit, which may stand in brackets. columns named `nanosec` and the like contain fractions
-/// of a second.
+/// Returns true if the text is a unit, which may stand in brackets. A column named `nanosec` or the
+/// like contains fractions of a second.
 pub(super) fn is_unit(text: &str) -> bool {
     let text = text.trim_matches(['[', ']', '(', ')', ' ']);
     if ["nanosec", "nanosecs", "nsec", "nsecs"].contains(&text) {
@@ -312,8 +315,8 @@ const BETWEEN: [char; 11] = ['_', '.', ' ', '-', ',', ':', '/', '(', ')', '[', '
 /// Units at the end of a name that often have another meaning: minimum, input, revision.
 const OFTEN_OTHERS: [&str; 5] = ["min", "in", "rev", "raw", "counts"];
 
-/// A unit found in the name of a column: its text, its value in SI (`factor`), the beginning of the name
-/// before it, and whether it is the end of the name.
+/// A unit that was found in the name of a column: its text, its value in SI (`factor`), the
+/// beginning of the name before it, and whether the name ends with the unit.
 #[derive(Debug, PartialEq)]
 pub(super) struct Stated {
     pub text: String,
@@ -436,8 +439,8 @@ fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Di
     }
 }
 
-/// Returns a column's name, from which the unit at its end was already cut, without what led to the unit: opening
-/// brackets, separators and the word "in".
+/// Returns the beginning of a column's name before its unit, without the characters that introduce
+/// the unit: opening brackets, separators and the word "in".
 fn strip_unit(name: &str) -> &str {
     let name = name.trim_end_matches(|c| BETWEEN.contains(&c) || ['[', '(', '{', '<'].contains(&c));
     let cut = name.strip_suffix(" in").unwrap_or(name);
@@ -477,7 +480,8 @@ fn ends(name: &str, at: usize) -> bool {
     !BETWEEN.contains(&last) && next.is_none_or(|next| BETWEEN.contains(&next) || is_hump(next))
 }
 
-/// Returns true if a new word begins with the capital `next`: aB, and A before Bc.
+/// Returns true if a new word begins with the letter `next` in a name of mixed case: at the B of
+/// aB, and at the A of ABc.
 fn is_hump(last: char, next: char, after: Option<char>) -> bool {
     next.is_uppercase() && (!last.is_uppercase() || after.is_some_and(char::is_lowercase))
 }
@@ -514,7 +518,7 @@ impl Quantity {
         self.facts().0
     }
 
-    /// Returns the factor from a unit of this quantity to SI; `None` for an unknown unit.
+    /// Returns the SI value of a unit of this quantity; `None` for an unknown unit.
     pub fn factor(self, unit: &str) -> Option<f64> {
         match factors(unit, self.dimension())[..] {
             [factor] => Some(factor),
