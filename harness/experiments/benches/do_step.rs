@@ -19,7 +19,8 @@ const STEP: f64 = 0.02;
 const SWEEP: &str = "lin-sweep:amplitude=0.1,f0=2.2,f1=2.6,duration=200";
 const DURATION: f64 = 200.0;
 
-/// States: angle θ and rate ω of the hub, slosh angle α and its rate.
+/// State of the bench: angle θ, rad, and rate ω, rad/s, of the hub, slosh angle α, rad, and its
+/// rate, rad/s.
 type State = SVector<f64, 4>;
 
 /// Equations of the hub with one linear pendulum of the thesis's bench. The sign of ω in the dry friction is smoothed to
@@ -68,8 +69,8 @@ fn rk4(system: &Smooth, parts: usize) -> State {
     x
 }
 
-/// MATLAB's ode45 over the whole sweep with the thesis's tolerances (6.2.3) and dense output at
-/// every knot.
+/// Integrates with MATLAB's ode45 method over the whole sweep, with the tolerances of the thesis
+/// (6.2.3) and dense output at every knot.
 fn dopri5(system: Smooth) -> State {
     let end = (system.knots.len() - 1) as f64 * STEP;
     let mut solver = Dopri5::new(system, 0.0, end, STEP, State::zeros(), 1e-5, 1e-7);

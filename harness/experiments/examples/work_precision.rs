@@ -54,7 +54,8 @@ fn since(start: Duration) -> f64 {
     (cpu_time() - start).as_secs_f64()
 }
 
-/// Rates at the knots, rad/s, and the time that each piece took, s.
+/// Solution by one method: the hub's rates at the knots, rad/s, and the CPU time that each piece of
+/// the run took, s.
 type Solution = (Vec<f64>, Vec<f64>);
 
 fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<Solution> {
@@ -90,7 +91,7 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
 /// solvers other than the FMU.
 struct Smooth<'a> {
     torque: &'a [f64],
-    /// Scale of the smoothing, rad/s.
+    /// Rate over which the sign of the hub's rate is smoothed in the friction, rad/s.
     eps: f64,
 }
 

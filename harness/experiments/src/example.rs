@@ -22,7 +22,7 @@ pub struct Example {
     inputs: &'static [(&'static str, f64, Course)],
 }
 
-/// Time function of an input; t in s, largest value 1.
+/// Time function of an input, with the largest value 1; t in s.
 type Course = fn(t: f64) -> f64;
 
 /// A sine of 2 Hz, below the slosh frequency of the bench, that grows and fades within ten seconds, followed by no torque.
@@ -117,8 +117,8 @@ impl Example {
     }
 }
 
-/// Drives the FMU with the inputs of a file. `hold` holds them over each step, like a host that does not set
-/// slopes.
+/// Simulates the FMU with the histories of inputs in a file. With `hold` the inputs are constant
+/// over each step, as by a host that does not set slopes.
 pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Result<Table> {
     let description = fmu.description();
     let mut others = histories(description, input, None, hold, false, &mut |_| {})?;

@@ -15,12 +15,13 @@ use names::hubslosh::{OMEGA, OMEGA_IMU, imu};
 use signals::table::Table;
 
 const MOST_RECORDS: usize = 10_000;
-/// Shortest record in correlation times of the bias, so that the maximum (at 1.89) is visible. The longest
-/// averaging time is a tenth of the record.
+/// Length of the shortest record from which a Gauss–Markov bias can be estimated, in correlation
+/// times of the bias. The Allan deviation of the bias has its maximum at 1.89 correlation times,
+/// and the longest averaging time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
 
-/// A recording to simulate; `settings` are start values by FMU name, as text, except `imu.enabled` and
-/// `imu.seed`.
+/// A recording of the gyro to simulate. `settings` are start values by their names in the FMU, as
+/// text; `imu.enabled` and `imu.seed` must not be among them.
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub settings: Vec<(String, String)>,

@@ -3,8 +3,9 @@ use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};
 use names::hubslosh;
 
-/// Returns the names of the parameters that make an FMU move although nothing is set. HubSlosh begins with
-/// the liquid displaced, so that a first plot in any host shows something; the value 0 is at rest.
+/// Returns the names of the parameters whose start values are not at rest, so that an FMU moves
+/// although nothing is set. HubSlosh begins with the liquid displaced, so that a first plot in any
+/// host shows something; with the value 0 it begins at rest.
 pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     match description.model_name.as_str() {
         "HubSlosh" => vec![hubslosh::init::SLOSH_ANGLE.into()],

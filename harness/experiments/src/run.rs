@@ -71,7 +71,8 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
     }
 }
 
-/// Column of a torque history that is not an input: the derivative of [`TORQUE`] until the next row.
+/// Name of the column in a torque history that is not an input of the FMU: the derivative of
+/// [`TORQUE`] until the next row, N·m/s.
 pub const SLOPE: &str = "tau_slope";
 
 /// Reads a file's histories of inputs: every column that is an input of the FMU, and [`SLOPE`] with
@@ -236,8 +237,8 @@ impl Run {
         budget::steps(self.stop - self.start(), self.step).unwrap_or(0)
     }
 
-    /// Estimates the memory in bytes that the communication points and the histories of the inputs take
-    /// during the run.
+    /// Estimates the memory, bytes, that the communication points of the run and the histories of
+    /// its inputs take.
     pub fn course_bytes(&self) -> u64 {
         let all = [&self.torque].into_iter().chain(self.others.iter().map(|(_, other)| other));
         let counts =
@@ -467,7 +468,8 @@ impl Recorder {
         })
     }
 
-    /// Adds a row, and returns the position of the first value that is NaN or infinite.
+    /// Adds the present values of the recorded variables as a row. Returns the position of the
+    /// first value that is NaN or infinite, if there is one.
     fn record(&mut self, instance: &mut Instance) -> Result<Option<usize>> {
         instance.get_real(&self.reals, &mut self.values)?;
         for (value, place) in self.values.iter().zip(&self.places) {

@@ -30,9 +30,10 @@ pub struct Weightless {
 }
 
 impl Contents {
-    /// Returns the state of the liquid in the row in which weight dominates least, if weight does not
-    /// dominate there. The rows are specific force towards the bottom, m/s², and speed of the surface, m/s. A
-    /// row's Weber number uses the radius and the highest speed up to it.
+    /// Returns the Bond and Weber number of the row in which weight dominates the liquid least, or
+    /// `None` if it dominates in every row. A row has the specific force towards the bottom of the
+    /// tank, m/s², and the speed of the free surface, m/s. A row's Weber number uses the radius and
+    /// the highest speed up to it.
     pub fn without_weight(&self, rows: impl IntoIterator<Item = (f64, f64)>) -> Option<Weightless> {
         let (mut speed, mut worst) = (0.0f64, None::<(f64, Weightless)>);
         for (g, v) in rows {
@@ -251,7 +252,8 @@ impl Tank {
     }
 }
 
-/// Returns the z axis of a frame from its attitude, a quaternion of any norm with the scalar first.
+/// Returns the unit vector of a frame's z axis in the outer axes, from the frame's attitude: a
+/// quaternion of any norm with the scalar first.
 fn third_axis([w, x, y, z]: [f64; 4]) -> [f64; 3] {
     let norm2 = w * w + x * x + y * y + z * z;
     [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z]
@@ -284,8 +286,9 @@ mod tests {
         Tanks { tanks: vec![tank], accelerometer: "specific_force" }
     }
 
-    /// Returns the warnings of the tanks for rows of the specific force along y, the angular acceleration
-    /// about z, the rate about x and the first modes' rates along x.
+    /// Returns the warnings about the tanks for a run whose rows have the specific force along y,
+    /// the angular acceleration about z, the rate about x, and the rates of the first modes along
+    /// x.
     fn warnings(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
         let names: Vec<String> =
             ["time".to_string()].into_iter().chain(tanks.required_variables()).collect();

@@ -139,9 +139,11 @@ pub struct Unanalysed {
     pub case: Case,
     pub history: History,
     pub tail: History,
-    /// Largest slosh angle, rad, and its name; `None` without slosh angles.
+    /// Largest slosh angle of the run, rad, and the name of the variable that has it; `None` if the
+    /// FMU has no slosh angles.
     pub largest_angle: Option<(f64, String)>,
-    /// Sentences about the tanks that left the range of their model, one for each.
+    /// Sentences about the tanks that left the range in which their model is valid, one for each
+    /// such tank.
     pub limits: Vec<String>,
     pub reused: bool,
 }
@@ -347,10 +349,11 @@ impl Campaign {
         }))
     }
 
-    /// Simulates one run, or reads it if it is stored, and analyses it.
+    /// Simulates one run, or reads it if it is already stored, and analyses it.
     ///
     /// # Errors
-    /// If the run cannot be stored, because then no other run can be stored either.
+    /// If the run cannot be stored. The campaign then ends, because no other run could be stored
+    /// either.
     fn done(
         &self,
         fmu: &Fmu,
@@ -515,8 +518,8 @@ impl Campaign {
     }
 }
 
-/// Writes a CSV table row by row, because the rows of a large campaign as strings would take more memory than
-/// its results.
+/// Writes a CSV table row by row, because all rows of a large campaign at once would take more
+/// memory than its results.
 fn written(header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(header)?;

@@ -35,8 +35,9 @@ struct Found {
     torques: Option<[f64; 2]>,
 }
 
-/// Replaces the `[onset]` of a plan by dwells at the onset; does nothing for a plan without it. `jobs` dwells
-/// are simulated in parallel; 0 for the number of cores.
+/// Replaces the `[onset]` of a plan by dwells, sine torques of constant frequency, at the onset of
+/// rotary slosh that it finds. Does nothing for a plan without `[onset]`. `jobs` dwells are
+/// simulated in parallel; 0 for the number of cores.
 pub fn seek_onset(
     plan: &mut Plan,
     fmu: &Fmu,
@@ -91,7 +92,7 @@ fn dwell(fmu: &Fmu, case: &Case, frequency: f64, torque: f64) -> Result<Dwell> {
     })
 }
 
-/// Searches the onset between two frequencies (Hz) and two torques (N·m).
+/// Searches the onset of rotary slosh between two frequencies, Hz, and two torque amplitudes, N·m.
 fn search(
     band: [f64; 2],
     [mut low, mut high]: [f64; 2],

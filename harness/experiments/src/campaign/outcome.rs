@@ -36,14 +36,16 @@ use signals::table::Table;
 /// sweep.
 const GRID_POINTS: usize = 2000;
 
-/// Separation of antiresonance and resonance that counts as resolved, in units of the resolution.
+/// Smallest distance of antiresonance and resonance, in units of the estimate's frequency
+/// resolution, at which both count as resolved.
 const RESOLVED: f64 = 3.0;
-/// Largest residual of a valid transfer function. With 0.3, a tenth of the power of the rate does not follow from the
-/// torque.
+/// Largest residual of a fitted transfer function that counts as valid, relative to the rate. With
+/// 0.3, a tenth of the power of the rate does not follow from the torque.
 const MOST_MISFIT: f64 = 0.3;
-/// Largest valid shift of the resonance by a passing sweep, and difference of two estimates from a whole
-/// record, as parts of the separation. The shift is 0.6 times the root of the sweep's rate if the resonance
-/// is narrower.
+/// Largest shift of the resonance by a passing sweep, relative to the distance of antiresonance and
+/// resonance, that counts as valid; also the largest such difference of two estimates from a whole
+/// record. The shift is 0.6 times the root of the sweep's rate, Hz/s, if the resonance is narrower
+/// than that.
 const MOST_SHIFT: f64 = 0.25;
 
 const LEAST_SNR: f64 = 0.0;
@@ -139,8 +141,8 @@ struct Rates {
     warnings: Vec<String>,
 }
 
-/// Mean of a rate over its deviation above which it is reported, because it would add 1 % to the energy of
-/// the rate.
+/// Ratio of a rate's mean to its standard deviation above which a warning reports the mean, because
+/// it would add 1 % to the energy of the rate.
 const NOTABLE_MEAN: f64 = 0.1;
 const PARTS: usize = 8;
 
@@ -322,7 +324,7 @@ pub struct Outcome {
     pub totals: Totals,
     /// Estimates from the whole record at once, for example by `spa`; `None` if the torque is neither a sweep nor noise.
     pub record: Option<Record>,
-    /// Estimates along the sweep; `None` if the torque is not a sweep.
+    /// Estimates along the sweep, as it passes each frequency; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
     /// Rotary slosh; `None` for a recording, which has no angles of the liquid.
     pub rotary: Option<Rotary>,
@@ -331,9 +333,11 @@ pub struct Outcome {
     pub history: History,
     pub path: SloshPath,
     pub ending: Ending,
-    /// Name of the force that dominates the liquid if it is not gravity ([`Range::without_weight`]).
+    /// Name of the force that dominates the liquid, if gravity does not
+    /// ([`Range::without_weight`]).
     pub weightless: Option<String>,
-    /// Sentence about the reasons for which the tank was out of range; empty if it was not.
+    /// Sentence about the reasons why the tank was out of the range of its model; empty if it was
+    /// not.
     pub limits: Vec<String>,
     pub reused: bool,
     pub warnings: Vec<String>,
@@ -342,7 +346,7 @@ pub struct Outcome {
 #[derive(Clone, Debug)]
 pub struct Estimate {
     pub response: FrequencyResponse,
-    /// Antiresonance and resonance; none if they are not valid.
+    /// Antiresonance and resonance of the response; both missing if they are not valid.
     pub features: Features,
     pub resolution: f64,
     /// Relative standard deviation of the magnitude, and of the phase, rad, from the part of the rate that no
@@ -391,7 +395,8 @@ impl Estimate {
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
-    /// Adds uncertainties; `slope` returns the rate at which the error changes along a frequency, relative to
+    /// Adds the uncertainties of the response and of its features. `slope` returns, for a
+    /// frequency, the rate at which the response's error changes along the frequency, relative to
     /// the error, 1/Hz.
     fn with_uncertainties(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
@@ -409,8 +414,8 @@ impl Estimate {
     }
 }
 
-/// Returns true if antiresonance and resonance are closer to each other than `than`, Hz, which is the resolution. Returns
-/// false if one of the two is missing.
+/// Returns true if the distance between antiresonance and resonance is less than `than`, Hz, the
+/// resolution of the estimate. Returns false if one of the two is missing.
 fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
@@ -434,7 +439,8 @@ pub struct Record {
     /// torque; `None` if `spa` finds no valid resonance and antiresonance.
     pub snr_db: Option<[f64; 2]>,
     pub snr_over_band: Curve,
-    /// A fitted transfer function, if neither `spa` nor H1 nor the passing sweep is valid.
+    /// A fitted transfer function, which is computed if neither `spa` nor H1 nor the estimate along
+    /// the sweep is valid.
     pub rational: Option<Estimate>,
     /// The thesis's linear model, fitted to the `spa` response, and over the band the coherence of its
     /// residual with the torque; `None` if nothing can be fitted.
@@ -445,8 +451,8 @@ pub struct Record {
 #[derive(Clone, Debug)]
 pub struct Passing {
     pub rate: Estimate,
-    /// Share of the liquid's force off the axis; for a recording, of the hub's rates, if it has more than
-    /// one.
+    /// Share of the liquid's force that does not act about the hub's axis. For a recording it is
+    /// the share of the hub's rates about other axes, if these were recorded.
     pub off_axis: Option<OffAxis>,
     pub leakage: Vec<f64>,
 }
@@ -782,7 +788,8 @@ impl Outcome {
         self.passing.as_ref()?.off_axis
     }
 
-    /// Returns the liquid's regime at its largest wave; `None` for a recording, which has no wave.
+    /// Returns the regime of linear slosh theory at the largest wave of the run; `None` for a
+    /// recording, which has no wave.
     pub fn regime(&self) -> Option<&'static str> {
         let ratio = self.totals.peak_wave_height / self.range.radius;
         (!ratio.is_nan()).then(|| match Regime::from_ratio(ratio) {
@@ -869,8 +876,9 @@ impl Range {
     }
 }
 
-/// Returns the item of an enumeration of an initialised instance, or of its integer twin `kind` if that is
-/// not 0. Returns `None` if the FMU has no such enumeration, because it is of an older version.
+/// Returns the selected item of an enumeration of an initialised instance. If `kind`, the integer
+/// twin of the enumeration, is not 0, it selects the item. Returns `None` if the FMU has no such
+/// enumeration, because it is of an older version.
 fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
     let description = instance.description();
     let Ok(variable) = description.variable(name) else { return Ok(None) };

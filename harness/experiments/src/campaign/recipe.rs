@@ -11,7 +11,8 @@ use crate::run::{self, Run};
 use crate::sensors::Sensors;
 use signals::table::{self, Table};
 
-/// Version of the format. It is raised when stored runs of an older program have another meaning.
+/// Version of the format of stored runs. It is raised when runs that an older version has stored
+/// would be understood differently.
 const FORMAT: &str = "1";
 
 /// Returns everything that determines a run's numbers. Two runs with the same recipe are the same run, independent of

@@ -24,21 +24,25 @@ const SIGNALS: [Signal; 4] = [
     Signal { name: "omega_y", required: false, between: Between::Line, unit: None },
 ];
 
-/// Smallest correlation of the recorded torque with the torque of the plan.
+/// Smallest correlation coefficient of the recorded torque and the torque of the plan with which a
+/// recording is accepted.
 const LEAST_CORRELATION: f64 = 0.9;
-/// Largest part of the run that may be missing in the recording at its ends.
+/// Largest fraction of the run that may be missing at the ends of the recording.
 const MISSING: f64 = 0.5;
-/// Largest part of a sweep in gaps. In gaps torque and rate are both interpolated linearly, which hardly changes their
-/// ratio. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
+/// Largest fraction of a sweep's time that may lie in gaps of the recording. In gaps torque and
+/// rate are both interpolated linearly, which hardly changes their ratio. A record that lost 3 % of
+/// its rows one by one has 6 % of its time in gaps.
 const GAPS: f64 = 0.15;
 /// Largest relative difference between the rates of the recorder's clock and of the clock that timed the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
-/// Shift of the torque at the end of a record that a wrong clock causes, in cycles, above which times are
-/// corrected.
+/// Shift of the recorded torque against the sweep at the end of a record, in cycles, that a wrong
+/// clock causes and above which times are corrected.
 const SHIFT: f64 = 0.02;
-/// Cycles of a block in which the phase of a record is compared with the phase of the sweep.
+/// Length of a block, in cycles of the sweep, over which the phase of a record is compared with the
+/// phase of the sweep.
 const BLOCK_CYCLES: f64 = 6.0;
-/// Number of times that the clock is estimated, each time starting from the result before.
+/// Number of times that the error of the recorder's clock is estimated, each time starting from the
+/// result before.
 const ROUNDS: usize = 3;
 
 /// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
@@ -160,9 +164,9 @@ pub(super) fn table(
     Ok((step, Table::of(columns)))
 }
 
-/// Times of a recording in terms of the commanded torque. The clock has the row at which the torque begins (it may lie
-/// before the first row or between two rows) and the relative difference `rate` of the two clocks: 1 + rate recorded
-/// seconds are one second of the torque.
+/// Relation between the recorder's clock and the clock of the torque command: `first` is the row of
+/// the recording at which the torque begins (it may lie before the first row or between two rows),
+/// and 1 + `rate` recorded seconds are one second of the torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Clock {
     first: f64,
@@ -276,8 +280,9 @@ impl Sought<'_> {
     }
 }
 
-/// Returns the row of a record at which a signal begins, possibly before the first row, and the correlation
-/// coefficient of the two where they overlap.
+/// Finds the signal `wanted` in a record by correlation. Returns the row of the record at which it
+/// begins, possibly before the first row, and the correlation coefficient of the two where they
+/// overlap.
 fn aligned(record: &[f64], wanted: &[f64]) -> (i64, f64) {
     let length = (record.len() + wanted.len()).next_power_of_two();
     let forward = Forward::new(length);

@@ -105,7 +105,7 @@ fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or(String::new(), |value| format!("{value:?}"))
 }
 
-/// Columns of `runs.csv` that say how a run was made; its features follow.
+/// Columns of `runs.csv` that describe how a run was simulated or recorded; the features follow.
 pub const MADE_FROM: [&str; 10] = [
     "name",
     "error",

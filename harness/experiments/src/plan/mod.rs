@@ -47,7 +47,8 @@ pub const BUILT_IN: &[(&str, &str)] = plans! {
     "bench_as_built" "monte_carlo" "low_thrust" "slew"
 };
 
-/// Step of a plan without one, s: the thesis's IMU at 50 Hz.
+/// Time between the rows of a result, s, in a plan that does not state it: the period of the
+/// thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
 /// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
 const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
@@ -136,7 +137,7 @@ pub struct Case {
     pub step: f64,
     pub stop: f64,
     pub tolerance: Option<f64>,
-    /// True if the torque is held over each step.
+    /// True if the torque is held constant over each step, false if it is interpolated linearly.
     pub hold: bool,
     pub sensors: Vec<Sensor>,
     pub recording: Option<Recorded>,
@@ -245,8 +246,9 @@ impl Plan {
         names
     }
 
-    /// Returns the number with the most values in the plan, which is the axis of figures; of several the
-    /// last. Returns `None` without one, or if values are drawn at random.
+    /// Returns the name of the varied number with the most values in the plan, which becomes the
+    /// axis of figures; of several the last. Returns `None` if no number is varied, or if values
+    /// are drawn at random.
     pub fn axis(&self) -> Option<&str> {
         self.axis_of_vary().or_else(|| self.axis_of_listed())
     }

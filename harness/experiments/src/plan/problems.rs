@@ -48,7 +48,8 @@ impl Problems {
         self.0.len()
     }
 
-    /// Returns all problems as one error, in the order of the file; nothing if there are none.
+    /// Returns all collected problems as one error, in the order of the plan's file, or `Ok` if
+    /// there are none.
     pub fn check(mut self) -> Result<()> {
         self.0.sort_by_key(|(lines, _)| lines.0.first().copied());
         let all: Vec<String> =

@@ -15,7 +15,8 @@ pub(super) struct Draws {
     pub draw: Vec<Named<Distribution>>,
 }
 
-/// Source of a random value. Values outside `min` to `max` or the bounds of the variable are drawn again.
+/// Probability distribution of a varied value. Values outside `min` to `max` or the bounds of the
+/// variable are drawn again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distribution {
     kind: Kind,
@@ -82,8 +83,8 @@ impl Family {
 }
 
 impl Draws {
-    /// Returns the values of draw `number`. Every draw has its own stream, so that it does not depend on the
-    /// number of runs.
+    /// Returns the random values of draw `number`. Every draw has its own stream of random numbers,
+    /// so that its values do not depend on the number of runs.
     pub fn draw(
         &self,
         description: &ModelDescription,

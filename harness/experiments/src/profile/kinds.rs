@@ -48,8 +48,8 @@ pub enum Allowed {
 }
 
 impl Allowed {
-    /// Returns a description of the error of a value, worded to follow the parameter's name; `None` for an
-    /// allowed value.
+    /// Returns a description of what is wrong with a value, worded to follow the parameter's name
+    /// in a message; `None` for an allowed value.
     pub(super) fn fault(self, value: f64) -> Option<String> {
         let (met, demand) = match self {
             Allowed::Any => (true, String::new()),
@@ -113,7 +113,8 @@ const fn sweep_from(first: Allowed) -> [Parameter; 4] {
     ]
 }
 const MOVES: Demand = (|v| v.value("f0") != v.value("f1"), "f0 and f1 are equal; use sine");
-/// Condition on frequencies, because beyond this range the phase of a sine has no valid digits.
+/// Condition on the frequencies of a profile: beyond this range the phase of its sine has no valid
+/// digits.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.value(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",

@@ -288,14 +288,16 @@ impl Profile {
     }
 }
 
-/// Default interval between two commands of a profile, s: 50 Hz, as on the thesis's bench.
+/// Time between two torque commands of a profile if the user states none, s: 50 Hz, as on the
+/// thesis's bench.
 pub const SAMPLE: f64 = 0.02;
-/// Largest error of straight lines between commands at the given interval, as a fraction of the amplitude.
-/// For a sine of frequency f the error is (2π f · interval)²/8. The value allows the thesis's sweeps up to
-/// 3.5 Hz to be commanded at 50 Hz.
+/// Largest error of straight lines between the commands of a profile, as a fraction of its
+/// amplitude, with which the given interval between commands is kept. For a sine of frequency f the
+/// error is (2π f · interval)²/8. The value allows the thesis's sweeps up to 3.5 Hz to be commanded
+/// at 50 Hz.
 pub const COARSEST: f64 = 0.025;
-/// Largest error of straight lines between commands that are closer than the given interval because of
-/// [`COARSEST`].
+/// Largest error of straight lines between the commands of a profile, as a fraction of its
+/// amplitude, if the given interval is divided because it exceeds [`COARSEST`].
 const FINEST: f64 = 0.001;
 
 /// Returns the largest product of frequency and interval (cycles) at which lines differ from a sine by at
@@ -413,8 +415,9 @@ impl Torque {
 }
 
 impl Profile {
-    /// Returns the number of intervals between commands until `stop`, which may have a fraction, and the
-    /// number of intervals in `sample` s; `None` if the torque is constant between its edges.
+    /// Returns the number of intervals between torque commands until `stop`, s, which may have a
+    /// fraction, and the number of them in `sample`, s. `None` if the torque is constant between
+    /// its edges and needs no commands.
     fn commands(&self, sample: f64, stop: f64, hold: bool) -> Result<Option<(f64, usize)>> {
         let highest = self.shape.highest(stop);
         if highest == 0.0 {
@@ -506,8 +509,8 @@ mod tests {
         }
     }
 
-    /// With φ = π f1 t²/T, 4 Hz and 8 s, a quarter cycle ends at t = 1 s and the first whole one at 2 s, at 1
-    /// Hz.
+    /// A linear sweep from 0 Hz has the phase φ = π f1 t²/T. With f1 = 4 Hz and T = 8 s, a quarter
+    /// cycle ends at t = 1 s and the first whole one at 2 s, when the frequency is 1 Hz.
     #[test]
     fn a_linear_sweep_begins_at_zero_hertz() {
         let profile: Profile = "lin-sweep:amplitude=2,f0=0,f1=4,duration=8".parse().unwrap();

@@ -12,8 +12,8 @@ use std::f64::consts::TAU;
 use super::shape::{Dwell, Shape};
 use analysis::random::Random;
 
-/// Number of sines. Over the thesis's band they are 4.4 mHz apart, closer than the 5 mHz that `spa` resolves,
-/// so that the estimate has no gaps.
+/// Number of sines of which the noise consists. Over the thesis's band they are 4.4 mHz apart,
+/// closer than the 5 mHz that `spa` resolves, so that the estimate has no gaps.
 pub const TONES: usize = 512;
 
 /// A noise torque in a band, which may begin at 0, Hz, if wanted with a sine added. The torque is clipped at

@@ -233,7 +233,8 @@ impl Sensor {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
-    /// Returns the reading for a value of the quantity without noise, delay and quantisation.
+    /// Returns the reading that a value of the quantity gives without noise, delay and
+    /// quantisation.
     pub fn expected(&self, value: f64) -> f64 {
         self.errors.scale * value + self.errors.bias
     }

@@ -66,8 +66,8 @@ impl Coordinate {
         }
     }
 
-    /// Converts the coordinates of a mode to slosh angles, radial and tangential, rad. `length` is the length of the mode's
-    /// pendulum, m.
+    /// Converts the coordinates `q` of a mode, radial and tangential, to slosh angles, rad.
+    /// `length` is the length of the mode's pendulum, m.
     pub fn angles(self, q: [f64; 2], length: f64) -> [f64; 2] {
         match self {
             Coordinate::Angle => q,
@@ -80,8 +80,9 @@ impl Coordinate {
     }
 }
 
-/// Modes whose coordinates are the first of the needed variables: for each mode radial and tangential
-/// coordinate and length, then once the tank's diameter.
+/// Slosh modes of the FMU as a sensor reads them. Their coordinates are the first of the needed
+/// variables: for each mode the radial and the tangential coordinate and the pendulum length, and
+/// finally the tank's diameter.
 #[derive(Clone, Debug)]
 struct Modes {
     count: usize,
@@ -211,7 +212,8 @@ impl Quantity {
     }
 }
 
-/// Returns the elevation at the wall per slosh angle of mode `n`, which counts from 0, m.
+/// Returns the elevation of the wave at the wall over the slosh angle of mode `n`, which counts
+/// from 0, m/rad.
 fn wall(n: usize, radius: f64) -> f64 {
     2.0 * radius / (XI[n] * XI[n] - 1.0)
 }
