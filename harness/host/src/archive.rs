@@ -22,10 +22,10 @@ use crate::xml;
 pub const MOST_ENTRIES: usize = 20_000;
 /// Longest name of an entry, bytes. Windows opens paths of up to 259 characters.
 pub const LONGEST_NAME: usize = 1024;
-/// Number of bytes to which the files of an archive may unpack in any case.
+/// Number of bytes to which the files of an archive may unpack, however small the archive is.
 pub const UNPACKED: u64 = 64 << 20;
-/// Number of additional bytes to which these files may unpack per byte of the archive. Binaries usually
-/// compress to a third and descriptions to a twentieth.
+/// Number of bytes to which the files may unpack for each byte of the archive, in addition to
+/// [`UNPACKED`]. Binaries usually compress to a third and descriptions to a twentieth.
 pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
@@ -42,8 +42,8 @@ impl Entry {
         self.name.ends_with('/')
     }
 
-    /// Returns the reason why unpacking this entry would write outside the folder, or `None` if it stays
-    /// inside.
+    /// Returns the reason why unpacking this entry would write outside the folder into which the
+    /// archive is unpacked, or `None` if it stays inside.
     fn way_out(&self) -> Option<&'static str> {
         let name = &self.name;
         if name.starts_with('/') || name.get(1..2) == Some(":") {
@@ -62,12 +62,12 @@ impl Entry {
     }
 }
 
-/// Returns the path of a name as the most lenient file system understands it. Windows and macOS ignore
-/// capitals. Windows drops full stops and spaces at the end of a part, and takes the text after a colon for a
-/// stream of the file.
+/// Returns the path of an entry as the most lenient file system understands its name. Windows and
+/// macOS ignore capitals. Windows drops full stops and spaces at the end of a part, and takes the
+/// text after a colon for a stream of the file.
 ///
-/// Two entries with the same place would overwrite each other on some systems. An archive with such entries
-/// is refused on every system, so that an FMU consists of the same files everywhere.
+/// Two entries with the same place would overwrite each other on some systems. An archive with such
+/// entries is refused on every system, so that an FMU consists of the same files everywhere.
 pub fn place(name: &str) -> String {
     let part = |part: &str| {
         let file = part.split(':').next().unwrap_or_default();

@@ -129,8 +129,8 @@ impl Binary {
         loading.into_iter().chain(lacking).chain(self.surplus()).collect()
     }
 
-    /// Lists what would keep the binary from loading on a machine without development tools, for the
-    /// processors of its platform.
+    /// Lists what would keep the binary from loading on a machine without development tools.
+    /// Machines with each processor of the binary's platform are considered.
     pub fn loading_faults(&self) -> Vec<String> {
         self.loading_faults_for(match self.kind {
             Kind::Linux | Kind::Windows => &["x86_64"],
@@ -268,7 +268,8 @@ fn linux(bytes: &[u8]) -> Result<Binary> {
     Ok(binary)
 }
 
-/// Returns 2.14 for `GLIBC_2.14`. Only two parts are kept, so that `GLIBC_2.2.5` gives 2.2.
+/// Parses the name of a symbol version: 2.14 for `GLIBC_2.14`. Only two parts of the number are
+/// kept, so that `GLIBC_2.2.5` gives 2.2.
 fn glibc_version(name: &str) -> Option<Version> {
     let mut numbers = name.strip_prefix("GLIBC_")?.split('.').map(str::parse);
     Some(Version(numbers.next()?.ok()?, numbers.next()?.ok()?))
@@ -453,7 +454,8 @@ mod tests {
         }
     }
 
-    /// The binary needs a library and a glibc that not every system has, exports other names, and has a search path.
+    /// A binary that needs a library and a glibc that not every system has, that exports other
+    /// names, and that has a search path has all of these reported at once.
     #[test]
     fn all_faults_of_a_binary_are_reported_at_once() {
         let mut linux = good(Kind::Linux);

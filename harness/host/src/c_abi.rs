@@ -50,8 +50,8 @@ struct Sink {
     uncategorised: AtomicUsize,
 }
 
-/// Receivers of the messages of all living instances, by the environment pointer that their FMUs pass back to the
-/// callbacks.
+/// Receivers of the messages of all living instances. The key is the environment pointer that an
+/// FMU passes back to the callbacks.
 ///
 /// An FMU may pass any pointer. The callbacks look it up in this map and never follow it.
 static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
@@ -197,7 +197,7 @@ unsafe extern "C" {
 #[derive(Clone, Debug)]
 pub struct CallError {
     pub call: &'static str,
-    /// The status, or `Error` if a function returned NULL instead of an instance.
+    /// Status that a call returned, or `Error` if a function returned NULL instead of an instance.
     pub status: Status,
     pub messages: Vec<Message>,
 }

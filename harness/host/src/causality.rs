@@ -6,7 +6,8 @@ macro_rules! attribute {
         #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum $name {
             $($item,)+
-            /// A causality that FMI does not define, as written; empty if the attribute is missing.
+            /// The text of the attribute if it is a causality that FMI does not define; empty if
+            /// the attribute is missing.
             Other(String),
         }
 

@@ -325,7 +325,8 @@ impl Reader {
         }
     }
 
-    /// Reads a required attribute with `read`; adds a problem if it is missing or not valid.
+    /// Reads a required attribute of an element with `read`. If the attribute is missing or not
+    /// valid, a problem is added, and the default is returned.
     fn required<T: Default>(
         &mut self,
         element: &Element,
@@ -592,7 +593,7 @@ fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     unknowns.filter_map(pair).collect()
 }
 
-/// Returns the start values of the elements of a variable of FMI 3.0.
+/// Returns the start values of the elements of an array, or of a scalar, in FMI 3.0, as texts.
 pub fn starts(element: &Element, c_type: CType) -> Vec<String> {
     match c_type {
         CType::String | CType::Binary => {

@@ -17,13 +17,16 @@ pub struct Inputs {
     discrete: Vec<(usize, Variable)>,
     sloped: bool,
     hold: bool,
-    /// Relative tolerance of the host's solver; `None` if the FMU has Co-Simulation.
+    /// Relative tolerance of the host's solver, if the FMU is integrated in Model Exchange; `None`
+    /// in Co-Simulation.
     exchange: Option<f64>,
 }
 
-/// Relative tolerance of the host's solver if neither the user nor the default experiment gives one.
+/// Relative tolerance of the host's solver in Model Exchange, if neither the user nor the default
+/// experiment gives one.
 const TOLERANCE: f64 = 1e-6;
-/// Relative deviation of an input from its slope above which it jumps, which is an event.
+/// Deviation of an input from the line that its slope gives, relative to its magnitude, above which
+/// the input jumps, which is an event.
 const JUMP: f64 = 1e-9;
 
 /// The inputs between two communication points: value and slope of each input, in the order of [`Inputs`].
@@ -35,7 +38,8 @@ pub struct Course<'a> {
 }
 
 impl Inputs {
-    /// Selects the inputs by name. With `hold` they are constant during each step (zero-order hold).
+    /// Selects the inputs of an FMU that a run drives, by name. With `hold` they are constant
+    /// during each step (zero-order hold).
     pub fn new(description: &ModelDescription, names: &[&str], hold: bool) -> Result<Self> {
         let (mut references, mut places, mut discrete) = (Vec::new(), Vec::new(), Vec::new());
         for (place, name) in names.iter().enumerate() {

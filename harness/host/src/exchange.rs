@@ -14,9 +14,9 @@ use anyhow::{Result, bail, ensure};
 use crate::c_abi::Called;
 use crate::fmu::Instance;
 
-/// Accuracy of the time of an event, as a fraction of the step.
+/// Accuracy with which the time of an event is located, as a fraction of the integrator's step.
 const LOCATED: f64 = 1e-13;
-/// Smallest distance of two events, as a fraction of the distance between two rows.
+/// Smallest time between two events, as a fraction of the time between two rows of the result.
 const APART: f64 = 1e-6;
 pub const MOST_STEPS: usize = 100_000;
 
@@ -55,7 +55,8 @@ pub struct Run<I> {
     t: f64,
     x: Vec<f64>,
     z: Vec<f64>,
-    /// Ratio of the absolute tolerance of each state to the relative tolerance.
+    /// Nominal values of the states: the absolute tolerance of a state is its nominal value times
+    /// the relative tolerance.
     nominals: Vec<f64>,
     tolerance: f64,
     h: f64,
@@ -176,7 +177,8 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(dx)
     }
 
-    /// Returns true if an indicator changes sign between the present point and (t, x).
+    /// Returns true if an event indicator changes sign between the present point and the states `x`
+    /// at the time `t`.
     fn crosses(&mut self, t: f64, x: &[f64]) -> Result<bool> {
         if self.z.is_empty() {
             return Ok(false);

@@ -341,7 +341,7 @@ impl Fmu {
         }
     }
 
-    /// Calls fmi2Instantiate with exactly these arguments, also wrong ones.
+    /// Calls fmi2Instantiate with exactly these arguments, even if they are not valid, for tests.
     pub fn instantiate_with(&self, with: &Instantiation) -> Result<Instance<'_>, CallError> {
         let (name, guid, resources) =
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
@@ -471,7 +471,8 @@ impl Functions {
     }
 }
 
-/// Callbacks that were passed to an FMU; they are freed after the instance.
+/// Callbacks that were passed to an FMU. They must live as long as the instance, and are freed
+/// after it.
 pub struct Given(*mut CallbackFunctions);
 
 impl Drop for Given {

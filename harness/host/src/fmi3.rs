@@ -159,7 +159,7 @@ fn as_text(value: &Value) -> &str {
     if let Value::String(text) = value { text } else { "" }
 }
 
-/// Converts an integer; a number of more than 63 bits becomes the largest i64.
+/// Converts an integer of any C type. A number of more than 63 bits becomes the largest i64.
 fn integer(n: impl TryInto<i64>) -> Value {
     Value::Integer(n.try_into().unwrap_or(i64::MAX))
 }
@@ -201,7 +201,7 @@ macro_rules! numbers {
 pub struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,
-    /// Valid during one call of fmi3DoStep, otherwise NULL.
+    /// Callback for points within the step, valid during one call of fmi3DoStep, otherwise NULL.
     within: Cell<*mut Within<'static>>,
     updates: Cell<usize>,
     line: Cell<Line>,
@@ -845,7 +845,8 @@ impl<'fmu> Instance<'fmu> {
     }
 }
 
-/// Inputs that an FMU 3.0 receives within a step, by its own value references; of an array all elements.
+/// Inputs that change linearly within a step and that an FMU 3.0 receives within the step, by their
+/// value references in the FMU. If one element of an array changes, all its elements are listed.
 #[derive(Default)]
 struct Line {
     references: Vec<u32>,

@@ -28,7 +28,7 @@ pub enum Instance<'fmu> {
     V3(fmi3::Instance<'fmu>),
 }
 
-/// Evaluates an expression with the FMU or instance of either version.
+/// Evaluates an expression with the FMU or instance in it, whichever version of FMI it has.
 macro_rules! each {
     ($type:ident, $of:expr, $one:ident => $do:expr) => {
         match $of {
@@ -114,7 +114,8 @@ impl Fmu {
     }
 }
 
-/// Declares methods that call the same method of the instance of either version.
+/// Declares methods of [`Instance`] that call the method of the same name of an instance of FMI 2.0
+/// or 3.0.
 macro_rules! passed_on {
     ($($(#[$doc:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
         impl Instance<'_> {$(

@@ -52,8 +52,8 @@ pub const FLOOD_SHOWN: u64 = 4 << 30;
 pub struct Limits {
     pub call: Duration,
     pub total: Option<Duration>,
-    /// Limit of memory beyond that in use when the first binary is loaded, bytes. The same number limits
-    /// temporary files and shared memory.
+    /// Limit of the memory that the process may use in addition to what it uses when the first
+    /// binary is loaded, bytes. The same number limits temporary files and shared memory.
     pub memory: u64,
     pub file: u64,
 }
@@ -229,7 +229,8 @@ fn watch(
     Ok(panic.or(cause).unwrap_or(Cause::Ended(status)))
 }
 
-/// Longest time between the end of the connection and the end of the process.
+/// Longest time that a process may go on after its connection to the parent has ended, before it is
+/// killed.
 const CLOSED: Duration = Duration::from_secs(1);
 
 const COUNTING: Duration = Duration::from_millis(50);
@@ -264,8 +265,8 @@ fn on_disk(file: &std::fs::Metadata) -> u64 {
     file.len()
 }
 
-/// Returns the shared memory of a process together with its open files that are in no folder, bytes: the
-/// larger of the mapped and the open memory.
+/// Returns the memory that a process shares with others, bytes: the larger of the mapped memory and
+/// the size of open files that are in no folder.
 #[cfg(target_os = "linux")]
 fn shared(id: u32) -> u64 {
     let process = Path::new("/proc").join(id.to_string());
@@ -344,7 +345,8 @@ fn kill_group(id: u32) {
 #[cfg(not(unix))]
 fn kill_group(_: u32) {}
 
-/// Returns true if a process has ended. The process is not reaped, so that its identifier is not used again.
+/// Returns true if a process has ended. It is not waited for, so that the system does not give its
+/// identifier to another process.
 #[cfg(unix)]
 fn has_ended(child: &mut Child) -> Result<bool> {
     let id = rustix::process::Pid::from_raw(i32::try_from(child.id())?);
@@ -504,7 +506,7 @@ fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
 struct Guarded {
     channel: channel::Process,
     limits: Limits,
-    /// The pipe for the output of the binary, and the original stdout and stderr.
+    /// The pipe for the output of the FMU's binary, and this process's original stdout and stderr.
     #[cfg(unix)]
     streams: Option<[File; 3]>,
 }
@@ -567,7 +569,8 @@ pub fn send_answer(content: &[u8]) {
     send(ANSWER, content);
 }
 
-/// Tells the parent that the work is done, with this exit code. Without a parent it does nothing.
+/// Tells the parent that the guarded process has done its work and ends with this exit code.
+/// Without a parent it does nothing.
 pub fn done(code: u8) {
     send(DONE, &[code]);
 }
@@ -588,7 +591,8 @@ pub fn streams() -> Option<(&'static File, &'static File)> {
     None
 }
 
-/// Sends a sign of life four times a second, until a call takes longer than its limit.
+/// Sends a sign of life to the parent four times a second, until a call of the FMU takes longer
+/// than its limit.
 fn send_signs_of_life() {
     let Some(guarded) = GUARDED.get() else { return };
     let mut seen: Vec<(Weak<AtomicU64>, u64, Instant)> = Vec::new();
@@ -614,7 +618,8 @@ fn send_signs_of_life() {
 /// Counters of all callers of a binary; each is odd during a call.
 static CALLS: Mutex<Vec<Weak<AtomicU64>>> = Mutex::new(Vec::new());
 
-/// Marks the calls of one caller, so that a call that does not return is noticed.
+/// Marks the beginnings and ends of the calls that one caller makes, so that the parent notices a
+/// call that does not return.
 #[derive(Debug)]
 pub(crate) struct Calls(Arc<AtomicU64>);
 
@@ -629,7 +634,7 @@ impl Calls {
         calls
     }
 
-    /// Creates a marker that counts as one call until it is dropped.
+    /// Creates a mark that counts as one call of the binary from now until it is dropped.
     pub(crate) fn one() -> Calls {
         let calls = Calls::new();
         calls.begin();
@@ -676,7 +681,8 @@ pub(crate) fn before_loading() {
     });
 }
 
-/// Raises the limits of memory and file size of a guarded process by `bytes`, for its own tables.
+/// Raises the limits of memory and file size of a guarded process by `bytes`, which its own tables
+/// need in addition to the FMU.
 pub fn allow(bytes: u64) {
     before_loading();
     #[cfg(target_os = "linux")]
@@ -689,7 +695,8 @@ pub fn allow(bytes: u64) {
     let _ = bytes;
 }
 
-/// Sets a soft limit, at most to the limit with which the process was started.
+/// Sets a soft limit for a resource of this process. It cannot exceed the limit with which the
+/// process was started.
 #[cfg(unix)]
 fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let mut limit = rustix::process::getrlimit(resource);

@@ -24,7 +24,8 @@ pub struct ParameterSet {
 pub struct Parameter {
     pub name: String,
     pub value: Value,
-    /// Unit in the file; without one the value is in the unit of the FMU's variable.
+    /// Unit that the file states for the value; without one the value is in the unit of the FMU's
+    /// variable.
     pub unit: Option<Unit>,
     line: u64,
 }
@@ -32,8 +33,8 @@ pub struct Parameter {
 #[derive(Clone, Debug)]
 pub struct Unit {
     pub name: String,
-    /// Definition by SI base units, if the file has one. Otherwise the unit must be one of the FMU's
-    /// variable.
+    /// Definition of the unit by SI base units, if the file has one. Otherwise the unit must be one
+    /// in which the FMU's variable can be given.
     pub base: Option<BaseUnit>,
 }
 
@@ -253,9 +254,9 @@ fn from_json(text: &str) -> Result<ParameterSet> {
     Ok(keep_parameters_of_one_run(ParameterSet { parameters, warnings }))
 }
 
-/// Keeps the parameters of one simulation: those common to all recordings and, if there is only one
-/// recording, its own (`NAME@1`). With several recordings their own parameters are left out, and a warning
-/// names them.
+/// Returns those parameters of an identification's result that one simulation can use: the
+/// parameters common to all recordings and, if there is only one recording, its own (`NAME@1`).
+/// With several recordings their own parameters are left out, and a warning names them.
 fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
     let has_others = found.parameters.iter().any(|p| recording(&p.name).is_some_and(|n| n > 1));

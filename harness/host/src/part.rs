@@ -19,9 +19,10 @@ pub struct Limit<'a> {
     pub parameter: &'a str,
     pub size: usize,
     pub most: usize,
-    /// True if each element has event indicators of its own.
+    /// True if each element of the arrays has event indicators of its own.
     pub has_indicators: bool,
-    /// The arrays that the parameter sizes, each with the position of this dimension among its indices.
+    /// The arrays whose size the parameter determines, each with the position of this dimension
+    /// among its indices.
     pub arrays: &'a [(&'a str, usize)],
 }
 

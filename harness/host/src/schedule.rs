@@ -106,7 +106,8 @@ impl History {
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
-    /// Returns value and slope at `t` (s), if `begun` rows have begun.
+    /// Returns the value of the input and its slope, per s, at `t`, s, if `begun` rows of the
+    /// history begin at `t` or before.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);

@@ -7,8 +7,8 @@ use cpp_demangle::{DemangleOptions, Symbol};
 
 const LONGEST: usize = 60;
 
-/// The first characters of a name. Writing to it fails when it is full, because short symbols of C++ may stand for
-/// extremely long names.
+/// A text that keeps only the first characters of a symbol's name. Writing to it fails when it is
+/// full, because short symbols of C++ may stand for extremely long names.
 #[derive(Default)]
 struct Short(String);
 

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use roxmltree::{Document, Error, Node};
 
 pub const DEEPEST: usize = 256;
-/// Largest file, bytes. This and the next two limits allow a hundred thousand variables, whose description
-/// has 27 MB and takes 0.6 GB of memory.
+/// Size of the largest XML file that is read, bytes. This and the next two limits allow a hundred
+/// thousand variables, whose description has 27 MB and takes 0.6 GB of memory.
 pub const LONGEST: usize = 32 << 20;
 pub const MOST: usize = 400_000;
 pub const MOST_ATTRIBUTES: usize = 1_000_000;
@@ -15,7 +15,8 @@ pub const MOST_OF_ONE: usize = 200;
 pub const LONGEST_NAME: usize = 1000;
 /// Longest value of an attribute, bytes. The longest values in FMI are lists of dependencies.
 pub const LONGEST_VALUE: usize = 1 << 20;
-/// Largest number of declared namespaces, because the time of a look-up grows with it.
+/// Largest number of XML namespaces that a file may declare. The time to look up a name grows with
+/// it.
 pub const MOST_NAMESPACES: usize = 100;
 
 /// Reason for refusing a file. All texts except `TooLarge` begin with `line 1, column 1: `.
@@ -243,7 +244,8 @@ struct Lines<'t> {
 }
 
 impl Lines<'_> {
-    /// Returns the line of a byte, which must not be before the byte of the last call.
+    /// Returns the number of the line in which the byte `byte` of the text is. `byte` must not be
+    /// smaller than in the last call.
     fn line_at(&mut self, byte: usize) -> u64 {
         let passed = &self.text.as_bytes()[self.at..byte.max(self.at)];
         self.line += passed.iter().filter(|b| **b == b'\n').count() as u64;

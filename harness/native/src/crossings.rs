@@ -20,9 +20,11 @@ use crate::schedule::bytes;
 /// Loop gain above which no phase crossing is searched, because such a gain occurs only next to a pole on the imaginary
 /// axis, for example an integrator at 0.
 const INTEGRATOR: f64 = 1e8;
-/// Loop gain below which no phase crossing is searched, because the gain is rounding error.
+/// Loop gain below which no phase crossing is searched, because a value this small consists of
+/// rounding errors.
 const NOTHING: f64 = 1e-12;
-/// Allowance for the error of ln L, because poles and zeros are computed eigenvalues and have rounding errors of their own.
+/// Allowance in ln L for the errors of the poles and zeros, which are computed eigenvalues with
+/// rounding errors of their own.
 const SLACK: f64 = 1e-3;
 /// Number of frequencies, evenly spaced on a logarithmic scale, with which every search begins.
 const GRID: usize = 40;
@@ -62,8 +64,8 @@ impl Model {
         model
     }
 
-    /// Changes the states from number `k` on by a Householder reflection that maps the vector `v` of these states to a multiple
-    /// of their first unit vector.
+    /// Changes the basis of the states from number `k` on by a Householder reflection, which maps
+    /// the vector `v` of these states to a multiple of their first unit vector.
     fn reflect(&mut self, k: usize, mut v: Vec<f64>) {
         let n = self.states;
         let size = v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -287,7 +289,7 @@ impl Root {
 /// A zero of the loop gain together with the nearest pole that has no partner yet. If the two are close, they nearly cancel in ln
 /// L, and the bound of the curvature is much smaller than the bound for two separate roots.
 struct Pair {
-    /// Number of roots in this entry: 2 for a zero with its pole, 1 for a root without a partner.
+    /// Number of roots in the pair: 2 for a zero with its pole, 1 for a root without a partner.
     roots: usize,
     /// Half the distance between zero and pole, and the factor of the joint bound of the curvature, which is divided by the cube
     /// of the distance from them.
@@ -297,7 +299,8 @@ struct Pair {
 
 /// A rational function, given by its poles, its zeros and a constant factor.
 struct Shape {
-    /// Poles and zeros in the order of `pairs`: first both roots of each pair, then the roots without a partner.
+    /// Poles and zeros of the function in the order of `pairs`: first both roots of each pair, then
+    /// the roots without a partner.
     roots: Vec<Root>,
     pairs: Vec<Pair>,
     /// Constant factor of the function: logarithm of its magnitude, and its phase, rad.
@@ -434,7 +437,8 @@ impl Shape {
         }
     }
 
-    /// Returns the logarithm of |L|² at `w` without the constant factor, which does not change where minima are.
+    /// Returns ln |L|² at the frequency `w`, rad/s, without the constant factor of L, which does
+    /// not change the frequencies of minima.
     fn size(&self, w: f64) -> f64 {
         let s = point(w, self.period);
         let (mut above, mut below) = (Product::new(), Product::new());
@@ -510,9 +514,9 @@ impl Shape {
 #[derive(Clone, Copy, PartialEq)]
 enum Look {
     None,
-    /// At most one crossing.
+    /// The interval contains at most one crossing.
     Once,
-    /// Possibly several crossings, so that the interval must be halved.
+    /// The interval may contain several crossings, so that it must be halved.
     Divide,
 }
 
@@ -562,8 +566,9 @@ impl Kind {
     }
 }
 
-/// Returns the argument between `a` and `b`, to rounding, at which a function with different signs at `a` and `b` is 0. The
-/// method is inverse quadratic interpolation where that converges, otherwise bisection (Chandrupatla 1997).
+/// Returns the argument between `a` and `b`, to rounding, at which the function `of` is 0; it must
+/// have different signs at `a` and `b`. The method is inverse quadratic interpolation where that
+/// converges, otherwise bisection (Chandrupatla 1997).
 fn between(
     mut of: impl FnMut(f64) -> f64,
     (mut b, mut f_b): (f64, f64),

@@ -295,7 +295,8 @@ fn wheels(
     rows: usize,
     commands: usize,
 ) -> PyResult<Option<Wheels>> {
-    /// Column of the torque, axis, inertia, largest torque, largest speed and speed.
+    /// Wheel as Python gives it: column of its torque among the commands, axis in body axes, moment
+    /// of inertia, kg·m², largest torque, N·m, largest speed and present speed, rad/s.
     type Given = (usize, [f64; 3], f64, f64, f64, f64);
     let given: Vec<Given> = feedback.getattr("wheels")?.extract()?;
     if given.is_empty() {

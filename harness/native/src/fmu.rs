@@ -80,7 +80,8 @@ pub struct Variable {
     start: Option<String>,
     /// Unit of the values in the FMU's interface; empty if the variable has none.
     unit: String,
-    /// Display units, each with its name, factor and offset.
+    /// Display units of the variable, each with its name, factor and offset: displayed value =
+    /// factor · value + offset.
     shown: Vec<(String, f64, f64)>,
     /// Definition of the unit by SI base units (exponents, factor, offset), if the FMU has one.
     base: Option<Base>,

@@ -14,7 +14,8 @@ use crate::numbers::{Failure, Numbers};
 /// Largest number of rows that are simulated before the run returns briefly to Python, which exchanges rows with the numpy arrays
 /// and notices Ctrl-C.
 const ROWS: usize = 1024;
-/// Longest time before the run returns briefly to Python, unless a single step takes longer.
+/// Longest time that a run computes before it returns briefly to Python, unless a single step takes
+/// longer.
 const SILENCE: Duration = Duration::from_millis(100);
 
 /// Largest number of rows in which columns that need not be read in every row are read, unless the run has less than twice as many.
@@ -107,7 +108,8 @@ pub type Stop = (usize, usize, String);
 /// A table of the Python side: the names of its columns, and the numpy array.
 pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 
-/// The Reals that change along a line within a row: value references, values at the row, and derivatives. Working memory.
+/// The Reals that change along a line from a row to the next: value references, values at the row,
+/// and derivatives. It is working memory, so that a row allocates nothing.
 #[derive(Default)]
 struct Lines {
     references: Vec<u32>,
@@ -117,8 +119,9 @@ struct Lines {
 
 pub struct Run<'fmu> {
     time: Vec<f64>,
-    /// Rows whose outputs are read, if not all are; the others repeat the outputs of the row before. Reading can make the FMU
-    /// compute all its outputs.
+    /// For each row true if its outputs are read; `None` if all are. A row that is not read repeats
+    /// the outputs of the row before. Reading is left out where possible, because it can make the
+    /// FMU compute all its outputs.
     wanted: Option<Vec<bool>>,
     inputs: (Columns<'fmu>, Numbers),
     slopes: Option<Numbers>,

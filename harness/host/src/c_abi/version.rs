@@ -120,8 +120,8 @@ pub trait Version: Sized {
     type Boolean: Copy + Default + PartialEq + From<bool>;
     type Kept;
 
-    /// Returns the names of the functions that a binary must export. `steps`: the FMU has Co-Simulation;
-    /// `exchanges`: it has Model Exchange.
+    /// Returns the names of the functions that a binary must export. `steps` is true if the FMU has
+    /// Co-Simulation, `exchanges` if it has Model Exchange.
     fn required_functions(steps: bool, exchanges: bool) -> Vec<&'static str>;
 
     /// Finds the version's functions in a library.
@@ -428,7 +428,8 @@ impl<V: Version> Fmu<V> {
         unsafe { copy_text((self.common.get_version.call)()) }
     }
 
-    /// Returns true if these Reals can be exchanged in one call, because all are scalars of type Float64.
+    /// Returns true if the Reals with these value references can be exchanged in one call, because
+    /// all are scalars of type Float64.
     fn is_plain(&self, references: &[u32]) -> bool {
         self.is_plain || references.iter().all(|r| self.plain.binary_search(r).is_ok())
     }
@@ -484,8 +485,8 @@ impl<V: Version> Fmu<V> {
     }
 }
 
-/// Returns whether all Reals are scalars of type Float64, and the value references of those that are,
-/// ascending.
+/// Returns true if all Reals are scalars of type Float64, and the value references of those Reals
+/// that are, in ascending order.
 fn scalar_reals(description: &ModelDescription) -> (bool, Vec<u32>) {
     let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
     let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
@@ -517,8 +518,8 @@ pub struct Instance<'fmu, V: Version> {
     pub(crate) kept: V::Kept,
     warned: Cell<Option<&'static str>>,
     pub(crate) calls: Calls,
-    /// Values of arrays, by value reference, if single elements of the array were set before the whole array could be
-    /// read.
+    /// Values of arrays, by value reference, of which single elements were set before the whole
+    /// array could be read from the FMU.
     arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
     one_thread: PhantomData<*mut ()>,
 }

@@ -10,7 +10,8 @@ const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 struct Guarded {
     words: Vec<u64>,
     bytes: usize,
-    /// Content of the array before the call, if the FMU may only read the array; otherwise `None`.
+    /// Content of the array before the call, if the FMU may only read the array; `None` for an
+    /// array into which it may write.
     input: Option<Vec<u8>>,
 }
 

@@ -197,7 +197,7 @@ impl Process {
         (Process { end: Mutex::new(end), nonce }, std::array::from_fn(number))
     }
 
-    /// Sends a message. It is lost if the parent has ended.
+    /// Sends a message to the parent process. It is lost if the parent has ended.
     pub fn send(&self, kind: u8, content: &[u8]) {
         let length = (content.len() as u32).to_le_bytes();
         let message = [&self.nonce, &[kind][..], &length, content].concat();
