@@ -25,7 +25,8 @@ pub struct Entry {
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
-    /// Bytes of the file if [`is_read`] is true for its name, otherwise empty.
+    /// Bytes of the file, if rules need its content ([`is_read`] is true for its name); otherwise
+    /// empty.
     content: Vec<u8>,
     fault: Option<String>,
 }
@@ -44,9 +45,9 @@ fn is_read(name: &str) -> bool {
 const INDEX: &str = "documentation/index.html";
 
 impl Archive {
-    /// Reads the archive and unpacks into a temporary folder what hosts would find there. Links and names
-    /// that lead out of the folder are left out, because other rules report them. A damaged entry is noted in
-    /// `fault`, so that all the other entries are still checked.
+    /// Reads the archive of an FMU and unpacks into a temporary folder what a host would find
+    /// there. Links and names that lead out of the folder are left out, because other rules report
+    /// them. A damaged entry is noted in `fault`, so that all the other entries are still checked.
     pub fn read(path: &Path) -> Result<Archive> {
         let from = host::archive::Archive::open(path)?;
         let directory = temporary::Folder::new()?;
@@ -103,8 +104,8 @@ impl Archive {
         }
     }
 
-    /// Returns the content of a file that rules read, or `None` if it does not exist or could not be
-    /// unpacked.
+    /// Returns the content of a file of the archive that rules read, or `None` if the file does not
+    /// exist or could not be unpacked.
     pub fn file(&self, name: &str) -> Option<&[u8]> {
         let entry = self.entries.iter().find(|entry| entry.name == name && is_read(name))?;
         entry.fault.is_none().then_some(entry.content.as_slice())

@@ -72,10 +72,11 @@ struct Placed {
 
 pub struct Binaries {
     placed: Vec<Placed>,
-    /// Number of binaries with the model's name in folders whose names vendors have invented.
+    /// Number of binaries with the model's name that are in folders for platforms which the
+    /// standard does not define.
     of_vendors: usize,
-    /// Files in folders of FMI 2.0 that no host finds because of their name, each with the names that hosts
-    /// look for.
+    /// Files that no host finds because of their name, in the folders that FMI 2.0 defines for
+    /// binaries, each with the names that hosts look for.
     elsewhere: Vec<(String, String)>,
     declared: Vec<Declared>,
     has_sources: bool,
@@ -83,7 +84,8 @@ pub struct Binaries {
     own_folder: &'static str,
 }
 
-/// Returns an interface with the functions that it needs; `None` if it has no modelIdentifier.
+/// Returns the interface that an element such as CoSimulation declares, with the functions that it
+/// needs; `None` if the element has no modelIdentifier.
 fn declare(element: &Element, is_fmi3: bool) -> Option<Declared> {
     let identifier = element.get("modelIdentifier")?.to_string();
     let wanted = match &*element.name {
@@ -180,7 +182,8 @@ impl Binaries {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }
 
-    /// Calls `look` for each binary that could be parsed. The rule is skipped if there is none.
+    /// Calls `look` for each binary that this check can parse. The rule is skipped if there is
+    /// none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
         if self.readable().next().is_none() {
             findings.skip("the FMU has no binary that can be parsed");

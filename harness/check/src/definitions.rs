@@ -83,7 +83,8 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
         ("canSerializeFMUState", "canGetAndSetFMUState"),
         ("canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"),
     ];
-    /// Properties of a binary, and so of all interfaces that it serves.
+    /// Attributes of an interface that describe the binary. Interfaces that use one binary must
+    /// therefore have the same values.
     const SHARED: [&str; 3] = [
         "needsExecutionTool",
         "canBeInstantiatedOnlyOncePerProcess",

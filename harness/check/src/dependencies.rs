@@ -24,9 +24,10 @@ const AT_LEAST: u64 = 40;
 /// Largest number of attempts to reach these initial points. More attempts than points are needed, because
 /// the FMU may refuse parameters drawn at random.
 const TRIES: u64 = 16 * STARTS;
-/// Probability with which a start value is divided by 100.
+/// Probability with which a random start value is divided by 100, because some dependencies show
+/// only at small values.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// Relative change below which a difference is rounding and not a dependency.
+/// Relative change of a value below which the change is a rounding error and no dependency.
 const ROUNDING: f64 = 1e-9;
 
 /// Returns an instance whose parameters, inputs and start values are drawn at random with the seed `attempt`.
@@ -137,8 +138,8 @@ impl Seen {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }
 
-    /// Reports the observed dependencies that the description does not declare. A state's dependency on
-    /// itself is left out.
+    /// Reports the dependencies that were observed but that the description does not declare. A
+    /// state's dependency on itself is left out.
     fn report(&self, fmu: &FmuUnderTest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
         for unknown in lists {
             let (Some(key), Some(declared)) = (unknown.key, &unknown.dependencies) else {
@@ -263,8 +264,8 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
     Ok(seen)
 }
 
-/// Returns another allowed value for `v`, about `share` of its magnitude away, or `None` if its bounds leave
-/// no room.
+/// Returns another value that `v` may have, which differs from `now` by about `share` of its
+/// magnitude; `None` if the bounds of `v` leave no room.
 pub fn displaced(fmu: &FmuUnderTest, v: &Variable, now: &Value, share: f64) -> Option<Value> {
     let Value::Real(x) = now else { return super::values::other_value(fmu, v, now) };
     let (min, max) = v.bounds();

@@ -13,7 +13,7 @@ use host::xml::{Element, Fault};
 pub struct Words {
     pub version: &'static str,
     pub token: &'static str,
-    /// Types that may be continuous.
+    /// Names of the types whose variables may be continuous.
     pub reals: &'static str,
     pub outputs: &'static str,
     pub derivatives: &'static str,
@@ -101,7 +101,8 @@ pub struct Variable {
     pub(crate) written: Element,
 }
 
-/// An entry of ModelStructure; `list` is the list that it belongs to, for example Outputs (FMI 3.0: Output).
+/// An entry of ModelStructure; `list` is the name of the list that contains it, for example Outputs
+/// (FMI 3.0: Output).
 #[derive(Clone, Debug)]
 pub struct Unknown {
     pub list: String,
@@ -258,8 +259,8 @@ impl Description {
         self.unknowns(self.words.outputs).chain(self.unknowns(self.words.derivatives))
     }
 
-    /// Returns true if derivatives need not be listed, because the FMU 2.0 is only for Co-Simulation, and are
-    /// not.
+    /// Returns true if the FMU lists no derivatives and need not, because it is an FMU 2.0 for
+    /// Co-Simulation only.
     pub fn hides_states(&self) -> bool {
         !self.is_fmi3()
             && self.interface("ModelExchange").is_none()

@@ -21,7 +21,7 @@ use super::under_test::{FmuUnderTest, Interface, Observed, STEPS, Session, skip}
 const STARTS: u64 = 12;
 /// Relative change of a value below which it is rounding.
 const ROUNDING: f64 = 1e-9;
-/// A time event nearer than this fraction of the step counts as due.
+/// Time to the next time event, as a fraction of the step, below which the event counts as due.
 const NEARLY_DUE: f64 = 1e-6;
 
 pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

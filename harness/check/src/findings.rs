@@ -48,7 +48,8 @@ impl Findings {
         Findings { severity, ..Findings::default() }
     }
 
-    /// Begins a finding at `place`; the methods of the returned value add its text.
+    /// Begins a finding about the element, file or call `place`; the methods of the returned value
+    /// add its text.
     pub fn at(&mut self, place: impl Into<String>) -> At<'_> {
         At { findings: self, place: place.into() }
     }

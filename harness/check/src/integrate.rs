@@ -34,7 +34,7 @@ const EXPLICIT_STEPS: usize = 40;
 const MOST_STEPS: usize = 100;
 /// Largest number of states for which a Jacobian is computed by finite differences.
 const MOST_STATES: usize = 200;
-/// The first integrator step is the communication step divided by this number.
+/// Ratio of the communication step to the first step of the integrator.
 const PARTS: f64 = 8.0;
 /// Accuracy with which an event indicator's zero crossing is located, as a fraction of the communication
 /// step.
@@ -43,13 +43,13 @@ const LOCATED: f64 = 1e-3;
 const SHORTEST: f64 = 1e-12;
 
 enum Trial {
-    /// The new states, and the estimated error divided by the allowed error.
+    /// The step is done: the new states, and the estimated error divided by the allowed error.
     Done(DVector<f64>, f64),
     /// The FMU could not be evaluated at a stage (fmi2Discard, or values that are NaN or infinite).
     Impossible(Impossible),
 }
 
-/// Reason why a step cannot be made as long as it was tried.
+/// Reason why the integrator cannot make a step of the length that it tried.
 #[derive(Debug, thiserror::Error)]
 enum Impossible {
     #[error("the integrator's linearised system of equations is singular")]

@@ -16,7 +16,8 @@ use super::under_test::{FmuUnderTest, Interface, Session};
 use host::description::Value;
 
 const STARTS: u64 = 12;
-/// Allowed relative difference of two measured factors.
+/// Allowed relative difference between two measurements of the factor between a known and an
+/// unknown.
 const AGREE: f64 = 1e-4;
 
 struct Pair<'d> {

@@ -75,8 +75,8 @@ pub fn rules() -> Vec<Statement> {
     second.chain(fmi3::RULES.iter().map(|rule| Statement { fmi: "3.0", rule })).collect()
 }
 
-/// Rules that explain why a file cannot be opened as an FMU. If the file cannot be opened, those that are
-/// broken are reported even if they were not selected.
+/// Rules that explain why a file cannot be opened as an FMU. If it cannot be opened, findings of
+/// these rules are reported even if the user has not selected the rules.
 const OPENING: [&str; 10] = [
     "zip.readable",
     "zip.methods",
@@ -228,8 +228,8 @@ fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
     })
 }
 
-/// The beginning of a call's description, and the rule that owns this call. If the call fails, only its owner
-/// reports the fault, and the other rules that need the call are skipped.
+/// Pairs of the first words in a call's description and the rule that owns this call. If the call
+/// fails, only its owner reports the fault, and the other rules that need the call are skipped.
 const OWNERS: [(&str, &str); 6] = [
     ("fmi2Instantiate", "load.instance"),
     ("fmi2SetupExperiment", "load.initialises"),

@@ -12,13 +12,14 @@ use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, skip};
 
 const MOST: usize = 500;
-/// Time limit for the first window; the other windows have the same number of calls.
+/// Time limit for the first window of calls; the other windows have the same number of calls.
 const LONGEST: Duration = Duration::from_millis(500);
-/// Smallest number of calls in a window from which a leak can be concluded.
+/// Smallest number of calls in a window from which a memory leak can be concluded.
 const FEWEST: usize = 10;
 /// Number of windows after the first one, each of which must need more memory.
 const WINDOWS: usize = 3;
-/// Growth that is a finding, bytes per step. Less is allowed, because an FMU may store a short history.
+/// Growth of the memory, bytes per step, that is a finding. Less is allowed, because an FMU may
+/// store a short history.
 const PER_STEP: u64 = 1024;
 
 fn writable_memory() -> Option<u64> {

@@ -16,8 +16,9 @@ const DEVICES: [&str; 6] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"];
 const LONGEST_PART: usize = 255;
 /// Largest length of a path on Windows, characters: MAX_PATH is 260 with the terminating zero.
 const LONGEST_PATH: usize = 259;
-/// Largest length of a path inside an FMU, characters: the rest of MAX_PATH after a temporary folder such as
-/// `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder named after the instance.
+/// Largest length of a path inside an FMU, characters, with which unpacking succeeds on Windows:
+/// MAX_PATH minus a temporary folder such as `C:\Users\a.long.user.name\AppData\Local\Temp\` and a
+/// folder named after the instance.
 const PORTABLE_PATH: usize = 160;
 
 fn windows_faults(part: &str) -> Vec<String> {
@@ -41,7 +42,7 @@ fn windows_faults(part: &str) -> Vec<String> {
     faults
 }
 
-/// Splits a name at its slashes, without the empty last part of a folder.
+/// Splits the name of an archive entry at its slashes, without the empty last part of a folder.
 fn parts(name: &str) -> impl Iterator<Item = &str> {
     name.split(['/', '\\']).filter(|part| !part.is_empty())
 }
@@ -113,7 +114,8 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// Names in the standard. Hosts on Linux find them only with exactly these capitals.
+/// Names of folders and files that the standard defines. Hosts on Linux find them only with exactly
+/// these capitals.
 const STANDARD_FOLDERS: [&str; 6] =
     ["binaries", "documentation", "resources", "sources", "extra", "terminalsAndIcons"];
 const STANDARD_FILES: [&str; 3] = ["modelDescription.xml", "model.png", "documentation/index.html"];

@@ -20,10 +20,10 @@ use super::trace::{self, Answer, Crash};
 use super::under_test::{Tested, UnderTest, Unusable};
 
 pub const SUBCOMMAND: &str = "check-calls";
-/// Number of rules with endless calls after which no further rules of calls are run.
+/// Number of rules in which a call did not return, after which no further rules of calls are run.
 const HANGS: usize = 2;
-/// Time limit of a single call: at least this long if the rule's limit allows it, and otherwise this part of
-/// the rule's limit, so that [`HANGS`] endless calls take at most about 10 s.
+/// Time limit of a single call of the FMU. A shorter limit applies if the rule's own limit is
+/// short, so that [`HANGS`] endless calls take at most about 10 s.
 const CALL: Duration = Duration::from_secs(4);
 const PART: f64 = 15.0;
 /// Largest file that an FMU may write, bytes. It is small because several rules run at the same time.

@@ -12,8 +12,8 @@ use super::under_test::{FmuUnderTest, STEPS, Session, skip, start_value};
 use super::values::{contains_name, items};
 use host::description::{Type, Value};
 
-/// Tolerance of min and max, relative to the bound or the nominal value, because an integrator may leave a
-/// state slightly outside its range.
+/// Largest amount by which a value may exceed min or max without a finding, relative to the bound
+/// or the nominal value. An integrator may leave a state slightly outside its range.
 const OVERSHOOT: f64 = 1e-3;
 
 pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -54,8 +54,8 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Sets `v` before initialisation and initialises. The inner error is the reason why the FMU refused the
-/// value.
+/// Sets the start value of `v`, and initialises the FMU. The inner error is the reason why the FMU
+/// refused the value.
 fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Value) -> Result<Result<()>> {
     let mut session = fmu.session(fmu.first_interface()?)?;
     fmu.announce(format!("setting {} to {value} and initialising", v.name));

@@ -42,7 +42,7 @@ impl Doctype {
         Some(Doctype { line, text: rest[..end.unwrap_or(rest.len())].to_string() })
     }
 
-    /// Describes what this declaration makes an XML parser do, as part of a sentence.
+    /// Describes what a DOCTYPE such as this one makes an XML parser do, as part of a sentence.
     pub fn danger(&self) -> &'static str {
         if self.text.contains("SYSTEM") || self.text.contains("PUBLIC") {
             "it makes a parser open another file or address"

@@ -37,11 +37,13 @@ pub type Attributes = &'static [(&'static str, Written)];
 
 pub enum Children {
     Any,
-    /// Each of these elements at most once, in this order; those marked with `!` are required.
+    /// Each of these child elements at most once, in this order; those marked with `!` are
+    /// required.
     Sequence(&'static [&'static str]),
     Ordered(&'static [&'static str]),
     Many(&'static [&'static str]),
-    /// Exactly one of the first elements, then any of the second.
+    /// Exactly one of the first list of child elements, then any number of those in the second
+    /// list.
     Choice(&'static [&'static str], &'static [&'static str]),
 }
 

@@ -28,8 +28,8 @@ pub fn continue_from<V: Tested>(session: &mut Session<V>, from: &Mark) -> Result
     session.readings()
 }
 
-/// Returns an error if a repeated run from a saved state differs within one instance. `states.rollback`
-/// reports this.
+/// Returns an error if two runs of one instance from the same saved state differ. `states.rollback`
+/// reports this fault.
 fn rolls_back<V: Tested>(fmu: &UnderTest<V>, using: Use) -> Result<()> {
     let mut session = fmu.running(using)?;
     session.advance(3)?;

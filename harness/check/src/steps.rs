@@ -184,8 +184,8 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Allowed multiple of the tolerance, because the errors of many steps add up and the tolerance is for
-    /// one step.
+    /// Allowed difference of two runs over the tolerance of the FMU's solver, because the tolerance
+    /// is for one step and the errors of many steps add up.
     const SLACK: f64 = 1e3;
     after_three_steps(fmu)?;
     fmu.require(Interface::CoSimulation, STEP_SIZES)?;
@@ -234,7 +234,8 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Relative change of a value with the step size above which the change is more than rounding.
+    /// Relative change of a value with the step size above which the value depends on the step size
+    /// and the change is not rounding.
     const SEEN: f64 = 1e-6;
     /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
@@ -337,7 +338,8 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Change of the input within a step, relative to its magnitude.
+    /// Change of an input within a step, relative to its magnitude, by which the rule tests whether
+    /// the FMU uses the input's slope.
     const SHARE: f64 = 0.3;
     /// If the difference between a held input and one with a slope is below this fraction of the held input's
     /// effect, the FMU ignores the slope.
@@ -469,7 +471,8 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
 const STEP_SIZES: &str = "canHandleVariableCommunicationStepSize";
 
 pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Step sizes that are tried instead of the usual one, s.
+    /// Step sizes, s, with which the rule simulates to see whether the FMU also works with steps
+    /// much shorter than usual.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
     const MOST: f64 = 5000.0;
     let usual = after_three_steps(fmu)?.step;

@@ -13,8 +13,9 @@ fn place(d: &Description, u: &Unknown) -> String {
     format!("line {}, {}, {}", u.line, u.list, d.name_of(u.key))
 }
 
-/// Reports entries of `list` that are repeated or not `allowed`, and variables that are `needed` there but
-/// missing; `why` describes the allowed entries.
+/// Compares the entries of one `list` of ModelStructure with the variables that must be in it.
+/// Reports entries that are repeated or not `allowed`, and `needed` variables that are missing;
+/// `why` describes the allowed entries.
 fn compare(
     d: &Description,
     findings: &mut Findings,

@@ -17,7 +17,7 @@ pub enum Crash {
 
 #[derive(Serialize, Deserialize)]
 pub(super) enum Answer {
-    /// The next call, and the meaning of a crash in it.
+    /// The next call, and what a crash in it would mean.
     Doing(String, Crash),
     Done(Findings),
 }

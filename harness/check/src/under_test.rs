@@ -31,12 +31,12 @@ pub const STEPS: usize = 20;
 /// Time limit for a call whose effect the standard leaves open, because it may never return.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Error that makes a rule impossible to check: `rule` reports the reason, and all others that meet it are
-/// skipped.
+/// Error that makes a rule impossible to check. The rule named `rule` reports the reason, and all
+/// other rules that meet this error are skipped.
 #[derive(Debug, thiserror::Error)]
 #[error("{why}")]
 pub struct Unusable {
-    /// The rule that reports the reason; empty if there is no fault of the FMU.
+    /// Identifier of the rule that reports the reason; empty if the FMU has no fault.
     pub rule: &'static str,
     pub why: String,
 }
@@ -82,12 +82,14 @@ pub struct Experiment {
 }
 
 pub trait Tested: Version + 'static {
-    /// The rule that reports steps of Model Exchange that fail.
+    /// Identifier of the rule that reports failing steps of Model Exchange.
     const EXCHANGE_RUNS: &'static str;
     const FMI: &'static str;
-    /// Word for a saved state in the names of functions and capabilities.
+    /// Word for a saved state in the names of functions and capabilities, which differs between
+    /// versions of FMI.
     const STATE: &'static str;
-    /// The rule that reports an FMU which ends the simulation when it is initialised, if there is one.
+    /// Identifier of the rule that reports an FMU which ends the simulation when it is initialised,
+    /// if there is one.
     const TERMINATION: Option<&'static str>;
     /// Description of the call that reads a Real with a value reference that no variable has.
     const UNKNOWN_READ: &'static str;
@@ -96,11 +98,12 @@ pub trait Tested: Version + 'static {
     /// Smallest number of steps of Model Exchange in the suggested experiment, after which a model may do
     /// anything; 0 for any step.
     const EXCHANGE_STEPS: f64;
-    /// Smallest number of suggested steps in the suggested experiment for which the suggestion is followed.
+    /// Smallest number of steps, in the suggested experiment, with the suggested step size for
+    /// which the check uses this step size.
     const SUGGESTED_STEPS: f64;
     type Notes;
 
-    /// Returns true if the rules call this interface, which `binary` has.
+    /// Returns true if the rules call the functions of this interface in `binary`.
     fn is_called(description: &Description, interface: Interface, binary: &Fmu<Self>) -> bool;
 
     fn uses(fmu: &UnderTest<Self>) -> Vec<Use>;
@@ -118,7 +121,8 @@ pub trait Tested: Version + 'static {
 
     fn make_usual_step(session: &mut Session<Self>) -> Result<()>;
 
-    /// Returns the magnitudes of the states by which the integrator measures errors.
+    /// Returns the magnitudes of the states, to which the allowed errors of the integrator are
+    /// relative.
     fn magnitudes(session: &mut Session<Self>) -> Called<Vec<f64>>;
 
     /// Accepts a step of the integrator and handles the events that follow. `crossed` says that an event
@@ -318,8 +322,8 @@ impl<V: Tested> UnderTest<V> {
         answer
     }
 
-    /// Records that the check has chosen parameter values, for which the model may have no solution. A crash
-    /// or hang then ends the rule without a finding.
+    /// Records that the check itself has chosen the parameter values, for which the model may have
+    /// no solution. A crash or a call that does not return then ends the rule without a finding.
     pub fn chose_values(&self) {
         *self.crash.borrow_mut() = Crash::ReportedBy(String::new());
     }
@@ -475,7 +479,8 @@ pub struct Session<'f, V: Tested = Fmi2> {
     pub notes: V::Notes,
 }
 
-/// State of the host that a saved FMU state does not contain.
+/// The host's own quantities, such as the time, at the instant at which an FMU state was saved,
+/// because a saved FMU state does not contain them.
 #[derive(Clone, Copy, Debug)]
 pub struct Mark {
     time: f64,
@@ -579,8 +584,8 @@ impl<V: Tested> Session<'_, V> {
         self.fmu.readable().map(|v| self.read(v)).collect()
     }
 
-    /// Describes the first variable whose value differs in at least one bit, or returns `None` if all are
-    /// equal.
+    /// Describes the first variable whose value in `ours` differs from the value in `theirs` in at
+    /// least one bit, or returns `None` if all are equal.
     pub fn difference(&self, ours: &Readings, theirs: &Readings) -> Option<String> {
         let all = self.fmu.readable().zip(ours.iter().zip(theirs));
         let mut different = all.filter_map(|(v, (a, b))| {
@@ -595,8 +600,8 @@ impl<V: Tested> Session<'_, V> {
         Some(format!("{name} is {a}, not {b}{more}"))
     }
 
-    /// Reads a value reference that no variable has, and returns the FMU's refusal with its messages. If this
-    /// crashes, `values.unknown` reports it.
+    /// Reads the value of a value reference that no variable has, and returns the FMU's refusal
+    /// with its messages. If this call crashes, `values.unknown` reports it.
     pub fn refused(&mut self) -> Option<CallError> {
         self.fmu.with_crash_reported_by("values.unknown", || {
             self.fmu.announce(V::UNKNOWN_READ);

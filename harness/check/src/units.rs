@@ -42,7 +42,7 @@ impl Unit {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
 
-    /// Returns true if this unit has the radians of the other unit or leaves them out.
+    /// Returns true if this unit has the same power of radians as the other unit, or no radians.
     fn has_radians_of(&self, other: &Unit) -> bool {
         [0, other.exponents[RADIAN]].contains(&self.exponents[RADIAN])
     }
@@ -156,7 +156,8 @@ fn symbol(text: &str) -> Vec<Unit> {
     all
 }
 
-/// Lists the units for which a name can stand; the list is empty if the name cannot be parsed.
+/// Lists the units for which the name of a unit can stand; the list is empty if the name cannot be
+/// parsed.
 fn read(name: &str) -> Vec<Unit> {
     let mut rest = name.trim();
     match quotient(&mut rest) {
@@ -231,7 +232,8 @@ fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {
     }
 }
 
-/// Returns true if two factors agree in three digits, the accuracy with which authors usually write conversion factors.
+/// Returns true if two conversion factors agree in three digits, the accuracy with which authors
+/// usually write them.
 fn is_equal(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-3 * a.abs().max(b.abs())
 }

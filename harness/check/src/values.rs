@@ -224,8 +224,8 @@ pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 type Call = (&'static str, fn(&mut Instance, u32) -> Called);
 
-/// Adds a finding unless the FMU refuses the call. Each call uses its own instance, because after an error
-/// some FMUs refuse every call.
+/// Adds a finding unless the FMU refuses the call `what`. Each such call is made with an instance
+/// of its own, because after an error some FMUs refuse every call.
 fn refused(
     fmu: &FmuUnderTest,
     findings: &mut Findings,

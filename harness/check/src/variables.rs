@@ -133,7 +133,7 @@ fn indexed(name: &str) -> Option<(&str, Vec<u32>)> {
     Some((array, indices?))
 }
 
-/// Returns true if `indices` has every index of an array exactly once.
+/// Returns true if `indices` contains every index of an array exactly once.
 fn is_whole(indices: &[Vec<u32>]) -> bool {
     let dimensions = indices[0].len();
     if indices.iter().any(|index| index.len() != dimensions || index.contains(&0)) {

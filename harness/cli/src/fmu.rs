@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use pack::Fmi;
 
-/// Folders of the project's FMUs relative to the command's own: next to it, in its data folder, in the Python
-/// package that it came with.
+/// Folders in which the project's FMUs may be, relative to the folder of the command: the same
+/// folder, the command's data folder, and the Python package in which the command was installed.
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 

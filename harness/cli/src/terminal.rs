@@ -165,7 +165,8 @@ pub fn stdout() -> Box<dyn Write> {
     }
 }
 
-/// Prints a text to stderr; in a guarded process to the stderr that the FMU cannot write to.
+/// Prints a text to stderr. In a guarded process it is printed to the original stderr, which the
+/// FMU cannot reach.
 fn complain(text: String) {
     // A closed stderr means that nobody wants to read the messages.
     let _ = match guard::streams() {

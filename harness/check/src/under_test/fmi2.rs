@@ -20,9 +20,9 @@ const ITERATIONS: usize = 100;
 /// Largest number of immediately successive events. An FMU that always requests the next event at once breaks
 /// a rule.
 const IMMEDIATE: usize = 3;
-/// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
+/// Number of events that are examined of those that only fmi2CompletedIntegratorStep requests.
 const ASKED: usize = 20;
-/// Relative change of a state at an event below which it is rounding.
+/// Relative change of a state at an event below which the change is rounding.
 const JUMP: f64 = 1e-9;
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
@@ -347,7 +347,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Advances like [`Session::advance`], but with constant inputs.
+    /// Advances the simulation like [`Session::advance`], but with constant inputs.
     pub fn coast(&mut self, steps: usize) -> Result<()> {
         self.steps(steps, |_| Ok(()))
     }

@@ -11,7 +11,8 @@ use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
 
-/// Lists what is wrong in the results of one fmi3DoStep from time `from` by `h` seconds.
+/// Lists the faults in the results that the FMU returns from one fmi3DoStep, from the time `from`
+/// by `h` seconds.
 fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     let mut faults = Vec::new();
     for (name, byte) in [
@@ -57,7 +58,8 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
     uses.filter(|u| u.interface == Interface::CoSimulation).collect()
 }
 
-/// Returns the uses in which the host handles events; skips the rule if there are none.
+/// Returns the ways to use the FMU in which the host handles events; skips the rule if there are
+/// none.
 fn uses_with_events(subject: &Subject) -> Result<Vec<Use>> {
     let mut uses = subject.uses();
     uses.retain(|u| u.event_mode || u.interface == Interface::ModelExchange);
@@ -555,7 +557,8 @@ impl Difference {
         Difference { quotient: (above - below) / (2.0 * h), rounding }
     }
 
-    /// Returns true if `derivative` agrees with the quotient within rounding, curvature and `unsure`.
+    /// Returns true if `derivative`, which the FMU computes, agrees with the finite difference
+    /// within rounding, curvature and the error `unsure`.
     fn is_near(&self, derivative: f64, unsure: f64) -> bool {
         let size = self.quotient.abs().max(derivative.abs());
         (derivative - self.quotient).abs() <= 1e-4 * size + self.rounding + unsure + 1e-9
@@ -666,9 +669,9 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if `after` differs from `before` by more than rounding. Terms that cancel in exact arithmetic
-/// may leave a few units in the last place; the known itself is changed by at least a hundredth of its
-/// magnitude.
+/// Returns true if the value `after` a change of a known differs from the value `before` it by more
+/// than rounding. Terms that cancel in exact arithmetic may leave a few units in the last place;
+/// the known itself is changed by at least a hundredth of its magnitude.
 fn follows(after: f64, before: f64) -> bool {
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let same = after.to_bits() == before.to_bits()

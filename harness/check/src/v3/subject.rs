@@ -15,7 +15,8 @@ pub type Session<'f> = Of<'f, Fmi3>;
 
 /// Number of calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Number of events in one communication step after which the simulation is abandoned.
+/// Number of events in one communication step after which the simulation is given up, because the
+/// FMU may request events for ever.
 const EVENTS: usize = 1000;
 
 /// Callback for intermediate updates within a step. It returns the time of an early return, or `None`.
@@ -50,7 +51,8 @@ impl Tested for Fmi3 {
     const SUGGESTED_STEPS: f64 = STEPS as f64;
     type Notes = Notes;
 
-    /// Clocks need event mode with clock activation, which the rules do not call.
+    /// Returns true unless the interface is Co-Simulation and the FMU has clocks. Clocks need event
+    /// mode with clock activation, which the rules do not call.
     fn is_called(description: &Description, interface: Interface, _: &Fmu) -> bool {
         interface == Interface::ModelExchange || !description.has_clocks()
     }
@@ -150,7 +152,8 @@ impl Subject {
         Ok(with)
     }
 
-    /// Instantiates the FMU with the arguments `with`; the outer error as for `make`.
+    /// Instantiates the FMU with the arguments `with`. The inner error is the FMU's refusal; the
+    /// outer error says that the rule cannot create an instance at all.
     pub fn instantiate(&self, with: &Instantiation) -> Result<Result<Instance<'_>, CallError>> {
         let binary = self.binary(with.interface)?;
         self.make(with.interface, || binary.instantiate_with(with))
@@ -213,7 +216,8 @@ impl Session<'_> {
         Err(Unusable { rule: "events.iteration", why }.into())
     }
 
-    /// Enters event mode, iterates, leaves it, and notes event indicators that are 0 afterwards.
+    /// Enters event mode, iterates until no further event is requested, leaves event mode, and
+    /// notes event indicators that are 0 afterwards.
     pub fn event(&mut self) -> Result<EventInfo> {
         self.notes.events += 1;
         self.fmu.announce(format!("event mode at {:?} s", self.time));

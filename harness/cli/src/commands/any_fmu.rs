@@ -72,7 +72,7 @@ pub struct AnyFmuArgs {
     solver: Stepped,
 }
 
-/// Solver that steps the FMU, and the tolerance of the FMU's own.
+/// A solver with which the FMU is stepped, and the relative tolerance of the FMU's own solver.
 #[derive(Clone, Copy)]
 struct Stepped {
     solver: Solver,

@@ -101,12 +101,13 @@ pub struct DesignArgs {
     any: AnyFmuArgs,
 }
 
-/// Time between two rows of the plan, s.
+/// Time between two rows of the planned torque, s.
 const STEP: f64 = 0.02;
-/// Slosh angle at which the wave at the wall, 2 α R/(ξ² − 1), reaches 0.15 R, where linear theory ends, rad.
+/// Slosh angle, rad, at which the wave at the wall, 2 α R/(ξ² − 1) with the slosh angle α, the
+/// tank's radius R and the zero ξ = 1.841 of J₁', reaches 0.15 R. Linear theory ends there.
 const LINEAR: f64 = 0.18;
-/// Number of columns in the table from which the bound is computed, for the estimate of the memory that it
-/// takes.
+/// Number of columns of the table from which the Cramér–Rao bound is computed, for an estimate of
+/// the memory that the table takes.
 const COLUMNS: usize = 20;
 
 impl DesignArgs {

@@ -1,5 +1,3 @@
-//! The commands, one file each.
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -142,7 +142,8 @@ fn stored_parameters(
         .with_context(|| format!("{}: the metadata of the file are damaged", file.display()))
 }
 
-/// Reads the columns that are variables of the FMU. Readings of sensors are not, so the picture has no place for them.
+/// Reads those columns of the run's file that are variables of the FMU. Readings of sensors are not
+/// variables, so that the page does not draw them.
 fn variables_of_run(
     description: &ModelDescription,
     file: &Path,

@@ -36,7 +36,8 @@ const THESIS: [(&str, f64); 5] = [
 const CENTAUR: f64 = 2.0425;
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;
-/// Rate up to which the report draws the friction curve near zero, in multiples of the Stribeck speed ω_s.
+/// Largest rate in the report's figure of the friction near rest, in multiples of the Stribeck
+/// speed ω_s.
 const NEAR: f64 = 5.0;
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
