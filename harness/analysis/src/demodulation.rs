@@ -11,7 +11,7 @@
 
 use crate::response::FrequencyResponse;
 use crate::sweep::Sweep;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Smallest number of cycles in a window. With three cycles a Hann window still separates the sweep from
 /// other components.

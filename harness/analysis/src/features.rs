@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use crate::response::FrequencyResponse;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Features of a frequency response: the frequency of the local maximum of |H|, which is the resonance, the frequency of the local minimum,
 /// which is the antiresonance, both in Hz, and the ratio of the two magnitudes, dB.

@@ -23,7 +23,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::smallest;
 use crate::statistics::{deviation, mean};
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 pub const LEAST_PERIODS: f64 = 5.0;
 
@@ -200,7 +200,7 @@ fn largest_line(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f6
     for (t, y) in time.iter().zip(weighted) {
         padded[((t - time[0]) / step).round() as usize] += y;
     }
-    let spectrum = signals::fourier::Forward::new(length).transform(padded);
+    let spectrum = fourier::Forward::new(length).transform(padded);
     let frequency = |k: usize| k as f64 / (length as f64 * step);
     let inside = (0..spectrum.len()).filter(|k| (low..=top).contains(&frequency(*k)));
     let best = inside.max_by(|a, b| spectrum[*a].norm_sqr().total_cmp(&spectrum[*b].norm_sqr()))?;

@@ -11,8 +11,8 @@
 //! With many rows each test is sensitive to effects of no importance, so the result includes the
 //! size of the excess.
 
+use fourier::Forward;
 use serde::Serialize;
-use signals::fourier::Forward;
 
 use crate::statistics::{mean, median};
 

@@ -34,5 +34,5 @@ pub mod sweep;
 pub mod transfer_function;
 pub mod welch;
 
+pub use fourier::Complex64;
 pub use response::{BAND, FrequencyResponse, logarithmic_grid};
-pub use signals::fourier::Complex64;

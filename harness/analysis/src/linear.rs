@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 
 use crate::exponential::exponential;
 use crate::response::FrequencyResponse;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Parameters of the linear model of hub and liquid: inertia I0 of hub and rigid liquid about the axis, kg·m²,
 /// viscous friction b, N·m·s, torsional stiffness k of the suspension line, N·m/rad, and distance r of the tank

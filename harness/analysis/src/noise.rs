@@ -13,10 +13,10 @@
 //! is solved by least squares. The rational function follows a resonance as narrow as a few lines, and the
 //! polynomial in t represents the leakage of the record's ends. The residual is V.
 
+use fourier::Forward;
 use nalgebra::{SMatrix, SVector};
-use signals::fourier::Forward;
 
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 const SIDE: usize = 6;
 const LINES: usize = 2 * SIDE + 1;

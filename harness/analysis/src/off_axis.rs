@@ -93,7 +93,7 @@ pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
 mod tests {
     use super::{OffAxis, off_axis_from_rates};
     use crate::response::FrequencyResponse;
-    use signals::fourier::Complex64;
+    use fourier::Complex64;
 
     #[test]
     fn rates_of_a_tenth_about_two_other_axes_give_a_cross_axis_energy_fraction_of_a_fiftieth() {

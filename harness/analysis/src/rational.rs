@@ -13,13 +13,13 @@
 
 use std::f64::consts::TAU;
 
+use fourier::Forward;
 use nalgebra::{DMatrix, DVector};
-use signals::fourier::Forward;
 
 use crate::features::{Deviations, Features};
 use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Largest number of spectral lines in a fit. If the band has more, lines at equal distances are
 /// selected.

@@ -1,6 +1,6 @@
 //! Frequency responses and their grids.
 
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// A complex frequency response, rate over torque in (rad/s)/(N·m), on a grid of increasing frequencies, Hz.
 #[derive(Clone, Debug, Default)]

@@ -2,7 +2,7 @@
 //! stationary noise (thesis 5.5.3). The checks are quantiles, histogram and Kolmogorov and Smirnov's distance compared with the
 //! normal distribution, autocorrelation, and statistics of chunks.
 
-use signals::fourier::{Forward, Inverse};
+use fourier::{Forward, Inverse};
 
 use crate::allan::{self, Fit, Octaves, Point};
 use crate::statistics::{deviation, mean, variance};

@@ -10,7 +10,7 @@
 //! of time, by their angular momentum.
 
 use crate::response::FrequencyResponse;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Swirl number above which motion counts as rotary; this is an ellipse with axes 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
@@ -98,7 +98,7 @@ mod tests {
 
     use super::{Rotary, swirl};
     use crate::response::FrequencyResponse;
-    use signals::fourier::Complex64;
+    use fourier::Complex64;
 
     #[test]
     fn the_swirl_number_is_one_for_a_circle_and_zero_for_a_line() {

@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Spectra at one frequency: s = jω in a unit near the middle of the lines (for the condition of the
 /// equations), U and Y, and the divisor `scale` that weights the equation.
@@ -89,7 +89,7 @@ mod tests {
 
     use super::{Coefficients, Line, fit};
     use crate::least_squares::smallest;
-    use signals::fourier::Complex64;
+    use fourier::Complex64;
 
     #[test]
     fn a_transfer_function_is_recovered_from_spectra_that_contain_a_transient() {

@@ -6,11 +6,11 @@
 //! H = Φ_yu / Φ_uu,   w(τ) = (1 + cos(πτ/M)) / 2
 //! ```
 
-use signals::fourier::{Forward, Inverse};
+use fourier::{Forward, Inverse};
 
 use crate::response::FrequencyResponse;
 use crate::statistics;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s hardly change
 /// the shape of the antiresonance, whose half-power width is 14 mHz.
@@ -157,7 +157,7 @@ fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64);
 #[cfg(test)]
 mod tests {
     use super::frequency_response;
-    use signals::fourier::Complex64;
+    use fourier::Complex64;
 
     #[test]
     fn the_spectral_estimate_equals_its_definition() {

@@ -19,7 +19,7 @@ use crate::least_squares::{minimise_by, smallest};
 use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::statistics::mean;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// A transfer function with three stable poles and two zeros, s in rad/s: the real pole has the rate p, 1/s,
 /// and the pole pair the natural frequency ω, rad/s, and the damping ratio ζ.

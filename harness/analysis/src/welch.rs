@@ -12,11 +12,11 @@
 //!   the antiresonance. It is used for the H1 estimate, which needs no average there, and for the
 //!   signal-to-noise ratio: one segment contains the sweep, and the others only noise.
 
-use signals::fourier::Forward;
+use fourier::Forward;
 
 use crate::response::FrequencyResponse;
 use crate::statistics;
-use signals::fourier::Complex64;
+use fourier::Complex64;
 
 /// Number of segments of a record, which is the default of MATLAB's `mscohere`, `cpsd` and `tfestimate`.
 pub const SEGMENTS: usize = 8;

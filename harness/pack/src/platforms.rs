@@ -225,7 +225,7 @@ impl Toolchain {
         platform: &Platform,
         target: &Target,
     ) -> Result<Vec<u8>> {
-        let path = project::cargo_build(self.command(product, platform, target), false)
+        let path = project::cargo_build(self.command(product, platform, target)?, false)
             .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     }
@@ -292,7 +292,7 @@ impl Toolchain {
         )
     }
 
-    fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Command {
+    fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Result<Command> {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),
             Cargo::Zig => Command::new("cargo-zigbuild"),
@@ -331,11 +331,11 @@ impl Toolchain {
                 Some(model.name.to_string())
             }
             Product::Native => {
-                project::native_arguments(&mut command);
+                project::native_arguments(&mut command)?;
                 Some("hubslosh_native".into())
             }
             Product::Command => {
-                project::program_arguments(&mut command);
+                project::program_arguments(&mut command)?;
                 None
             }
         };
@@ -349,7 +349,7 @@ impl Toolchain {
             link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
         }
         command.args(link.iter().map(|argument| format!("-Clink-arg={argument}")));
-        command
+        Ok(command)
     }
 }
 

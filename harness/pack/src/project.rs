@@ -67,25 +67,40 @@ pub(crate) fn arguments(command: &mut Command, package: &str) {
     command.args(["--", "-Cllvm-args=-slp-threshold=10"]);
 }
 
-/// Adds the arguments of `cargo rustc` for the command `hubslosh` as it is distributed; arguments that follow
-/// go to the compiler.
-pub(crate) fn program_arguments(command: &mut Command) {
-    command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
-    // Not optimised in the profile, so that `cargo run` compiles them fast.
-    for package in ["pack", "hubslosh", "check"] {
+/// Adds to a build of a binary that is distributed that packages which the profile `release` does not optimise, because
+/// `cargo run` then compiles them faster, are optimised for size.
+fn optimise_for_size(command: &mut Command) -> Result<()> {
+    let manifest = std::fs::read_to_string(root().join("Cargo.toml")).context("Cargo.toml")?;
+    let manifest: toml::Table = manifest.parse().context("Cargo.toml cannot be understood")?;
+    let profile = manifest.get("profile").and_then(|profiles| profiles.get("release"));
+    let packages = profile.and_then(|profile| profile.get("package")?.as_table());
+    let packages = packages.context("Cargo.toml has no [profile.release.package]")?;
+    let is_optimised = |settings: &toml::Value| settings.get("opt-level") != Some(&0.into());
+    for (package, _) in packages.iter().filter(|(_, settings)| !is_optimised(settings)) {
         command.arg("--config").arg(format!("profile.release.package.{package}.opt-level = \"s\""));
     }
+    Ok(())
+}
+
+/// Adds the arguments of `cargo rustc` for the command `hubslosh` as it is distributed; arguments that follow
+/// go to the compiler.
+pub(crate) fn program_arguments(command: &mut Command) -> Result<()> {
+    command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
+    optimise_for_size(command)?;
     command.args(["--features", "shipped", "--message-format", "json-render-diagnostics"]);
     command.args(["--", "-Cstrip=symbols"]);
+    Ok(())
 }
 
 pub(crate) const NATIVE: &str = "hubslosh-native";
 
-/// Adds the arguments of `cargo rustc` for the compiled half of the Python package; arguments that follow go
-/// to the compiler.
-pub(crate) fn native_arguments(command: &mut Command) {
+/// Adds the arguments of `cargo rustc` for the compiled half of the Python package as it is distributed; arguments that
+/// follow go to the compiler.
+pub(crate) fn native_arguments(command: &mut Command) -> Result<()> {
     command.args(["--release", "--package", NATIVE, "--lib", "--crate-type", "cdylib"]);
+    optimise_for_size(command)?;
     command.args(["--message-format", "json-render-diagnostics", "--"]);
+    Ok(())
 }
 
 /// Builds the compiled half of the Python package for the platform on which this program runs and returns its

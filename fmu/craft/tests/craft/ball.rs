@@ -7,6 +7,7 @@ use craft::{
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use super::random::Random;
+use super::seeds::every_or;
 
 pub(super) type V = Vector3<f64>;
 
@@ -251,7 +252,7 @@ fn drive(
 #[test]
 fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
     let mut seen = [0; 6];
-    for seed in 0..11 {
+    for seed in every_or(&[0, 1, 2, 3, 8, 9], 0..11) {
         let mut random = Random::new(seed);
         let mut p = off_axis_craft(&mut random);
         if seed >= 8 {
@@ -791,7 +792,8 @@ fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
 #[test]
 fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_energy() {
     let mut settled = 0;
-    for seed in 0..10 {
+    let seeds = every_or(&[0, 1, 2], 0..10);
+    for &seed in &seeds {
         let mut random = Random::new(seed);
         let mut p = off_axis_craft(&mut random);
         for tank in &mut p.tank[..2] {
@@ -840,7 +842,7 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
         assert!(changes[0] >= 2, "{seed} {changes:?}");
         settled += changes[1];
     }
-    assert!(settled > 10, "{settled}");
+    assert!(settled > seeds.len(), "{settled}");
 }
 
 #[test]
@@ -1015,7 +1017,7 @@ fn options_that_do_not_go_with_detached_liquid_are_refused() {
 #[test]
 fn random_craft_and_steps_of_any_length_give_finite_results() {
     // 1335 grazes a wall where forces of 1 kN cancel. Without losses (e = 1) bounces need not end.
-    for seed in (0..40).chain([1335]) {
+    for seed in every_or(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1335], (0..40).chain([1335])) {
         let mut random = Random::new(seed + 1000);
         let mut p = Parameters { tanks: 1 + random.below(TANKS), ..random.parameters() };
         p.max_steps = 20_000;

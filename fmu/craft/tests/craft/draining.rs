@@ -19,6 +19,7 @@ use nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
 use super::component::{SloshTank, Spacecraft};
 use super::random::{Random, draining_craft, draining_tank};
 use super::records::STEP;
+use super::seeds::every_or;
 
 type V = Vector3<f64>;
 
@@ -62,9 +63,10 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
 /// The rates are integrated over two seconds by Lobatto's rule of five points, for tanks with and without modes.
 #[test]
 fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
-    for (seed, modes) in
-        [(0, 0), (1, 0), (2, 1), (3, 2), (4, 3), (5, 1), (20, 3), (21, 1), (40, 3), (41, 1)]
-    {
+    let modes =
+        [(0, 0), (1, 0), (2, 1), (3, 2), (4, 3), (5, 1), (20, 3), (21, 1), (40, 3), (41, 1)];
+    let seeds = every_or(&[0, 3, 21, 41], modes.map(|(seed, _)| seed));
+    for (seed, modes) in modes.into_iter().filter(|(seed, _)| seeds.contains(seed)) {
         let (p, u) = draining_craft(seed, modes);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-13).unwrap();
         let start = momenta(&craft.outputs(&u));
@@ -166,7 +168,7 @@ fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
 /// steps need not stay as short as at the start.
 #[test]
 fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
-    for seed in 0..6 {
+    for seed in every_or(&[1, 3], 0..6) {
         let (mut p, u) = draining_craft(seed, seed as usize % 4);
         (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
         for tolerance in [1e-6, 1e-12] {
@@ -344,7 +346,7 @@ pub fn energy(out: &Outputs) -> f64 {
 
 #[test]
 fn the_energy_balance_holds_while_tanks_drain() {
-    for seed in (0..8).chain(21..25).chain(41..45) {
+    for seed in every_or(&[0, 3, 7, 21, 43], (0..8).chain(21..25).chain(41..45)) {
         let (mut p, u) = draining_craft(seed, seed as usize % 4);
         if [6, 7, 24, 43].contains(&seed) {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);

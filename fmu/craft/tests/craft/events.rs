@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion};
 use super::ball::{V, off_axis_craft, rotation, shape, thrust, v, wall};
 use super::ball_on_host::Craft;
 use super::random::Random;
+use super::seeds::every_or;
 
 /// A craft, the force and torque that act on it, and the length of the motion, s.
 struct Case {
@@ -434,7 +435,8 @@ fn default_case() -> Case {
 /// Before 0.6.0 an impact of case 12 in mid-air made an error of 0.01 with steps of 0.5 s.
 #[test]
 fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
-    for (seed, case) in (0..13).map(|seed| (seed, case(seed))).chain([(13, default_case())]) {
+    let cases = every_or(&[0, 3, 6, 12], 0..13).into_iter().map(|seed| (seed, case(seed)));
+    for (seed, case) in cases.chain([(13, default_case())]) {
         let mut simulator = Simulator::new(&case);
         simulator.simulate_to(case.end);
         let want = simulator.compared_quantities();
@@ -633,7 +635,8 @@ fn locating(case: &Case) -> [(Method, f64); 3] {
 /// liquid left the tank through its wall.
 #[test]
 fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps() {
-    for (seed, case) in (0..9).map(|seed| (seed, case(seed))).chain([(9, default_case())]) {
+    let cases = every_or(&[0, 1, 2], 0..9).into_iter().map(|seed| (seed, case(seed)));
+    for (seed, case) in cases.chain([(9, default_case())]) {
         let mut simulator = Simulator::new(&case);
         simulator.simulate_to(case.end);
         for (method, allowed) in locating(&case) {
@@ -673,7 +676,8 @@ fn without_location(case: &Case, seed: u64) -> f64 {
 
 #[test]
 fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
-    for (seed, case) in (0..6).map(|seed| (seed, case(seed))).chain([(6, default_case())]) {
+    let cases = every_or(&[0, 1], 0..6).into_iter().map(|seed| (seed, case(seed)));
+    for (seed, case) in cases.chain([(6, default_case())]) {
         without_location(&case, seed);
     }
 }
@@ -744,9 +748,13 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
 
 #[test]
 fn co_simulation_and_model_exchange_find_the_same_impacts_of_random_craft() {
-    let figures = compare_hosts(100, 6);
+    let count = every_or(&[2], [6])[0];
+    let figures = compare_hosts(100, count);
     assert!(figures.problems.is_empty(), "{figures:#?}");
-    assert!(figures.craft > 3 && figures.impacts > 10, "{figures:?}");
+    assert!(
+        figures.craft > count as usize / 2 && figures.impacts > 2 * count as usize,
+        "{figures:?}"
+    );
 }
 
 /// Runs the comparison with a seed from the environment variable HUBSLOSH_EVENTS_SEED, if it is set, so that a nightly run tries new cases.

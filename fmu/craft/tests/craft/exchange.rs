@@ -7,6 +7,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
+use super::seeds::every_or;
 
 /// Returns the inputs at t as a host that integrates itself passes them: without slopes, and with the wheels' reaction in the
 /// torque.
@@ -48,7 +49,7 @@ pub fn runge_kutta(
 /// two turns.
 #[test]
 fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
-    for seed in 0..30 {
+    for seed in every_or(&[0, 1, 3, 12, 16, 18, 21, 24, 28], 0..30) {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
         if seed >= 18 {

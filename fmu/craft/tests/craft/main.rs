@@ -27,6 +27,7 @@ mod records;
 mod reference;
 mod refusals;
 mod rows;
+mod seeds;
 mod small_motions;
 mod special_cases;
 mod spinning;

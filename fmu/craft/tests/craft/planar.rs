@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use super::component::{SloshTank, Spacecraft};
 use super::exchange::{HostWithTanks, runge_kutta};
 use super::random::Random;
+use super::seeds::every_or;
 
 /// Returns a box with 1000 kg of liquid, as wide as deep along y and twice as long along x. It has one mode along each
 /// axis, and their masses add up to more than the liquid's.
@@ -276,7 +277,8 @@ fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
 #[test]
 fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_dissipate() {
     let mut telling = 0;
-    for seed in 0..8 {
+    let seeds = every_or(&[0, 1, 2], 0..8);
+    for &seed in &seeds {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
         random.make_all_planar(&mut p);
@@ -301,7 +303,7 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
         assert!(off < 1e-9 * before[6], "{seed} {off:e} of {}", before[6]);
         telling += usize::from(dissipated > 1e-5 * before[6]);
     }
-    assert!(telling > 5, "{telling}");
+    assert!(telling > seeds.len() / 2, "{telling}");
 }
 
 fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
@@ -315,7 +317,7 @@ fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
 /// law of drag. A mass flow has no effect.
 #[test]
 fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
-    for seed in 0..8 {
+    for seed in every_or(&[0, 1, 2, 3], 0..8) {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
         random.make_planar(&mut p.tank);

@@ -522,7 +522,7 @@ fn not_negative(
 
 #[cfg(test)]
 mod tests {
-    use signals::fourier::{Forward, Inverse};
+    use fourier::{Forward, Inverse};
 
     use super::*;
     use crate::random::Random;

@@ -7,8 +7,8 @@ use analysis::Complex64;
 use analysis::sweep::Sweep;
 use anyhow::{Context, Result, ensure};
 use files::budget;
+use fourier::{Forward, Inverse};
 use nalgebra::{DMatrix, DVector};
-use signals::fourier::{Forward, Inverse};
 use signals::recording::{self, Between, Signal, Wanted, even_with_gaps};
 use signals::table::Table;
 

@@ -9,7 +9,7 @@ use analysis::transfer_function::TransferFunction;
 use analysis::{Complex64, FrequencyResponse};
 use anyhow::Result;
 use formulas::cylinder::tank_of_first_mode;
-use signals::fourier::Forward;
+use fourier::Forward;
 
 use crate::bench::nominal::{Bench, Nominal, Start};
 use crate::bench::problem::DELAY;

@@ -1,7 +1,6 @@
 //! Tests of `signals`, outside the library: its generic crates are compiled once.
 
 mod corpus;
-mod fourier;
 mod headers;
 mod recording;
 mod scale;

@@ -3,6 +3,8 @@
 //! ```text
 //! X_k = Σ_n x_n e^{−j2πkn/N},   k = 0 … N/2
 //! ```
+//!
+//! The generic crate `realfft` is used only here, so that its code is compiled only once.
 
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use signals::fourier::{Complex64, Forward, Inverse};
+use fourier::{Complex64, Forward, Inverse};
 
 #[test]
 fn a_fourier_transform_equals_its_definition_and_is_inverted() {

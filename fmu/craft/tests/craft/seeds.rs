@@ -1,0 +1,10 @@
+//! The choice between all random craft of a test and a few of them.
+
+/// Returns `all` seeds if the environment has HUBSLOSH_EVERY_SEED, as `.ci/long-tests` sets it. Otherwise returns only the `few`
+/// seeds, so that `cargo test` takes minutes.
+pub fn every_or(few: &[u64], all: impl IntoIterator<Item = u64>) -> Vec<u64> {
+    match std::env::var_os("HUBSLOSH_EVERY_SEED") {
+        Some(_) => all.into_iter().collect(),
+        None => few.to_vec(),
+    }
+}
