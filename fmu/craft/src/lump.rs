@@ -344,8 +344,8 @@ impl Lump {
         [at[0], at[1], at[2], rate[0], rate[1], rate[2]]
     }
 
-    /// Returns the six numbers `x` of the lump (position and velocity in tank axes) after moving
-    /// the position onto the wall and the velocity into the wall's tangent plane.
+    /// Returns the lump's six states (position and rate, tank axes) with the position moved onto the wall and the rate
+    /// projected onto the wall's tangent plane.
     fn on_wall(&self, x: &[f64; 6]) -> [f64; 6] {
         let [across, along] = [self.radius, self.half].map(|r| 1.0 / (r * r));
         let at = [x[0], x[1], x[2] - self.height];
