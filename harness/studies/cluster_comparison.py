@@ -89,7 +89,7 @@ def table_differences(one: Path, other: Path) -> dict[str, float]:
 
 def signal_differences(one: Path, other: Path, columns: list[str]) -> dict[str, float]:
     """Return the largest difference in each column of two runs, over the column's largest value."""
-    a, b = (pyarrow.parquet.read_table(path, columns).to_pandas() for path in (one, other))
+    a, b = (pyarrow.parquet.read_table(path, columns=columns).to_pandas() for path in (one, other))
     largest = {name: np.abs(a[name]).max() for name in columns}
     return {
         name: float(np.abs(a[name] - b[name]).max() / (largest[name] or 1.0)) for name in columns
