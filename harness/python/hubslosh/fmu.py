@@ -492,7 +492,10 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     found, texts = _read_parameters(Path(path))
     for text in texts:
         warnings.warn(f"{path}: {text}", FmuWarning, stacklevel=2)
-    return {
-        name: value if unit is None else (value, DefinedUnit(unit, base) if base else unit)
-        for name, value, unit, base in found
-    }
+    parameters: dict[str, Quantity] = {}
+    for name, value, unit, base in found:
+        if unit is None or isinstance(value, str):
+            parameters[name] = value
+        else:
+            parameters[name] = value, DefinedUnit(unit, base) if base else unit
+    return parameters
