@@ -3,37 +3,39 @@
 
 use anyhow::{Result, ensure};
 
-/// Largest number of rows of a table and of steps of a run: 111 hours at 50 Hz.
+/// Largest number of rows of a table, and of steps of a run. At 50 Hz they are 111 hours.
 pub const ROWS: usize = 20_000_000;
-/// Largest size of the numbers that are held at once, bytes: twice the bench's columns of the longest run.
+/// Largest memory for numbers that a command holds at once, bytes. It is twice what the bench's
+/// columns of the longest run take.
 pub const BYTES: u64 = 4 << 30;
 /// Largest text that is read as a whole, bytes: plans, parameter sets, results. A table is limited by
 /// [`ROWS`] instead.
 pub const TEXT: u64 = 64 << 20;
 /// Largest size of the numbers that are read from one recording, bytes: three signals in [`ROWS`] rows.
 pub const RECORDING: u64 = 512 << 20;
-/// Number of bytes of numbers that a file may contain per byte of its size, in addition to [`RECORDING`]:
-/// compressed tables of runs contain up to 10.
+/// Number of bytes of numbers that a file may contain for each byte of its size, in addition to
+/// [`RECORDING`]. Compressed tables of runs contain up to 10.
 pub const PER_BYTE: u64 = 32;
 /// Largest size of one file while it is decompressed, bytes, including the parts that are skipped.
 pub const INFLATED: u64 = 2 << 30;
 pub const RUNS: usize = 100_000;
 pub const JOBS: usize = 512;
 pub const LINES: usize = 20_000;
-/// Largest number of sines to evaluate for a multisine, all lines in all rows, which takes half a minute.
+/// Largest number of sines that are evaluated for a multisine, lines times rows, which takes half a
+/// minute.
 pub const SINES: u64 = 2_000_000_000;
-/// Largest number of products for the frequency responses of one run, rows times frequencies: about ten
-/// seconds.
+/// Largest number of products that the frequency responses of one run take, rows times frequencies.
+/// They take about ten seconds.
 pub const PRODUCTS: f64 = 4e9;
-/// Largest frequency of a torque, and the inverse of the smallest, Hz.
+/// Largest frequency of a torque, Hz. Its inverse is the smallest frequency.
 pub const FREQUENCY: f64 = 1e9;
 /// Largest length of a run's name, bytes, because file systems allow 255 with an ending.
 pub const NAME: usize = 200;
 
-/// Returns the number of steps of length `step` (s) in `span` (s), the last perhaps shorter.
+/// Returns the number of steps of length `step`, s, in `span`, s; the last step may be shorter.
 ///
 /// # Errors
-/// If there are more than [`ROWS`], or if the numbers make none.
+/// If there are more than [`ROWS`] steps, or a length is not positive and finite.
 pub fn steps(span: f64, step: f64) -> Result<usize> {
     ensure!(
         step > 0.0 && step.is_finite(),
@@ -90,11 +92,11 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Returns the number of threads for `wanted` jobs at once (0 for as many as the machine has cores) that hold
-/// `bytes` each.
+/// Returns the number of threads for `wanted` jobs at the same time (0 for as many as the machine
+/// has cores), each of which holds `bytes` of memory.
 ///
 /// # Errors
-/// If more than [`JOBS`] are wanted.
+/// If more than [`JOBS`] jobs are wanted.
 pub fn jobs(wanted: usize, bytes: u64) -> Result<usize> {
     ensure!(wanted <= JOBS, "{wanted} runs at once (allowed: 1 to {JOBS})");
     let cores = std::thread::available_parallelism().map_or(1, usize::from).min(JOBS);

@@ -23,7 +23,7 @@ pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }
 
-/// Keeps the messages of panics for [`caught`] instead of printing them.
+/// Makes panics of this process keep their messages for [`caught`] instead of printing them.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));

@@ -100,8 +100,8 @@ fn file_kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() { "a directory" } else { "a special file" }
 }
 
-/// Identity of a file, by which two paths to the same file are recognised. On systems other than Unix two hard links count
-/// as different files.
+/// Identity of a file, by which two paths that lead to one file are recognised. On systems other
+/// than Unix two hard links count as different files.
 #[derive(PartialEq)]
 struct Identity(#[cfg(unix)] (u64, u64), #[cfg(not(unix))] PathBuf);
 
@@ -116,8 +116,8 @@ fn identity(path: &Path) -> Option<Identity> {
     path.canonicalize().ok().map(Identity)
 }
 
-/// A protected input. The file stays open, because otherwise a new file could get the number of an input that
-/// was deleted.
+/// An input file that no output may replace. The file stays open, because otherwise a new file
+/// could get the number of an input that was deleted.
 struct Protected {
     identity: Identity,
     path: PathBuf,
@@ -163,7 +163,8 @@ pub fn check_replaceable(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// A deleted input's file number may be given to a new file; the new file may be overwritten.
+    /// The system may give the file number of a deleted input to a new file. This new file may be
+    /// overwritten.
     #[cfg(unix)]
     #[test]
     fn a_new_file_is_never_taken_for_a_deleted_input() {

@@ -119,8 +119,8 @@ pub struct Store {
     _lock: File,
 }
 
-/// The hashes of the files, by name, and the manifest file, which is `None` after publication, and after a
-/// line that could not be written.
+/// The hashes of the stored files, by name, and the file of the manifest. The file is `None` after
+/// publication, and after a line that could not be written.
 #[derive(Debug)]
 struct Manifest {
     file: Option<File>,
@@ -131,10 +131,11 @@ fn lines(sums: &BTreeMap<String, String>) -> String {
     sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
 }
 
-/// Returns the last hash of each name. A line that a kill has cut off does not count.
+/// Returns the SHA-256 that each file name in the manifest's text has in its last line. A last line
+/// that is incomplete, because the program was killed, does not count.
 ///
 /// # Errors
-/// Another line is not in the format of a manifest.
+/// If another line is not in the format of a manifest.
 fn sums(text: &str) -> Result<BTreeMap<String, String>> {
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let pair = |(row, line): (usize, &str)| {
@@ -160,11 +161,11 @@ fn has_no_runs(path: &Path) -> bool {
     }
 }
 
-/// Reads a folder's manifest. `is_used` is true if a program has locked the folder before.
+/// Reads the manifest of a folder. `is_used` is true if a program has locked the folder before.
 ///
 /// # Errors
-/// Nothing verifies the stored runs: the manifest is damaged, or it is missing although the folder
-/// is used.
+/// If the manifest is damaged, or is missing although the folder was used, so that nothing verifies
+/// the stored runs.
 fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
     let place = path.join(MANIFEST);
     let read = || -> Result<BTreeMap<String, String>> {
@@ -289,12 +290,12 @@ impl Store {
         self.manifest().sums.contains_key(&self.kind.run_file(run))
     }
 
-    /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line in the
-    /// manifest is accepted if the folder is new, or if `is_ours` does not recognise its file as one of
-    /// HubSlosh.
+    /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line
+    /// in the manifest is accepted if the folder is new, or if `is_ours` says that HubSlosh has not
+    /// written its file.
     ///
     /// # Errors
-    /// The file is not the stored one.
+    /// If the file is not the one that was stored.
     pub fn check(
         &self,
         run: &str,
@@ -307,10 +308,11 @@ impl Store {
         Ok(sum)
     }
 
-    /// Returns the bytes of a stored run that only HubSlosh writes, or `None` if it was never stored.
+    /// Returns the bytes of a stored run of a kind that only HubSlosh writes, or `None` if it was
+    /// never stored.
     ///
     /// # Errors
-    /// The file is not the stored one.
+    /// If the file is not the one that was stored.
     pub fn read(&self, run: &str) -> Result<Option<Vec<u8>>, Damage> {
         let read = |path: &Path| {
             let bytes = input::bytes(path)?;
@@ -344,13 +346,15 @@ impl Store {
         self.add_to_manifest(&self.kind.run_file(run), sum)
     }
 
-    /// Stores a run, which `write` writes to the path that it gets. It is on the disk when this returns.
+    /// Stores a run in the folder. `write` writes the run's file to the path that it receives. When
+    /// this function returns, the run is on the disk.
     pub fn add(&self, run: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let stored = self.write(&self.kind.run_file(run), write);
         stored.with_context(|| format!("{} cannot be stored", self.run(run).display()))
     }
 
-    /// Writes a file: its line in the manifest first, then the file under its name.
+    /// Writes a file of the folder: first its line in the manifest, then the file itself, which
+    /// gets its name when it is complete.
     fn write(&self, file: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let place = self.path.join(file);
         input::check_replaceable(&place)?;

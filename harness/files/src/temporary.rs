@@ -15,7 +15,7 @@ fn paths() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     PATHS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file or folder that a signal removes while this value exists.
+/// A temporary file or folder that is removed if a signal ends the program while this value exists.
 #[derive(Debug)]
 pub struct Registered(PathBuf);
 
@@ -51,7 +51,8 @@ pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
 }
 
 pub const PREFIX: &str = "hubslosh-";
-/// Name of the file in a temporary folder that is locked as long as its program runs.
+/// Name of the file in a temporary folder that the program locks as long as it runs. It shows other
+/// programs that the folder is in use.
 const ALIVE: &str = "alive";
 const FILES: &str = "files";
 
@@ -65,7 +66,8 @@ pub struct Folder {
     process: u32,
 }
 
-/// A forked process has the folder from the process that made it, and leaves it alone.
+/// Removes the folder. A forked process does not, because the folder belongs to the process that
+/// created it.
 impl Drop for Folder {
     fn drop(&mut self) {
         if std::process::id() != self.process {
@@ -83,7 +85,8 @@ impl Folder {
         Folder::make(&std::env::temp_dir(), PREFIX)
     }
 
-    /// Makes one in `parent`, with a name that begins with `prefix`, and removes those there of programs that were killed.
+    /// Creates a temporary folder in `parent`, with a name that begins with `prefix`. Removes
+    /// folders with such names that programs have left which were killed.
     pub fn new_in(parent: &Path, prefix: &str) -> Result<Folder> {
         sweep(parent, prefix);
         Folder::make(parent, prefix)

@@ -12,7 +12,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Finds the variables of an FMU; `has` returns true for the name of one of its variables.
+    /// Finds those variables of an FMU that give the reason why a tank is out of the range of its
+    /// model. `has` returns true for the name of a variable of the FMU.
     pub fn find(has: impl Fn(&str) -> bool) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
             .map(|i| (spacecraft::tank::LIMITED_BY_KIND.element([i]), format!("tank {i}: ")));

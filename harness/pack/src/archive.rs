@@ -17,8 +17,9 @@ use crate::fmi::Fmi;
 pub type Files = Vec<(String, Vec<u8>)>;
 
 const QUICK: i64 = 9;
-/// Above 9 the crate `zip` uses Zopfli, with one iteration per level above that. Five iterations would make a
-/// binary smaller by 0.2 % and take a third longer.
+/// Compression level for distributed archives. Above 9 the crate `zip` uses Zopfli, with one
+/// iteration per level above that. Five iterations would make a binary smaller by 0.2 % and take a
+/// third longer.
 const SMALL: i64 = 10;
 
 pub struct Packed {
@@ -37,8 +38,8 @@ impl Packed {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }
 
-    /// Returns the binary's paths and contents in an FMU of version `fmi`. A folder for one processor gets
-    /// only its part of a universal binary.
+    /// Returns the paths of a binary in an FMU of the version `fmi`, each with its bytes. A folder
+    /// for one processor gets only that processor's part of a universal binary.
     pub fn files(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = (String, &[u8])> {
         fmi.folders(self.folder).iter().map(move |folder| {
             let bytes = match folder.strip_suffix("-darwin") {
@@ -124,7 +125,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
 }
 
-/// Writes the archive. Order, times and attributes are fixed, so that the same files give the same bytes.
+/// Writes the zip archive to `out`. The order of the files, their times and their attributes are
+/// fixed, so that the same files give the same bytes.
 fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)], level: i64) -> Result<()> {
     let mut archive = ZipWriter::new(out);
     for (name, bytes) in files {

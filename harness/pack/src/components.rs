@@ -24,7 +24,7 @@ pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
     pub name: String,
-    /// Version; `None` if it is the version of the tool that linked it.
+    /// Version of the component; `None` if it is the version of the tool that linked the component.
     pub version: Option<String>,
     pub licence: String,
     pub texts: Vec<String>,
@@ -35,8 +35,8 @@ pub struct Component {
     pub platforms: BTreeSet<&'static str>,
 }
 
-/// Crates of Rust's standard library. Panic messages in a binary name those whose code is linked and can
-/// panic, with their versions.
+/// Crates of Rust's standard library, each with its licence. A binary contains the paths of those
+/// crates whose code is linked and can panic, with their versions.
 const STANDARD: [(&str, &str); 10] = [
     ("addr2line", "Apache-2.0 OR MIT"),
     ("adler2", "0BSD OR MIT OR Apache-2.0"),
@@ -59,8 +59,8 @@ struct RunTime {
     origin: &'static str,
 }
 
-/// Reverses a text at compile time. This program is itself searched for the components of a wheel, and so
-/// must not contain the text.
+/// Reverses a text at compile time. This program is itself searched for texts that identify
+/// components of a wheel, and must therefore not contain them.
 const fn backwards<const N: usize>(text: [u8; N]) -> [u8; N] {
     let (mut reversed, mut place) = ([0; N], 0);
     while place < N {
@@ -104,11 +104,10 @@ const RUN_TIME: [RunTime; 4] = [
     },
 ];
 
-/// Lists the components that are linked into the `binaries` of a package.
+/// Lists the third-party components that are linked into the `binaries` of a package.
 ///
 /// # Errors
-///
-/// If a component's licence is unknown here.
+/// If the licence of a component is not known to this program.
 pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     let everywhere: BTreeSet<&str> = binaries.iter().map(|binary| binary.folder).collect();
     let mut all = crates(package, &everywhere)?;

@@ -19,10 +19,11 @@ use crate::project;
 
 #[derive(Debug)]
 pub struct Platform {
-    /// Folder under `binaries/` of the FMU (FMI 2.0.5, section 2.3).
+    /// Folder under `binaries/` of the FMU for this platform (FMI 2.0.5, section 2.3).
     pub folder: &'static str,
     pub ending: &'static str,
-    /// Build targets. If there are several, their binaries are joined into a universal binary.
+    /// Targets of Rust's compiler for this platform. If there are several, their binaries are
+    /// joined into a universal binary.
     pub targets: &'static [Target],
     tools: &'static [Tool],
     cargo: Cargo,
@@ -358,7 +359,8 @@ mod tests {
     use super::*;
     use crate::fmi::Fmi;
 
-    /// A platform without a folder would be built and then left out of the archive without a word.
+    /// Every platform that is built has a folder in the FMU. Without one its binary would be left
+    /// out of the archive without a message.
     #[test]
     fn every_platform_has_its_folder_in_an_fmu() {
         for platform in &PLATFORMS {

@@ -67,7 +67,8 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns true if a file's name is `NAME-VERSION` followed by `-` or `.`.
+/// Returns true if a file in the release's folder belongs to this version of `name`: its name is
+/// `NAME-VERSION` followed by `-` or `.`.
 fn belongs_to(file: &str, name: &str, version: &str) -> bool {
     let rest = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-'));
     rest.and_then(|rest| rest.strip_prefix(version))

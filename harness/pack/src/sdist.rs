@@ -14,7 +14,8 @@ use crate::archive::{Files, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::root;
 
-/// Path of the build backend relative to the folder of pyproject.toml, and relative to the root of the sdist.
+/// Text in pyproject.toml that gives the path of the build backend: relative to the folder of this
+/// file in the project, and relative to the root of the sdist.
 const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
 
 /// Writes the sdist to `folder` and returns its path.
@@ -43,8 +44,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// Reads the files under version control, except releases and files that only a checkout needs.
-/// pyproject.toml and the metadata are placed at the root.
+/// Reads the project's files under version control, except releases and files that only a checkout
+/// needs. pyproject.toml and the metadata are placed at the root of the sdist.
 fn files() -> Result<Files> {
     let said = Command::new("git")
         .current_dir(root())

@@ -19,8 +19,8 @@ pub fn allan_deviations(gyro: &Characteristics) -> String {
     .file()
 }
 
-/// Draws Allan deviations and, if it is known, the noise with its white part; `names` are of the white part, the
-/// deviations and the noise.
+/// Draws the Allan deviations of a gyro and, if `noise` is given, the deviation of this noise and
+/// of its white part. `names` label the white part, the deviations and the noise.
 fn allan(title: &str, points: &[Point], noise: Option<&Noise>, names: [&str; 3]) -> Chart {
     let curve = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
         points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()

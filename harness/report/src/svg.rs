@@ -53,7 +53,7 @@ impl Axis {
     }
 }
 
-/// Returns the least and the largest of the finite values; 0 and 1 without values.
+/// Returns the smallest and the largest of the finite values; 0 and 1 if there are none.
 pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .into_iter()

@@ -12,7 +12,8 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 #[derive(Debug)]
 pub struct Page {
     pub path: String,
-    /// Name for anchors, for example `hubslosh-model` for `modelDescription/HubSlosh/documentation/model.md`.
+    /// Name of the page for its anchors, for example `hubslosh-model` for
+    /// `modelDescription/HubSlosh/documentation/model.md`.
     pub name: String,
     pub title: String,
     pub headings: Vec<Heading>,
@@ -33,11 +34,10 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Returns the figures.
+    /// Returns the figures of all pages, by file name.
     ///
     /// # Errors
-    ///
-    /// All faults, if there are any.
+    /// All faults that were found while the pages were rendered, if there are any.
     pub fn figures(mut self) -> Result<BTreeMap<String, Vec<u8>>> {
         self.faults.sort();
         self.faults.dedup(); // pages are rendered more than once
@@ -49,12 +49,14 @@ impl Gathered {
 }
 
 impl Page {
-    /// Returns the `id` of a heading in the file of all pages, or of the page itself if `slug` is empty.
+    /// Returns the `id` of a heading in the file that has all pages, or the `id` of the page itself
+    /// if `slug` is empty.
     pub fn id(&self, slug: &str) -> String {
         if slug.is_empty() { self.name.clone() } else { format!("{}--{slug}", self.name) }
     }
 
-    /// Returns the address of a heading, or of the page itself if `slug` is empty.
+    /// Returns the address of a heading of the page, as in a link, or of the page itself if `slug`
+    /// is empty.
     pub fn address(&self, slug: &str) -> String {
         format!("#{}", self.id(slug))
     }

@@ -45,5 +45,6 @@ pub(super) fn ordered(i: usize, count: usize) -> String {
     format!("rgb({r:.0},{g:.0},{b:.0})")
 }
 
-/// Colour of reference curves, dark in the light scheme and light in the dark scheme.
+/// Name that stands for the colour of reference curves: dark in the light scheme of the page and
+/// light in the dark scheme.
 pub(super) const INK: &str = "@ink";

@@ -167,7 +167,8 @@ pub(super) fn line(
     trace
 }
 
-/// Returns the first x and the distance between points, if all points have the same distance.
+/// Returns the first x and the distance between neighbouring points along x if all these distances
+/// are equal, so that a page need not store every x.
 fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let [first, .., last] = points else { return None };
     let step = (last.0 - first.0) / (points.len() - 1) as f64;

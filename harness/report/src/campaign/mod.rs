@@ -31,14 +31,15 @@ pub(crate) static PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 
 pub(crate) static PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
-/// Largest number of groups that get figures of their own; the page says for which groups figures are
-/// missing.
+/// Largest number of groups of runs that get figures of their own; the page names the groups whose
+/// figures are left out.
 const MOST_GROUPS: usize = 24;
 
 const MOST_RUNS: usize = 6;
 
-/// Returns the run that is shown in 3-D: the one with the largest radial slosh angle, which has rotary slosh,
-/// or, if no run leaves its plane, the one with the largest slosh angle. Recordings are not considered.
+/// Returns the run that the report shows in 3-D: the run with the largest radial slosh angle,
+/// because it has rotary slosh. If the slosh of every run stays in its plane, it is the run with
+/// the largest slosh angle. Recordings are not considered, because their liquid was not measured.
 pub fn most_swirling_run(results: &Results) -> Option<&Outcome> {
     let simulated = results.outcomes.iter().filter(|run| !run.is_recording());
     let (radial, tangential) =

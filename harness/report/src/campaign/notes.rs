@@ -169,8 +169,8 @@ fn cells(estimate: Option<&Estimate>) -> Markup {
     }
 }
 
-/// Formats a number times `scale`; a number with many digits, such as a drawn one, gets six. Any other text
-/// is returned unchanged.
+/// Formats a number times `scale`. A number with more than six digits, such as a value drawn at
+/// random, is rounded to six. A text that is not a number is returned unchanged.
 fn shortened(text: &str, scale: f64) -> String {
     match text.parse::<f64>() {
         Ok(value) if text.len() > 8 => format!("{:.5e}", value * scale),

@@ -112,8 +112,8 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     }
 }
 
-/// Returns labels for the ends of lines. Lines that end close together share a label. If there are too many labels to be
-/// read, none is drawn.
+/// Returns labels for the ends of a figure's lines. Lines that end close together share a label. If
+/// there would be too many labels to be read, none is drawn.
 fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
     const TOGETHER: f64 = 0.03;

@@ -146,7 +146,8 @@ impl Varied {
         Some(Varied { name: name.into(), unit, scale })
     }
 
-    /// Formats one of the values, for example `tank.d 111 mm` or `slosh.model planar`.
+    /// Formats a value of the varied quantity with its name and unit, for example `tank.d 111 mm`
+    /// or `slosh.model planar`.
     pub fn value(&self, text: &str) -> String {
         let number = text.parse::<f64>().ok().map(|value| {
             // Rounded, to remove the errors of binary fractions.

@@ -82,8 +82,8 @@ fn bode(
 
 /// Draws the band of two standard deviations around a response, or nothing if the band would be as narrow as the line.
 fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
-    /// Smallest visible half-width, dB, and the largest half-width that is drawn, as standard deviation of ln
-    /// |H|.
+    /// Smallest half-width of a band that is visible, dB, and the largest half-width that is drawn,
+    /// as the standard deviation of ln |H|.
     const SEEN: f64 = 0.2;
     const WIDEST: f64 = 0.5;
     let decibel = 20.0 / std::f64::consts::LN_10;
@@ -187,8 +187,8 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
         .collect()
 }
 
-/// A quantity of a heat map: name, the function that reads it from a run, and the ends of the colour scale if
-/// they are fixed.
+/// A quantity of a run that a heat map shows: its name, the function that reads it from the run,
+/// and the ends of the colour scale if they are fixed.
 struct Quantity {
     label: &'static str,
     of: fn(&Outcome) -> Curve,
@@ -266,8 +266,8 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     }
 }
 
-/// Averages a curve in cells of equal width in log frequency. An empty cell between others takes the value of
-/// its left neighbour.
+/// Averages a curve over frequency in cells of equal width in log frequency. An empty cell between
+/// others takes the value of its left neighbour.
 fn cells(curve: &Curve, (from, to): (f64, f64)) -> Vec<serde_json::Value> {
     let mut sums = vec![(0.0, 0usize); CELLS];
     for (f, value) in curve.iter().filter(|(_, v)| v.is_finite()) {

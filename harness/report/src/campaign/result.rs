@@ -57,8 +57,8 @@ impl Series {
         [SloshModel::Linear.name(), SloshModel::Frozen.name()].contains(&&*self.model)
     }
 
-    /// Returns the first and last position with rotary slosh, and true if all positions from the first to the
-    /// end of the axis have it.
+    /// Returns the first and the last position on the axis with rotary slosh, and true if every
+    /// position from the first to the end of the axis has it. `None` without rotary slosh.
     fn swirl(&self) -> Option<(f64, f64, bool)> {
         let first = self.points.iter().position(|p| p.swirls)?;
         let last = self.points.iter().rposition(|p| p.swirls)?;
@@ -430,7 +430,8 @@ fn largest_angle_of_other_fmus(results: &Results) -> String {
     }
 }
 
-/// Keeps the first `most` parts of a text, and replaces all further parts by their number ("and 3 more").
+/// Returns the first `most` parts of a list in words, followed by the number of the further parts
+/// ("and 3 more").
 fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
     let further = parts.len().saturating_sub(most);
     if further > 0 {
@@ -464,7 +465,8 @@ mod tests {
         swirling,
     };
 
-    /// Returns a series with exact responses at 2 and 3 Hz from (x, antiresonance, resonance, rotary).
+    /// Returns a series whose exact responses are at 2 and 3 Hz. Each point is given as its
+    /// position on the axis, antiresonance, resonance, and true for rotary slosh.
     fn series(model: &str, plant: &str, points: &[(f64, f64, f64, bool)]) -> Series {
         let known = |f: f64| (f > 0.0).then_some(f);
         let point = |&(x, a, r, swirls): &(f64, f64, f64, bool)| Point {

@@ -33,7 +33,7 @@ impl Parameters<'_> {
         Some((self.description.value(variable, text).ok()?, text.clone()))
     }
 
-    /// Returns a number in SI units; 0 if the FMU has no such parameter.
+    /// Returns the value of a parameter in SI units; 0 if the FMU has no parameter with this name.
     pub fn number(&self, name: &str) -> f64 {
         let number = self.value(name).map(|(value, _)| value.number());
         number.filter(|number| !number.is_nan()).unwrap_or(0.0)
@@ -167,9 +167,9 @@ impl Tank {
     }
 }
 
-/// Modes and surface height of a draining tank as functions of the mass of liquid, interpolated as in the
-/// FMU: 1/l_n and h_n − l_n at the points, with slope and second derivative, and the height of the surface,
-/// m, by mass, kg.
+/// Interpolation of a draining tank's modes and surface height over the mass of its liquid, as in
+/// the FMU: 1/l_n and h_n − l_n at the points of the fill table, with slope and second derivative,
+/// and the height of the surface, m, by mass, kg.
 pub(super) struct Fill {
     masses: Vec<f64>,
     modes: Vec<[Vec<[f64; 3]>; 2]>,
@@ -196,15 +196,16 @@ impl Fill {
     }
 }
 
-/// Height of the cylinder's wall above the liquid, in radii. This is an assumption, because no parameter
-/// states it.
+/// Assumed height of the drawn cylinder's wall above the liquid, in radii of the cylinder. No
+/// parameter of the FMU states it.
 const FREEBOARD: f64 = 0.7;
 
 fn cylinder(radius: f64, bottom: f64, level: f64) -> Outline {
     Outline::Revolved(vec![[0.0, bottom], [radius, bottom], [radius, level + FREEBOARD * radius]])
 }
 
-/// Returns h/R of the cylinder whose first mode has this share of the liquid's mass, found by bisection.
+/// Returns the ratio of depth to radius, h/R, of the upright cylinder whose first mode has this
+/// share of the liquid's mass. It is found by bisection.
 fn depth_over_radius(share: f64) -> f64 {
     let xi = XI[0];
     let share_at = |x: f64| 2.0 * (xi * x).tanh() / (xi * (xi * xi - 1.0) * x);
@@ -492,8 +493,8 @@ mod tests {
         points[1]
     }
 
-    /// The start values are the modes of a cylinder of 0.9 m, 0.6 m deep, its origin at mid-depth, in six
-    /// digits.
+    /// The default tank's modes are those of a cylinder of 0.9 m diameter, 0.6 m deep, to six
+    /// digits; the origin is at mid-depth.
     #[test]
     fn modes_of_a_cylinder_are_drawn_as_that_cylinder() {
         let drawn = tank_with(&[]);
@@ -503,7 +504,8 @@ mod tests {
         }
     }
 
-    /// The table has 0.1 to 1.2 m of the same cylinder; between the points the surface rises with the mass.
+    /// The default fill table has the depths 0.1 to 1.2 m of one cylinder; between its points the
+    /// surface rises with the mass.
     #[test]
     fn the_surface_of_a_draining_cylinder_is_where_its_liquid_ends() {
         let drawn = tank_with(&[("tank.fill.points", "12"), ("tank.liquid_0", "381.704")]);

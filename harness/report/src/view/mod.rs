@@ -67,8 +67,8 @@ fn kind(description: &ModelDescription) -> Option<Kind> {
     .find_map(|(name, kind)| has(name).then_some(kind))
 }
 
-/// Columns that share a panel, in the order of interest. A name with `*` stands for all names that begin with
-/// it.
+/// Panels of the bench's plots, each with its title and its columns in the order of interest. A
+/// name with `*` stands for all names that begin with it.
 const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Torque on the hub", &[TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FRICTION, TAU_FLUID]),
     ("Rate of the hub", &[OMEGA, OMEGA_IMU]),
@@ -126,7 +126,8 @@ pub fn columns(
     all
 }
 
-/// Lists the prefixes of the tanks' variables, each with the tank's number of modes; empty for the bench.
+/// Lists the tanks of the FMU, each with the prefix of its variables and its number of modes; empty
+/// for the bench.
 fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
     let all: Vec<String> = match kind(parameters.description) {
         Some(Kind::Craft) => (1..=(parameters.number("tanks") as usize).max(1))
@@ -151,7 +152,8 @@ impl Columns<'_> {
         self.table.is_some_and(|table| table.column(name).is_some())
     }
 
-    /// Takes all columns `names` if they all exist; otherwise none.
+    /// Marks all columns `names` as used and returns true if the run has all of them. Otherwise
+    /// marks none.
     fn take(&mut self, names: &[String]) -> bool {
         let there = names.iter().all(|name| self.has(name));
         if there {
@@ -160,8 +162,8 @@ impl Columns<'_> {
         there
     }
 
-    /// Takes the first list of columns that exists completely and returns its index; otherwise records the
-    /// missing columns.
+    /// Marks the columns of the first list that the run has completely as used, and returns the
+    /// index of the list. If there is no such list, records the missing columns.
     fn require(&mut self, lists: &[Vec<String>]) -> Option<usize> {
         let found = (0..lists.len()).find(|i| self.take(&lists[*i]));
         if found.is_none() {
