@@ -309,7 +309,8 @@ fn a_hinged_panel_is_one_mode_at_small_angles() {
     }
 }
 
-/// Modes without participation swing by themselves; a craft with such modes moves as a craft without them.
+/// Appendage modes without participation swing by themselves; a craft with such modes moves as a
+/// craft without them.
 #[test]
 fn appendage_modes_without_participation_do_not_change_the_motion_of_the_craft() {
     let mut random = Random::new(3);

@@ -34,7 +34,8 @@ fn norm(a: [f64; 3]) -> f64 {
     f64::sqrt(a.iter().map(|x| x * x).sum())
 }
 
-/// Returns v of the body in inertial components: v + 2 u x (u x v + q0 v).
+/// Returns the vector v, given in body axes, in inertial axes: v + 2 u x (u x v + q0 v), where q =
+/// (q0, u) is the craft's attitude.
 fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let [q0, x, y, z] = q;
     let inner = cross([x, y, z], v);
@@ -82,8 +83,8 @@ impl Balance {
     }
 }
 
-/// Runs with the inputs, then without force and torque to `end`. Returns the relative residuals
-/// of P, H and E.
+/// Simulates the craft with the inputs, then without force and torque to `end`. Returns the
+/// residuals of momentum P, angular momentum H and energy E, relative to their sizes.
 fn residuals(
     p: &Parameters,
     input: impl Fn(usize) -> Inputs,
@@ -195,7 +196,8 @@ fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
     random_craft(END);
 }
 
-/// Runs random craft for `most` steps; the craft whose torque changes the momentum about every axis runs for at most 1,000 steps.
+/// Simulates random craft for `most` steps, and checks the balances. The craft whose torque changes the momentum
+/// about every axis is simulated for at most 1,000 steps.
 fn random_craft(most: usize) {
     let mut excess = Vec::new();
     for seed in 0..32 {

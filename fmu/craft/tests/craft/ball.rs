@@ -63,7 +63,8 @@ pub(super) fn with_states(
     State::from_words(&words).unwrap()
 }
 
-/// At 0.01 m/s2 the liquid takes 11 s for 0.6 m; its 382 kg then have a momentum of 42 N s.
+/// At 0.01 m/s2 the detached liquid takes 11 s for 0.6 m, after which its 382 kg have a momentum of
+/// 42 N s.
 #[test]
 fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     let p = craft();
@@ -212,7 +213,8 @@ fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     assert!((out.momentum[2] - 600.0 * 25.0 + 180.0).abs() < 1e-8);
 }
 
-/// Drives a craft with pieces of thrust forwards and backwards, then without thrust, and calls the check every 0.5 s.
+/// Simulates a craft with stretches of thrust forwards and backwards, then without thrust, and
+/// calls `check` every 0.5 s.
 fn drive(
     p: &Parameters,
     seed: u64,
@@ -420,7 +422,7 @@ fn a_craft_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_de
     );
 }
 
-/// Solution of Newton's laws with the wall's force as an unknown.
+/// Accelerations and forces that solve Newton's laws with the wall's force as an unknown.
 struct Rates {
     a: V,
     w_d: V,
@@ -530,7 +532,8 @@ fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rat
     Rates { a: part(0), w_d: part(3), x_dd }
 }
 
-/// Returns a craft with two lumps anywhere within their walls; the second or both are on them.
+/// Returns a craft with two lumps (detached liquids) anywhere within their walls. The second one,
+/// or both, are on the wall.
 fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
     let p = off_axis_craft(random);
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-12).unwrap();
@@ -625,7 +628,8 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     }
 }
 
-/// The dry craft with J_a about its centre of mass, and a free particle, in inertial axes.
+/// The two bodies of the independent simulator, in inertial axes: the dry craft with J_a about its
+/// centre of mass, and the detached liquid as a free particle.
 #[derive(Clone, Copy)]
 struct Pair {
     place: V,
@@ -872,7 +876,8 @@ fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
     }
 }
 
-/// Runge-Kutta at 1 ms and a bisection where an indicator changes its sign, as hosts of Model Exchange do it.
+/// A Model Exchange host with Runge-Kutta steps of 1 ms, which bisects where an indicator changes
+/// its sign, finds the impacts and settling times of Co-Simulation.
 #[test]
 fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation() {
     let mut p = craft();

@@ -94,7 +94,8 @@ impl Craft {
         }
     }
 
-    /// Returns the tank's present inputs; the drag of its bobs does not depend on the acceleration here.
+    /// Returns the present inputs of the tank, which are the motion of the host. The drag of the
+    /// bobs does not depend on the host's acceleration here.
     fn inputs(&mut self, u: &Inputs) -> TankInputs {
         let w = self.host.w;
         let still = self.held(w, &Six::zeros());

@@ -134,7 +134,8 @@ struct Way {
     shift: f64,
 }
 
-/// Calls `step` with row, time in it and length for all communication steps, and `look` after each row.
+/// Calls `step` for each communication step, with the row of the table, the time in this row and
+/// the length of the step, s. Calls `look` after each row.
 fn drive(rows: &[Row], longest: f64, mut step: impl FnMut(&Row, f64, f64), mut look: impl FnMut()) {
     for row in rows {
         let pieces = (row.h / longest).ceil().max(1.0);
@@ -205,7 +206,8 @@ fn craft_states(p: &Parameters, rows: &[Row], way: Way) -> Vec<f64> {
     all
 }
 
-/// Returns the largest difference relative to 1 rad, 1 rad/s, or to the largest rate if that is higher.
+/// Returns the largest difference between two states, relative to 1 rad or 1 rad/s, or to the
+/// largest rate if that is larger.
 fn off(a: &[f64], b: &[f64]) -> f64 {
     let size = b.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size

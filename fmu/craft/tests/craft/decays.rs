@@ -119,8 +119,8 @@ fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breakin
     }
 }
 
-/// Returns the ranges of a tank in a craft with this thrust, after checking that the tank alone has the same
-/// under the craft's motion.
+/// Returns the ranges of validity of a tank in a craft with this thrust, after checking that the
+/// tank alone has the same ranges under the craft's motion.
 fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     let mut p = Parameters::default();
     p.tank[0] = tank;

@@ -60,7 +60,8 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
     [momentum, v(&out.angular_momentum) + center.cross(&momentum)]
 }
 
-/// The rates are integrated over two seconds by Lobatto's rule of five points, for tanks with and without modes.
+/// Checks the momentum balances, whose rates are integrated over two seconds by Lobatto's rule of
+/// five points, for draining tanks with and without modes.
 #[test]
 fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     let modes =

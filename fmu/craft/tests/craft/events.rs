@@ -128,7 +128,8 @@ struct Simulator<'a> {
 }
 
 impl Simulator<'_> {
-    /// Starts with liquid that has just left the bottom of its tank, at rest relative to it.
+    /// Starts the simulation with liquid that has just left the bottom of its tank, at rest
+    /// relative to the tank.
     fn new(case: &Case) -> Simulator<'_> {
         let Case { p, u, .. } = case;
         let x = Spacecraft::new(p, u, 0.0, 1e-12).unwrap().continuous_states();
@@ -256,8 +257,8 @@ impl Simulator<'_> {
         y
     }
 
-    /// Returns a number that is positive until the liquid meets the wall from inside, is released, or is
-    /// pressed enough for its drag.
+    /// Returns a number that is positive until the next event: until flying liquid meets the wall
+    /// from inside, sliding liquid is released, or light liquid is pressed enough for its drag.
     fn distance_to_event(&self, y: &Coordinates) -> f64 {
         let InTank { rate, gradient, f, .. } = self.in_tank(y);
         match self.mode {
@@ -432,7 +433,8 @@ fn default_case() -> Case {
     Case { p, u, end: 10.0 }
 }
 
-/// Before 0.6.0 an impact of case 12 in mid-air made an error of 0.01 with steps of 0.5 s.
+/// Impacts equal those of an independent simulator for all communication steps. Before 0.6.0 an
+/// impact of case 12 in mid-air made an error of 0.01 with steps of 0.5 s.
 #[test]
 fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
     let cases = every_or(&[0, 3, 6, 12], 0..13).into_iter().map(|seed| (seed, case(seed)));
@@ -464,7 +466,8 @@ pub(super) struct Method {
     /// Relative and absolute tolerance of a step; 0 for steps of the length `longest`.
     pub tolerance: f64,
     pub longest: f64,
-    /// True if events are located within a step. Otherwise they are handled at its end.
+    /// True if the integrator locates events within a step. Otherwise events are handled at the end
+    /// of the step.
     pub locates: bool,
 }
 
@@ -608,7 +611,8 @@ impl Equations for Own<'_> {
     }
 }
 
-/// Simulates with a host that integrates itself. Returns the outputs at the end and the number of impacts.
+/// Simulates the case with a Model Exchange host that integrates by `method`. Returns the outputs
+/// at the end and the number of impacts.
 fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     let craft = Spacecraft::new(&case.p, &case.u, 0.0, 1e-12).unwrap();
     let start = craft.continuous_states();
@@ -685,8 +689,9 @@ fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
 #[derive(Debug, Default)]
 struct Figures {
     craft: usize,
-    /// Number of craft left out. Their liquid settles, or a change of the thrust by a factor of 1 + 1e-7 changes the
-    /// result by more than 1e-3 or the number of impacts.
+    /// Number of craft that are left out of the comparison. Their liquid settles, or a change of
+    /// the thrust by a factor of 1 + 1e-7 changes the result by more than 1e-3 or the number of
+    /// impacts.
     settled: usize,
     too_sensitive: usize,
     impacts: usize,

@@ -133,7 +133,8 @@ fn liquid_masses_beyond_the_fill_table_are_refused() {
     }
 }
 
-/// Returns the number of internal steps that one step of 2 s takes.
+/// Returns the smallest number of internal steps for which `is_enough` is true, that is, the number
+/// that one step of 2 s takes.
 fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
     let (mut few, mut enough) = (0, 1 << 12);
     while enough - few > 1 {

@@ -44,8 +44,8 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     bodies
 }
 
-/// Returns the unit vector across the plane of a mode that swings in one, tank axes, and its hinge relative
-/// to the tank's origin.
+/// Returns for a planar mode the unit vector across its plane, in tank axes, and for every mode its
+/// hinge relative to the tank's origin.
 fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     let direction = V::new(tank.direction[n][0], tank.direction[n][1], 0.0);
     let on_axis = V::z() * tank.hinge[n];
@@ -57,7 +57,8 @@ fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     (Some(across), on_axis - across * tank.arm[n])
 }
 
-/// Returns a pivot's torque: the spring that turns the body's axis to the z axis, damping and dry friction.
+/// Returns the torque of the craft's pivot: of the spring that turns the body's z axis to the
+/// inertial z axis, of damping and of dry friction.
 fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     let upright = rotation(&x[..4]).inverse() * V::z();
     let pull = V::new(p.pivot.k[1] * upright.x, p.pivot.k[0] * upright.y, 0.0);
@@ -141,7 +142,8 @@ struct Shape {
     rate: V,
     q: V,
     q_d: V,
-    /// dz/d|q|^2 and its derivative
+    /// The derivative dz/d|q|^2 of the surface's height by the square of the displacement, followed
+    /// by the second derivative.
     slope: f64,
     bend: f64,
     /// Half the gradient of the left side divided by l, and the terms of the second derivative of the left side without x''.
@@ -484,7 +486,8 @@ fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     }
 }
 
-/// Bobs on other surfaces than spheres, some in planes, with the force of the surface as unknown.
+/// Compares bobs on other surfaces than spheres, some in planes, with Newton's law in which the
+/// force of the surface is an unknown.
 #[test]
 fn bobs_on_surfaces_follow_newtons_law_with_the_surface_as_a_constraint() {
     let mut compared = 0;

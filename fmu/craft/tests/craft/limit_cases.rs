@@ -29,7 +29,8 @@ pub fn reason(tank: &Tank, motion: Motion) -> LimitedBy {
     seen.limited_by
 }
 
-/// An upright cylinder of random size, on its axis, with angle limits, and a motion well inside of all limits.
+/// An upright cylinder of random size, on its own axis, with limits of the slosh angle, and a
+/// motion that is well inside of all limits.
 struct Case {
     tank: Tank,
     motion: Motion,
@@ -72,8 +73,8 @@ impl Case {
         self.motion.axial / self.tank.length[0] + self.tank.k[0] / self.tank.mass[0]
     }
 
-    /// Returns the rate at which the first of the two limits by spin is reached, by formulas other than the
-    /// product's.
+    /// Returns the spin rate, rad/s, at which the first of the two limits by spin is reached, by
+    /// formulas other than the ones that are tested.
     fn largest_spin(&self) -> f64 {
         let radius = self.tank.wave[0] * (XI * XI - 1.0) / 2.0;
         let kh = (radius / (XI * self.tank.length[0])).atanh();

@@ -9,7 +9,7 @@ use super::random::Random;
 type V = Vector3<f64>;
 type M = Matrix3<f64>;
 
-/// A body: mass, centre of mass from O, and inertia about the centre of mass.
+/// A rigid body: its mass, its centre of mass from O, and its inertia about the centre of mass.
 type Body = (f64, V, M);
 
 fn point(m: f64, s: V) -> M {

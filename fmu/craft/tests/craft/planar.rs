@@ -230,8 +230,9 @@ fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_m
 
 type V = Vector3<f64>;
 
-/// Returns momentum and angular momentum about the inertial origin, and energy, of a body with its tanks, from
-/// positions and velocities of every mass. This sum is independent of the outputs.
+/// Returns the momentum and the angular momentum about the inertial origin, and the energy, of a
+/// craft with its tanks, computed from positions and velocities of every mass. This sum is
+/// independent of the craft's outputs.
 fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
     let v = |at: usize| V::from_column_slice(&x[at..at + 3]);
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(x[0], x[1], x[2], x[3]));

@@ -56,8 +56,8 @@ impl Random {
         tank
     }
 
-    /// Makes the drag of a tank follow acceleration and amplitude: every law; half the bobs with drag that grows, half of
-    /// them with waves that break.
+    /// Makes the drag of a tank's bobs follow acceleration and amplitude, by every law. Half of the
+    /// bobs have drag that grows with the amplitude, and half of these have waves that break.
     pub fn follow(&mut self, tank: &mut Tank) {
         tank.damping_law = DampingLaw::ALL[self.below(3)];
         // Wide enough for differences of the kink there is without it at reversed thrust.
@@ -220,8 +220,8 @@ impl Random {
     }
 }
 
-/// A tank with a table: an upright cylinder of 0.45 m radius, `modes` modes, rotated and off the centre. An odd number
-/// of modes has damping ratios in the table.
+/// Returns a tank with a fill table: an upright cylinder of 0.45 m radius with `modes` modes,
+/// rotated and off the craft's centre. With an odd number of modes the table has damping ratios.
 pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
     let mut tank = Tank { modes, diameter: 0.0, ..random.tank() };
     let mut table = FillTable { points: POINTS, ..tank.fill };
@@ -250,8 +250,9 @@ pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
     tank
 }
 
-/// A craft with one to three draining tanks and one that stays; from seed 20 on with surfaces other than spheres, from
-/// seed 40 on with those of the fill.
+/// Returns a craft with one to three draining tanks and one tank that keeps its liquid. From seed
+/// 20 on bobs move on surfaces other than spheres, and from seed 40 on these surfaces depend on the
+/// fill.
 pub fn draining_craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();

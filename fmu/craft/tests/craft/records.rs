@@ -109,7 +109,8 @@ pub fn tank_parameters(record: &Value) -> TankParameters {
     TankParameters { tank: tank(&record["tank"]), ..TankParameters::default() }
 }
 
-/// Returns an input from knot k to the next: the sum of the terms for this port.
+/// Returns an input of the craft from knot k to the next, as value and slope: the sum of those
+/// `terms` that belong to `port`.
 fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
     let knot = |k: usize| k as f64 * STEP;
     let mut ends = [[0.0; 3]; 2];

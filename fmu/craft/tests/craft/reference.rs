@@ -26,8 +26,8 @@ impl Deviations {
         assert_eq!(*scale, largest);
     }
 
-    /// Differences beyond the digits that the record promises for a signal. The record's numbers
-    /// are rounded to 14 digits, which `digits_of` includes.
+    /// Lists the signals whose difference from the record exceeds the digits that the record
+    /// promises. The record's numbers are rounded to 14 digits, which `digits_of` includes.
     fn excess(&self, record: &Value) -> Vec<String> {
         let name = record["name"].as_str().unwrap();
         let mut excess = Vec::new();

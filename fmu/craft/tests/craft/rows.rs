@@ -210,7 +210,8 @@ fn error_of_restarts(h: f64, tolerance: f64) -> f64 {
     angles.map(|i| (found[i] - exact[i]).abs()).fold(0.0, f64::max)
 }
 
-/// The allowed error of a short step is proportional to its length.
+/// The allowed error of a short step is proportional to its length, so that many short steps
+/// together stay within the tolerance.
 #[test]
 fn short_steps_between_changes_of_inputs_are_within_the_solver_tolerance() {
     for h in [0.1, 0.05, 0.02, 0.005] {

@@ -233,7 +233,8 @@ fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
     }
 }
 
-/// Gains of the attitude loop over I: 0.2 rad/s and 0.7.
+/// Gain K_p of the attitude loop over the inertia I, 1/s2, and, in the next constant, gain K_d over
+/// I: the loop has 0.2 rad/s and the damping ratio 0.7.
 const K_P: f64 = 0.04;
 const K_D: f64 = 0.28;
 

@@ -88,8 +88,8 @@ fn craft_with_full_spheroids_nutate_at_the_rates_of_poincare() {
     }
 }
 
-/// (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda + (A - C) C' = 0, with C' - i K/Omega in place of C' if the liquid
-/// has friction.
+/// Returns the rates lambda that solve (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda +
+/// (A - C) C' = 0, with C' - i K/Omega in place of C' if the liquid has friction.
 fn closed_form([across, axial, m, a, c]: [f64; 5], by_friction: C) -> [C; 3] {
     let (inner, whole) = (m * (a * a + c * c) / 5.0, 2.0 * m * a * a / 5.0);
     let shared = 2.0 * m * a * c / 5.0;
@@ -227,7 +227,8 @@ const FORCES: [[f64; 5]; 48] = [
     [0.5, 0.3, 3.0, -4.19429, -2.11511],
 ];
 
-/// A cylinder whose liquid turns with it, with C and K - omega_0^2 over Omega^2.
+/// Returns a cylinder whose liquid turns with it, and its inputs, with the coefficients C and (K -
+/// omega_0^2)/Omega^2 of the first mode.
 fn cylinder(fill: f64, beta: f64, c: f64, stiffness: f64) -> (TankParameters, TankInputs) {
     let mut p = TankParameters::default();
     p.tank = Tank {
@@ -374,8 +375,8 @@ fn the_numbers_of_the_spin_have_derivatives() {
     }
 }
 
-/// The liquid starts at rest in a tank that turns at Omega about its axis: Omega (1 - exp(-t decay)), with a torque of
-/// I Omega decay exp(-t decay) on the tank.
+/// The liquid starts at rest in a tank that turns at Omega about its axis. It spins at Omega (1 -
+/// exp(-t decay)), and its torque on the tank is I Omega decay exp(-t decay).
 #[test]
 fn liquid_spins_up_with_its_tank_at_the_rate_of_its_decay() {
     let mut p = TankParameters::default();

@@ -287,7 +287,8 @@ impl Lagrangian<'_> {
     }
 }
 
-/// Weights of the central difference of seventh order: number of steps from the centre, and weight.
+/// The central difference of the sixth order: for each pair of points the number of steps from the
+/// centre, and the weight.
 const DIFFERENCES: [(f64, f64); 6] = [
     (1.0, 0.75),
     (2.0, -0.15),

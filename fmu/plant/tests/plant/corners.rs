@@ -45,8 +45,9 @@ fn table(rng: &mut fastrand::Rng, varies: bool) -> Vec<Row> {
     (0..8).map(row).collect()
 }
 
-/// The default bench with every slosh model and friction law; a half each with drag that grows, waves that break, a ring
-/// baffle, a tilted bench, friction that depends on direction and angle, a spring, and a wheel at its limits.
+/// Returns parameters of the default bench with every slosh model and friction law. One half each
+/// has drag that grows with the amplitude, waves that break, a ring baffle, a tilted bench,
+/// friction that depends on direction and angle, a spring, and a wheel at its limits.
 fn parameters(rng: &mut fastrand::Rng) -> Parameters {
     let slosh = SloshModel::ALL[rng.usize(..SloshModel::ALL.len())];
     let friction = FrictionModel::ALL[rng.usize(..FrictionModel::ALL.len())];

@@ -6,7 +6,8 @@ use super::common::bench;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
 const G: f64 = 9.81;
-/// Balances hold up to the rounding errors of some thousand steps.
+/// Tolerance of the balances, relative to the energy throughput: the rounding errors of some
+/// thousand steps.
 const TOLERANCE: f64 = 1e-13;
 
 /// Returns 5 kg of liquid with a mode along the tangent, one askew and one along the radius.

@@ -203,8 +203,8 @@ fn motion_before_sliding_runs_through_closed_loops() {
     assert!(third.iter().all(|(_, friction, _)| friction.abs() < 0.8 * G_MAX));
 }
 
-/// Returns the friction on the way up minus that on the way down at the mean rate, N m, at a frequency of the
-/// rate in rad/s.
+/// Returns the friction torque while the rate rises minus the friction torque while it falls, N m,
+/// both at the mean rate. The rate oscillates with `frequency`, rad/s.
 fn lag(frequency: f64) -> f64 {
     let mut p = bench(SloshModel::Frozen);
     // Stribeck's effect alone: within w_s, without viscous friction's share.

@@ -3,7 +3,8 @@
 use super::*;
 use crate::variable::Access;
 
-/// Returns the level of a vessel after `h` seconds with a leak of k = 1/2.
+/// Returns the level of a vessel, m, after `h` seconds with a leak of k = 1/2 1/s, from the level
+/// `x` and the inflow `q` with its slope.
 fn level(x: f64, q: f64, slope: f64, h: f64) -> f64 {
     let e = (-0.5 * h).exp();
     x * e + 2.0 * q * (1.0 - e) + 2.0 * slope * (h - 2.0 * (1.0 - e))

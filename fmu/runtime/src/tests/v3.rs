@@ -28,9 +28,11 @@ fn reference(name: &str) -> u32 {
 struct TestHost {
     instance: Option<usize>,
     lines: Vec<(fmi3Status, String, String)>,
-    /// Times of intermediate updates, and whether inputs could be set then.
+    /// Times of the intermediate updates that the host has received, each with true if it could set
+    /// inputs then.
     updates: Vec<(f64, bool)>,
-    /// The force that the host sets at the end of a part of the step.
+    /// The force that the host sets in an intermediate update, for the end of the part of the step
+    /// that follows.
     force: Option<f64>,
     wish: Option<f64>,
     statuses: Vec<fmi3Status>,

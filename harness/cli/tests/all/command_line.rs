@@ -28,8 +28,8 @@ fn files(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Asserts that a command fails with one line that has all of `words`, and leaves the directory unchanged. A
-/// line with the columns that are used may come before it.
+/// Asserts that a command fails with one line that contains all of `words`, and leaves the
+/// directory unchanged. A line that lists the columns in use may come before.
 fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     let before = files(directory);
     let output = output();
@@ -189,7 +189,8 @@ fn runs_beyond_any_memory_are_refused() {
     }
 }
 
-/// For example a plan with 9e18 random runs.
+/// Numbers of runs or steps that need too much memory, for example a plan with 9e18 random runs,
+/// are refused before anything is allocated.
 #[test]
 fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_allocation() {
     let directory = tempfile::tempdir().unwrap();

@@ -441,8 +441,8 @@ fn units_of_a_parameter_set_are_converted_or_refused() {
     }
 }
 
-/// Returns a recording of a sweep from 1 to 3 Hz in 100 s and a response; `times` and `values` are factors on
-/// times and values.
+/// Returns a recording of a torque sweep from 1 to 3 Hz in 100 s and of a response to it. `times`
+/// and `values` are factors by which its times and values are multiplied.
 fn sweep(times: f64, values: f64) -> String {
     let mut text = String::from("time,tau_cmd,omega\n");
     for k in 0..=5000 {

@@ -291,7 +291,8 @@ macro_rules! targets {
         }
     )*
 
-        /// Runs the long form of the targets in HUBSLOSH_FUZZ_TARGETS, or of all.
+        /// Fuzzes the readers that HUBSLOSH_FUZZ_TARGETS names, or all of them, with as many inputs
+        /// as HUBSLOSH_FUZZ_INPUTS says.
         #[test]
         #[ignore = "takes long: .ci/fuzz-readers"]
         fn fuzz_campaign() {

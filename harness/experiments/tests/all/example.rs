@@ -1,4 +1,4 @@
-//! The example in each FMU's `extra` folder is the FMU's.
+//! Tests that the example in each FMU's folder `extra` belongs to the FMU.
 
 use std::path::PathBuf;
 

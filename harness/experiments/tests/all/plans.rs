@@ -6,7 +6,7 @@ use host::fmu::Fmu;
 use pack::packed_for_tests;
 use rayon::prelude::*;
 
-/// Plans that leave the range of a model; their texts say why.
+/// Built-in plans whose runs leave the range of a model; the text of each of these plans says why.
 const BEYOND: [&str; 7] = [
     "thesis",
     "thesis_models",
@@ -17,7 +17,8 @@ const BEYOND: [&str; 7] = [
     "bench_damping",
 ];
 
-/// Selects the runs to simulate: from many those with the largest torque, from random draws every twentieth.
+/// Selects the runs of a plan that the test simulates: those with the largest torque if there are
+/// many, and every twentieth of random draws.
 fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
     let largest = cases.iter().filter_map(|case| case.amplitude).fold(0.0, f64::max);
     match cases.len() {

@@ -1,4 +1,5 @@
-//! FMUs 3.0 with arrays: how long they are is set like any other parameter.
+//! FMUs 3.0 with array variables. The parameter that determines the length of the arrays is set
+//! like any other parameter.
 
 use experiments::profile::Torque;
 use experiments::run::{Run, parameters};

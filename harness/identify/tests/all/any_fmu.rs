@@ -23,7 +23,7 @@ use std::io::Write;
 use crate::fmu_twin::{self, SensorErrors};
 
 const STEP: f64 = 0.05;
-/// Moment of inertia, kg·m², and viscous coefficient, N·m·s.
+/// True moment of inertia of the hub, kg·m², and true viscous coefficient of its bearing, N·m·s.
 pub const TRUTH: (f64, f64) = (0.35, 0.05);
 const NOISE: f64 = 1e-3;
 const BIAS: f64 = 4e-3;

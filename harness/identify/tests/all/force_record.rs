@@ -206,7 +206,8 @@ fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)
     result.parameters.iter().map(|(name, p)| (name.clone(), p.interval, truth(name))).collect()
 }
 
-/// Asserts that the fit is accepted, and that each estimate is within 4 standard deviations of the true value.
+/// Asserts that the model fits the record, and that each estimate is within 4 standard deviations
+/// of the true value.
 fn holds(tank: &Tank, result: &Identification) {
     assert_eq!(result.fits, Some(true), "{:#?}", result.verdict);
     for (name, [low, high], truth) in compared(tank, result) {
@@ -298,8 +299,8 @@ impl Moving {
         -rest / (1.0 + slope * slope + own * q * q)
     }
 
-    /// Rows of time, specific force along x and z, angular rate and acceleration about y, and Fx, Fz, My about the reference point, in the
-    /// tank's axes.
+    /// Returns rows of time, specific force along x and z, angular rate and acceleration about y,
+    /// and the loads Fx, Fz and My about the reference point, in the tank's axes.
     fn rows(&self, seconds: f64, step: f64) -> Vec<[f64; 8]> {
         let mut solver = Rk4::new(*self, 0.0, Vector2::new(0.0, 0.0), seconds, step / 12.0);
         solver.integrate().unwrap();

@@ -25,7 +25,8 @@ const ASYMMETRY: f64 = 0.15;
 /// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, rad/s.
 const NOISE: f64 = 4.066e-4;
 
-/// A push of 0.1 N·m for 5 s forwards (1) or backwards (−1), and the free decay to rest.
+/// Returns a recording of a push of 0.1 N·m for 5 s forwards (`way` 1) or backwards (−1), and of
+/// the free decay to rest.
 pub fn push(seed: u64, way: f64) -> Recording {
     let time: Vec<f64> = (0..=3000).map(|k| 0.02 * f64::from(k)).collect();
     let tau: Vec<f64> =
@@ -147,7 +148,8 @@ fn a_gyro_bias_of_5_degrees_per_second_does_not_mislead_the_friction_fit() {
     assert_eq!(wrong(&SETS[0], 4, 0.087, ASYMMETRY), [""; 0]);
 }
 
-/// The tank counts as empty unless its liquid is stated, and the verdict says so.
+/// If the settings do not state how much liquid is in the tank, the tank counts as empty, and the
+/// verdict says so.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn all_inertia_is_the_hubs_unless_the_liquid_is_stated() {

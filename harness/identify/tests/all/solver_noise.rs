@@ -91,7 +91,8 @@ fn xml(exchange: bool) -> String {
     )
 }
 
-/// r, v, phi and w change at these rates, by the equations in `adaptive.c` with m = 1, L = 1.
+/// Returns the rates of change of r, v, phi and w by the equations in `adaptive.c` with m = 1 and L
+/// = 1.
 fn rates([r, v, phi, w]: [f64; 4], [k, d, c]: [f64; 3], a: f64) -> [f64; 4] {
     let g = 9.81;
     [
@@ -102,7 +103,8 @@ fn rates([r, v, phi, w]: [f64; 4], [k, d, c]: [f64; 3], a: f64) -> [f64; 4] {
     ]
 }
 
-/// A free swing from the true start, with noise of `scale` times [`NOISE`], by Runge and Kutta's method in 100 steps a row, whose error is below 1e-9.
+/// Records a free swing from the true start, with noise of `scale` times [`NOISE`]. Runge and
+/// Kutta's method with 100 steps a row has an error below 1e-9.
 pub fn record(seed: u64, scale: f64) -> Record {
     let noise = NOISE.map(|noise| scale * noise);
     let [k, d, c, r, phi] = TRUTH.map(|(_, value)| value);
@@ -150,7 +152,8 @@ fn found(fmu: &Adaptive, question: &Question, seed: u64, scale: f64) -> Identifi
     identify(&model, question, &[record(seed, scale)], &mut |_| {}).unwrap()
 }
 
-/// Returns the number of intervals that contain the true value, and the number of intervals that are given.
+/// Returns the number of the given intervals that contain the true value, and the number of
+/// intervals that are given.
 fn held(found: &Identification) -> (usize, usize) {
     let given = TRUTH.iter().filter(|(name, _)| found.parameters[*name].determined);
     let holds = |(name, truth): &&(&str, f64)| {

@@ -38,7 +38,7 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
         .unwrap()
 }
 
-/// Options with a torque that is known to be linear between rows.
+/// Returns options of a fit in which the torque is known to be linear between rows.
 fn options() -> Options {
     Options {
         models: vec!["linear".into()],
@@ -50,7 +50,7 @@ fn options() -> Options {
     }
 }
 
-/// Options with an unknown intersample behaviour of the torque.
+/// Returns options of a fit that has to find the intersample behaviour of the torque.
 fn of_any_torque() -> Options {
     Options { intersample: None, ..options() }
 }
@@ -96,7 +96,8 @@ fn identify_finds_damping_that_grows_with_the_amplitude() {
     }
 }
 
-/// Waves break at a steepness of 0.63, which is 23°.
+/// Settings of a twin whose waves break from a steepness of 0.63 on, which the first mode reaches
+/// at a slosh angle of 23°.
 const BREAKS: [(&str, &str); 2] =
     [("slosh.zeta_breaking", "0.04"), ("slosh.breaking_steepness", "0.63")];
 

@@ -23,7 +23,7 @@ fn torque(k: usize) -> i64 {
     (37 * k % 200) as i64 - 100
 }
 
-/// Returns ten times the rate in deg/s, an integer.
+/// Returns the rate in row `k` of the test recording in tenths of a degree per second, an integer.
 fn tenths(k: usize) -> i64 {
     (13 * k % 50) as i64 - 25
 }

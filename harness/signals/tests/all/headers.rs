@@ -89,7 +89,7 @@ struct Column {
     below: String,
     option: String,
     cells: Vec<String>,
-    /// Values in SI, if the file states the unit.
+    /// Values of the column in SI; `None` if the file does not state the unit.
     truth: Option<Vec<f64>>,
 }
 

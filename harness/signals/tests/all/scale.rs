@@ -28,7 +28,7 @@ const REFUSED: f64 = 1e-3;
 #[derive(Clone, Default)]
 struct Truth {
     columns: String,
-    /// Times from the first one, s; rows at the end may be cut off.
+    /// True times of the rows from the first row, s. Rows at the end of a file may be cut off.
     time: Vec<f64>,
     is_unstated: bool,
 }

@@ -6,7 +6,8 @@ use hubslosh_tank::Tank;
 use hubslosh_tank::modal::Damping;
 use hubslosh_tank::parameters::{Liquid, tank_damping};
 
-/// Kinematic viscosity and specific force within the range of the sphere's correlation for the tanks below.
+/// Kinematic viscosity, m2/s, and specific force, m/s2, at which the tanks below are within the
+/// range of the sphere's correlation.
 const SLOW: [f64; 2] = [1e-6, 0.3];
 
 fn at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
@@ -19,8 +20,9 @@ fn of(shape: &str) -> Tank {
     tank(&format!("density = 1000.0\n{shape}"))
 }
 
-/// Name, tank, liquid. A cone, a sphere and a torus have one correlation at every fill, a box has none, a cylinder two.
-/// Capsule, cylinder with a dome, cone with a cylinder and dish leave their shapes at a tangent or a corner.
+/// Name, tank, and liquid of the tests. A cone, a sphere and a torus have one correlation at every
+/// fill, a box has none, a cylinder two. The walls of capsule, cylinder with a dome, cone with a
+/// cylinder and dish are a measured shape up to a tangent or a corner.
 const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ("sphere", "shape = { sphere = { radius = 0.3 } }", SLOW),
     (

@@ -6,7 +6,8 @@ use crate::common::tank;
 use hubslosh_tank::parameters::{Liquid, tank_damping};
 use hubslosh_tank::{ModalData, Mode, Tank};
 
-/// A tank of each kind, lengths behind an `@`, and its fill: closed forms, the integral equation, full, thin.
+/// Tanks of each kind with a fill; an `@` marks lengths that are scaled. They are solved in closed
+/// form or by the integral equation, and are full or thin.
 const TANKS: [(&str, f64); 10] = [
     ("shape = { cylinder = { radius = @0.7, height = @2.0 } }", 0.6),
     ("shape = { annulus = { inner_radius = @0.3, outer_radius = @0.7, height = @2.0 } }", 0.6),

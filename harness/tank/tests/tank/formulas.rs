@@ -11,8 +11,9 @@ fn laminar(mode: &Mode, nu: f64, g: f64) -> f64 {
     damping::laminar(mode.beta, nu, (g * mode.lambda).sqrt())
 }
 
-/// Stephens is 1.493 times the laminar layer at every depth; its tanh(1.84 x)^(-1/4) is the layer's
-/// omega. 1.84 for 1.8412 makes 0.2 %.
+/// Stephens's formula gives 1.493 times the damping of the laminar layer at every depth; its factor
+/// tanh(1.84 x)^(-1/4) comes from the layer's omega. The rounded 1.84 in place of 1.8412 makes 0.2
+/// %.
 #[test]
 fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     for fill in [0.02, 0.05, 0.0815, 0.15, 0.25] {
@@ -125,7 +126,8 @@ fn flat_surface_is_exact_in_a_cylinder() {
     assert!(!strong.unknown, "nothing is known there, but it is 1e-5 of omega^2");
 }
 
-/// Omega_1^2 = omega_1^2 rho R^3/sigma, deep cylinder: Bond numbers down, contact angles along.
+/// Values of Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder, for Bond numbers (rows) and
+/// the contact angles of this constant (columns), degrees.
 const ANGLES: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
 const MENISCUS: [(f64, [f64; 7]); 6] = [
     (0.0, [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263]),

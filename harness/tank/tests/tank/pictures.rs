@@ -5,7 +5,8 @@ use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::third_order::Overlaps;
 use hubslosh_tank::{Tank, picture, table};
 
-/// A drawing and the file that it is committed as; with `HUBSLOSH_DRAW` set it is written instead, to be looked at.
+/// Asserts that a drawing equals the committed file. If `HUBSLOSH_DRAW` is set, the drawing is
+/// written to this file instead, so that it can be looked at.
 fn is_drawn(svg: &str, file: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     if std::env::var_os("HUBSLOSH_DRAW").is_some() {

@@ -4,8 +4,8 @@ use crate::common::{number, reference, tank, toml};
 use hubslosh_tank::{Mode, Rest};
 use serde_json::Value;
 
-/// Largest deviations of modes and rest from the reference: lambda and l (relative), masses (of
-/// m_liq), m H (of m_liq R), inertias (of m_liq R^2), waves (of R).
+/// Returns the largest deviations of the modes and the fixed mass from the reference: lambda and l
+/// (relative), masses (of m_liq), m H (of m_liq R), inertias (of m_liq R^2), waves (of R).
 fn deviation(
     case: &Value,
     modes: &[Mode],

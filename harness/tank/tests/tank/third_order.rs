@@ -3,7 +3,8 @@
 use crate::liquid_figure::resonances;
 use hubslosh_tank::third_order::Overlaps;
 
-/// Excited modes of each azimuthal number: the terms fall as n^-5, 40 leave 1e-7.
+/// Number of excited modes of each azimuthal number in the sums. The terms fall as n^-5, so that 40
+/// modes leave an error of 1e-7.
 const COUNT: usize = 40;
 
 /// The tank is the bench's, R = 81.5 mm. The expected values have three digits and come from an independent derivation; the
