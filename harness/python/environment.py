@@ -23,7 +23,7 @@ OLDEST = (3, 11)
 
 
 def target() -> Path:
-    """Return the directory for built things: Cargo's."""
+    """Return the directory for files that are built: Cargo's target directory."""
     root = Path(__file__).resolve().parents[2]
     return root / os.environ.get("CARGO_TARGET_DIR", "target")
 
@@ -43,10 +43,10 @@ def ensure(directory: Path, requirements: Path, *, hashes: bool = True) -> Path:
 
 
 def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
-    """Run this program again, in the environment of the ``requirements-<name>.txt`` next to it.
+    """Run this program again in the environment of the ``requirements-<name>.txt`` next to it.
 
-    ``missing`` is what it could not import; where it is in that environment already, the
-    environment is damaged, and the script ends with that.
+    ``missing`` is the package that could not be imported. If the program runs in that environment
+    already, the environment is damaged, and the program ends with a message that says so.
     """
     here = target() / "python" / name
     if Path(sys.prefix) == here:
@@ -92,7 +92,7 @@ def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
 def _alone(lock: Path) -> Iterator[None]:
     """Wait until no other process is between here and the end of its ``with``.
 
-    The system lets go of the lock when the process ends, however it ends.
+    The operating system releases the lock when the process ends, however it ends.
     """
     lock.parent.mkdir(parents=True, exist_ok=True)
     with lock.open("a") as file:

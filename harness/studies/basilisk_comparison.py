@@ -66,7 +66,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Case:
-    """Inputs of both codes."""
+    """Inputs of one comparison, for our FMU and for Basilisk."""
 
     start: Start
     h: float  # m, fill
@@ -82,12 +82,12 @@ class Case:
 
     @property
     def damping(self) -> float:
-        """Force of the liquid's damping per velocity, N·s/m."""
+        """Viscous damping coefficient of the slosh mass, N·s/m."""
         return 2 * self.zeta * self.omega_1 * self.m
 
 
 def starts(length: float) -> dict[str, Start]:
-    """Return the ways to begin, for a pendulum of ``length`` (m)."""
+    """Return the starts of the motions that are compared, for a pendulum of ``length`` (m)."""
     cone = np.arcsin(0.3)
     conical = (GRAVITY / (length * np.cos(cone))) ** 0.5  # of a conical pendulum, rad/s
     return {
@@ -116,7 +116,7 @@ def case(fmu: Path, start: str, h: float, zeta: float) -> Case:
 
 
 def ours(fmu: Path, given: Case, tolerance: float = TOLERANCE) -> Signals:
-    """Return our signals every 20 ms, steps of 20 ms."""
+    """Return the signals of our FMU every 20 ms, simulated in steps of 20 ms."""
     start = given.start
     settings = {
         "slosh.model": "spherical",
@@ -156,7 +156,8 @@ def bob(craft: spacecraft.Spacecraft, pendulum: sphericalPendulum.SphericalPendu
 def basilisk(given: Case, mass: float, integrator: str = "RKF78", step: float = 1e-3) -> Signals:
     """Return Basilisk's signals every 20 ms.
 
-    mass: of the hub, kg. integrator: its name in Basilisk. step: s.
+    ``mass`` is the mass of the hub, kg, ``integrator`` the integrator's name in Basilisk, ``step``
+    its step, s.
     """
     simulation = SimulationBaseClass.SimBaseClass()
     process = simulation.CreateNewProcess("process")
@@ -246,7 +247,7 @@ def column(x: float, y: float, z: float) -> list[list[float]]:
 
 
 def differences(a: Signals, b: Signals) -> list[float]:
-    """Return each signal's largest difference, relative to its maximum in ``b``."""
+    """Return the largest difference of each signal, relative to the signal's maximum in ``b``."""
     return [np.abs(a[name] - b[name]).max() / np.abs(b[name]).max() for name in b]
 
 
@@ -257,9 +258,9 @@ def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
 
 
 def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]:
-    """Compare everything at one mass.
+    """Compare all cases at one mass of the hub.
 
-    Returns the table's lines, for each start the largest differences over both fills and every
+    Return the table's lines, for each start the largest differences over both fills and every
     damping ratio, and the largest difference of all.
     """
     names = list(starts(1.0))
@@ -280,7 +281,7 @@ def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]
 
 
 def integrators_table(fmu: Path) -> list[str]:
-    """Show the error of each integrator and its cost relative to ours."""
+    """Return the table of each Basilisk integrator's error and of its cost relative to our FMU."""
     given = case(fmu, "release far", 0.10, 0.003)
     own = ours(fmu, given)
     rows = []
@@ -306,8 +307,8 @@ def integrators_table(fmu: Path) -> list[str]:
 def rounding(fmu: Path) -> tuple[dict[str, float], float]:
     """Show how undamped motion magnifies small differences.
 
-    Returns what the next larger number in place of the start's angle makes of ours, by start, and
-    what a tolerance of 1e-12 makes of *very far*.
+    Return the change of our motion, by start, if the start's angle is the next larger number, and
+    the change of the start *very far* at a tolerance of 1e-12.
     """
     moved = {}
     for name in ("release far", "very far"):
@@ -325,7 +326,7 @@ def page(
     ulp: dict[str, float],
     looser: float,
 ) -> str:
-    """Return the page: two tables, the largest difference, and what `rounding` returns."""
+    """Return the page: two tables, the largest difference, and the results of `rounding`."""
     far, very = ulp["release far"], ulp["very far"]
     described = "\n".join(f"* *{name}*: {start.text}." for name, start in starts(1.0).items())
     return "\n".join([
@@ -402,7 +403,7 @@ def page(
 
 
 def write(out: Path, text: str, worst: float) -> None:
-    """Write the page, unless the largest difference is more than allowed."""
+    """Write the page, unless the largest difference exceeds the allowed one."""
     if worst > ALLOWED:
         sys.exit(
             f"{text}\nerror: {worst:.1e} is more than the {ALLOWED:.0e} allowed; nothing written"

@@ -69,7 +69,10 @@ class Tank:
 
 @dataclass(frozen=True)
 class Case:
-    """Inputs of both codes; segments: end (s), force (N), torque (N·m), body axes."""
+    """Inputs of one comparison, for both codes.
+
+    Each of the segments has its end (s), force (N) and torque (N·m), body axes.
+    """
 
     text: str
     segments: list[tuple[float, tuple[float, float, float], tuple[float, float, float]]]
@@ -136,12 +139,15 @@ def skew(a: np.ndarray) -> np.ndarray:
 
 
 def drag(case: Case, tank: Tank) -> float:
-    """Return the liquid's damping force per velocity, N·s/m."""
+    """Return the viscous damping coefficient of the tank's slosh mass, N·s/m."""
     return 2 * case.zeta * tank.mass * (G_REF / tank.length) ** 0.5
 
 
 def ours(fmu: Path, case: Case, start: Signals, tolerance: float = TOLERANCE) -> Signals:
-    """Return our signals every 20 ms, in steps of 20 ms; start: Basilisk's first samples."""
+    """Return the signals of our FMU every 20 ms, simulated in steps of 20 ms.
+
+    ``start`` has Basilisk's first samples.
+    """
     settings: dict[str, float | int] = {"craft.mass": case.mass, "tanks": 2}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2),
                          "yz": (1, 2)}.items():  # fmt: skip
@@ -190,7 +196,10 @@ def ours(fmu: Path, case: Case, start: Signals, tolerance: float = TOLERANCE) ->
 
 
 def basilisk(case: Case, integrator: str = "RKF78", step: float = 1e-3) -> Signals:
-    """Return Basilisk's signals every 20 ms; integrator: its name in Basilisk. step: s."""
+    """Return Basilisk's signals every 20 ms.
+
+    ``integrator`` is the integrator's name in Basilisk, ``step`` its step, s.
+    """
     simulation = SimulationBaseClass.SimBaseClass()
     process = simulation.CreateNewProcess("process")
     process.addTask(simulation.CreateNewTask("task", macros.sec2nano(step)))
@@ -244,7 +253,10 @@ def basilisk(case: Case, integrator: str = "RKF78", step: float = 1e-3) -> Signa
 
 
 def pendulum_of(case: Case, tank: Tank) -> sphericalPendulum.SphericalPendulum:
-    """Return Basilisk's pendulum; its angles start at zero, so its first axis is the bob's."""
+    """Return Basilisk's pendulum.
+
+    Its angles start at zero, so that its first axis points to where the bob starts.
+    """
     axes = tank.axes()
     first = np.array(tank.p) / np.linalg.norm(tank.p)
     rate = np.array(tank.p_dot) - first * (first @ tank.p_dot)
@@ -282,7 +294,7 @@ def cost_table(fmu: Path, exact: Signals) -> list[str]:
 
 
 def page(cases: list[str], cost: list[str], worst: float) -> str:
-    """Return the page."""
+    """Return the page with the comparison of all cases and the table of costs."""
     return "\n".join([
         "<!-- Written by harness/studies/basilisk_six.py; do not edit. -->",
         "# Comparison with Basilisk",

@@ -50,7 +50,7 @@ WINDOW, SHARE, LEAST = 2.0, 0.5, np.radians(3.0)
 
 
 def sweep(amplitude: float, noise: float) -> pd.DataFrame:
-    """Return the torque of the thesis's sweep, linear in frequency, and what else turns the hub."""
+    """Return the torque of the thesis's sweep, linear in frequency, and the other inputs."""
     time = np.arange(round(DURATION / STEP)) * STEP
     phase = 2 * np.pi * (FIRST * time + (LAST - FIRST) / (2 * DURATION) * time**2)
     columns = {"time": time, "tau_cmd": amplitude * np.sin(phase)}
@@ -60,13 +60,13 @@ def sweep(amplitude: float, noise: float) -> pd.DataFrame:
 
 
 def largest_acceleration(rate: pd.Series) -> float:
-    """Return the largest of central differences at 50 Hz, rad/s²."""
+    """Return the largest angular acceleration, rad/s², by central differences of the rate."""
     values = rate.to_numpy()
     return float(np.abs(values[2:] - values[:-2]).max() / (2 * STEP))
 
 
 def swirls(run: pd.DataFrame) -> bool:
-    """Return whether the liquid swirls in some window."""
+    """Return True if the slosh is rotary in any window of the run."""
     count = round(WINDOW / STEP)
     whole = len(run) // count * count
     swing = [
@@ -77,7 +77,7 @@ def swirls(run: pd.DataFrame) -> bool:
 
 
 def drive(model: str, growth: float, fill: float, seed: str, amplitude: float) -> pd.DataFrame:
-    """Run one sweep."""
+    """Simulate one sweep of the bench."""
     more, noise = SEEDS[seed]
     parameters = {
         "slosh.model": model,
@@ -93,7 +93,7 @@ def drive(model: str, growth: float, fill: float, seed: str, amplitude: float) -
 
 
 def case(key: tuple[str, float, float, str]) -> dict[str, object]:
-    """Return the bench's numbers of one model, growth, fill and seed."""
+    """Return the numbers of the bench for one slosh model, damping growth, fill and seed."""
     model, growth, fill, seed = key
     row: dict[str, object] = dict(
         zip(("model", "zeta_amplitude", "fill_m", "seed"), key, strict=True)
@@ -120,7 +120,10 @@ def case(key: tuple[str, float, float, str]) -> dict[str, object]:
 
 
 def cases() -> list[tuple[str, float, float, str]]:
-    """Return all cases; a linear liquid stays in its plane, whatever the seed."""
+    """Return all cases.
+
+    A linear liquid stays in its plane, whatever the seed, so it has one seed.
+    """
     every = product(MODELS, GROWTHS, FILLS, SEEDS)
     return [key for key in every if key[0] != "linear" or key[3] == "none"]
 

@@ -37,7 +37,7 @@ MEASURED = ["q[2]", "omega[1]", "q[3]", "omega[2]", "q[4]", "omega[3]"]
 
 
 def example(fill: str) -> tuple[hubslosh.UncertainModel, hubslosh.Loop]:
-    """Return the uncertain model and the loop of example 14 at a fill of both tanks."""
+    """Return the uncertain model and the loop of example 14 at a fill of both its tanks."""
     loop = telecom.loop(fill)
     return telecom.craft.uncertain(fill, RANGES, outputs=loop.names[0]), loop
 
@@ -77,7 +77,7 @@ def random_craft(seed: int) -> tuple[hubslosh.UncertainModel, hubslosh.Loop]:
 def unstable_draws(
     model: hubslosh.UncertainModel, loop: hubslosh.Loop, found: hubslosh.Certificate, draws: int
 ) -> int:
-    """Return how many of uniform random Δ within the certificate make the sampled loop unstable."""
+    """Return how many random Δ, uniform within the certificate, make the sampled loop unstable."""
     random, count, linear = np.random.default_rng(1), 0, loop.linear()
     low = np.maximum(-found.size, list(found.least.values()))
     for _ in range(draws):
@@ -87,7 +87,7 @@ def unstable_draws(
 
 
 def main() -> None:
-    """Print a row for each loop."""
+    """Print the table with a row for each loop."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--fills", nargs="*", default=telecom.FILLS)
     parser.add_argument("--craft", type=int, default=10)

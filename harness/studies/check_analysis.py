@@ -74,20 +74,20 @@ class Sweep:
         return 2 * np.pi * (self.f0 * t + (self.f1 - self.f0) / self.duration * t**2 / 2)
 
     def time_of(self, f: Real) -> Real:
-        """Time at which the sweep passes ``f``, s."""
+        """Time, s, at which the sweep passes the frequency ``f``, Hz."""
         if self.exponential:
             return np.log(f / self.f0) / np.log(self.f1 / self.f0) * self.duration
         return (f - self.f0) / (self.f1 - self.f0) * self.duration
 
     def rate(self, f: float) -> float:
-        """Rate of change of the frequency at ``f``, Hz/s."""
+        """Rate of change of the sweep's frequency at the frequency ``f``, Hz/s."""
         if self.exponential:
             return abs(f * np.log(self.f1 / self.f0) / self.duration)
         return self.mean_rate
 
     @property
     def mean_rate(self) -> float:
-        """Mean rate of change of the frequency, Hz/s."""
+        """Mean rate of change of the sweep's frequency, Hz/s."""
         return abs(self.f1 - self.f0) / self.duration
 
     @property
@@ -98,12 +98,12 @@ class Sweep:
 
     @property
     def band(self) -> tuple[float, float]:
-        """Its lowest and its highest frequency, Hz."""
+        """Lowest and highest frequency of the sweep, Hz."""
         return min(self.f0, self.f1), max(self.f0, self.f1)
 
 
 def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real) -> Complex:
-    """Fourier coefficients at the sweep's phase, in a Hann window of 24 cycles or fewer."""
+    """Fourier coefficients at the sweep's phase, in a Hann window of at most 24 cycles."""
     carrier = np.exp(-1j * sweep.phase(time))
     response = np.empty(len(grid), complex)
     for i, (f, centre) in enumerate(zip(grid, sweep.time_of(grid), strict=True)):
@@ -115,7 +115,7 @@ def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real)
 
 
 def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Complex:
-    """Blackman and Tukey's estimate, lags up to ``lag`` s, transformed at the very frequencies."""
+    """Blackman and Tukey's estimate at the frequencies of ``grid``, with lags up to ``lag`` s."""
     u, y = torque - torque.mean(), output - output.mean()
     last = min(round(lag / step), len(u) - 1)
     lags = np.arange(-last, last + 1)
@@ -135,7 +135,7 @@ def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Comp
 
 
 def features(grid: Real, response: Complex) -> Features:
-    """Antiresonance and resonance: the ends of the level's largest rise with the frequency."""
+    """Antiresonance and resonance: both ends of the largest rise of |H| (dB) with the frequency."""
     level = 20 * np.log10(np.abs(response))
     lowest = np.minimum.accumulate(level)
     high = int(np.argmax(level - lowest))
@@ -175,13 +175,13 @@ class Model:
         return np.polymul([1, self.p], pair)
 
     def response(self, grid: Real) -> Complex:
-        """H at frequencies in Hz."""
+        """Frequency response H of the model at the frequencies ``grid``, Hz."""
         s = 2j * np.pi * grid
         return np.polyval(self.numerator, s) / np.polyval(self.denominator(), s)
 
 
 def fit(grid: Real, measured: Complex) -> Model:
-    """Least squares on the complex response: poles by search, the numerator exactly for each."""
+    """Least squares on the complex response: search of poles, best numerator for each."""
     unit = 2 * np.pi * grid.mean()
     s = 2j * np.pi * grid / unit
     target = np.concatenate([measured.real, measured.imag])
@@ -209,7 +209,10 @@ def fit(grid: Real, measured: Complex) -> Model:
 
 
 def residual_of(model: Model, step: float, torque: Real, rate: Real) -> Real:
-    """Return what the model, driven with straight lines from the best initial state, leaves."""
+    """Return the measured rate minus the rate of the model.
+
+    The model gets the torque as straight lines, and the initial state with which it fits best.
+    """
     driven = signal.TransferFunction(model.numerator, model.denominator()).to_ss()
     time = np.arange(len(torque)) * step
     _, forced, _ = signal.lsim(driven, torque, time)

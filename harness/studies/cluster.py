@@ -58,22 +58,22 @@ TORQUE_COLUMNS = ("time", hubslosh.TORQUE, "tau_slope")
 
 
 class CampaignError(Exception):
-    """Reason why no run, or no further run, can start."""
+    """Reason why the runs cannot start, or cannot go on."""
 
 
 class Harness:
-    """The program ``hubslosh``, with an FMU, a plan and a directory for what comes out."""
+    """The program ``hubslosh`` with an FMU, a plan, and a directory for the results."""
 
     def __init__(self, program: Path, fmu: Path, plan: str, out: Path) -> None:
         """Store the paths; `listing` checks whether they exist."""
         self.program, self.fmu, self.plan, self.out = program, fmu, plan, out
 
     def listing(self) -> dict[str, Any]:
-        """Return what is to be run."""
+        """Return the list of the plan's runs that are to be simulated."""
         return json.loads(self._say(*self._campaign(), "--list"))
 
     def torque(self, run: Run) -> list[np.ndarray]:
-        """Return a run's torque: time (s), ``tau_cmd`` (N·m), its slope until the next row."""
+        """Return a run's torque: time (s), ``tau_cmd`` (N·m), its slope to the next row (N·m/s)."""
         with tempfile.TemporaryDirectory() as directory:
             path = Path(directory) / "torque.parquet"
             times = ("step", "sample", "stop")
@@ -84,9 +84,10 @@ class Harness:
             return [table[name].to_numpy() for name in TORQUE_COLUMNS]
 
     def analyse(self) -> bool:
-        """Write tables and report from the stored runs; whether every run is in them.
+        """Write tables and report from the stored runs.
 
-        Its words go to the terminal. It makes runs that are not there, as it always does.
+        Return True if all runs are in them. The program's output goes to the terminal. It also
+        simulates runs that are not stored, as always.
         """
         return subprocess.run([self.program, *self._campaign()]).returncode == 0
 
@@ -107,7 +108,7 @@ class Harness:
 
 
 def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
-    """Return why the file is not this run, complete, or None if it is.
+    """Return the reason why a file is not this run, complete; None if it is.
 
     The harness judges the stored runs by the same rules when it reads them.
     """
@@ -132,7 +133,10 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
 def drive_here(
     fmu: str, run: Run, torque: list[np.ndarray], columns: list[str]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
-    """Make one run: what a worker does. Returns its columns and who made it, or None and why."""
+    """Simulate one run on a worker.
+
+    Return its columns and the worker's name, or None and the reason of the failure.
+    """
     import os
     from pathlib import Path
 
@@ -164,7 +168,7 @@ class Package(WorkerPlugin):
     """The package hubslosh, without FMUs, in every worker's folder: no zip holds compiled code."""
 
     def __init__(self) -> None:
-        """Read its files; the compiled half has the name that Python looks for."""
+        """Read the package's files; the compiled half gets the name that Python looks for."""
         source = Path(hubslosh.__file__).parent
         native = Path(str(sys.modules["hubslosh._native"].__file__))
         self.files = {file.name: file.read_bytes() for file in source.iterdir() if file.is_file()}
@@ -172,7 +176,7 @@ class Package(WorkerPlugin):
         self.files[f"_native{ending}"] = native.read_bytes()
 
     def setup(self, worker: Worker) -> None:
-        """Write it on a worker and import it."""
+        """Write the package to a worker's folder, and import it there."""
         folder = Path(worker.local_directory) / "package"
         (folder / "hubslosh").mkdir(parents=True, exist_ok=True)
         for name, content in self.files.items():
@@ -182,9 +186,9 @@ class Package(WorkerPlugin):
 
 
 def prepare(client: Client, fmu: Path, sha256: str) -> str:
-    """Give every worker, those that come later too, the FMU and the package hubslosh.
+    """Give every worker, also those that start later, the FMU and the package hubslosh.
 
-    Returns the FMU's file name there. Workers that cannot host it are refused.
+    Return the FMU's file name there. Workers that cannot host the FMU are refused.
     """
     threads = client.nthreads()
     if not threads:
@@ -215,9 +219,10 @@ def prepare(client: Client, fmu: Path, sha256: str) -> str:
 def make_runs(
     client: Client, harness: Harness, made: Callable[[Run], None] = lambda run: None
 ) -> dict[str, str]:
-    """Make all runs of the plan that are not there yet; return, by name, why some failed.
+    """Simulate all runs of the plan that are not stored yet.
 
-    A run is written as soon as it comes back; then `made` hears of it.
+    Return by name why runs have failed. A run is written as soon as its worker returns it, and then
+    `made` is called with it.
     """
     store = Store.campaign(harness.out, "cluster.py")
     try:
@@ -303,7 +308,7 @@ def make_runs_in(
 
 
 def reason(error: BaseException) -> str:
-    """Return why a run failed by no word of the FMU's, for whoever planned it."""
+    """Return the reason of a run's failure other than a message of the FMU, in words for users."""
     if isinstance(error, KilledWorker):
         return f"{error.allowed_failures + 1} workers died while they made it"
     return f"{type(error).__name__}: {error}"

@@ -34,10 +34,10 @@ MOST = 1e-9
 
 
 class Killer:
-    """Kills one local worker in the middle of a run, after the first run that was made."""
+    """Kills one local worker in the middle of a run, after the first run is finished."""
 
     def __init__(self, client: Client) -> None:
-        """Wait for `made`."""
+        """Store the client; `made` kills the worker."""
         self.client = client
         self.process: int | None = None
         """The killed worker's process."""
@@ -45,7 +45,7 @@ class Killer:
         """The run that it was making."""
 
     def made(self, run: cluster.Run) -> None:
-        """Kill a worker, if none was killed yet and one is busy."""
+        """Kill a worker that is busy, unless one was killed before. It is called after each run."""
         if self.process is not None:
             return
         for address, process in self.client.run(os.getpid).items():
@@ -62,7 +62,7 @@ class Killer:
 
 
 def difference(a: str, b: str) -> float:
-    """Return how far two cells differ: numbers relatively, texts by 0 or infinity."""
+    """Return the difference of two cells: of numbers the relative one, of texts 0 or infinity."""
     if a == b:
         return 0.0
     try:
@@ -97,17 +97,18 @@ def signal_differences(one: Path, other: Path, columns: list[str]) -> dict[str, 
 
 
 def maker(path: Path) -> str:
-    """Return who made a stored run, as its notes say."""
+    """Return the program that made a stored run, from the run's metadata."""
     return (pyarrow.parquet.read_schema(path).metadata or {}).get(b"made_by", b"").decode()
 
 
 def compare(
     client: Client, ours: cluster.Harness, theirs: cluster.Harness
 ) -> tuple[dict[str, float], Killer]:
-    """Make the plan's runs in both ways; return the largest difference of every column.
+    """Simulate the plan's runs in both ways; return the largest difference of every column.
 
-    ours: by the harness. theirs: by Dask, one worker killed on the way; its directory is emptied
-    first. Columns are named file:column; those of the signals start with runs:.
+    ``ours`` is the directory of the harness, ``theirs`` that of Dask, one of whose workers is
+    killed; the latter is emptied first. Columns are named file:column; those of the signals start
+    with runs:.
     """
     shutil.rmtree(theirs.out, ignore_errors=True)
     killer = Killer(client)
@@ -131,7 +132,7 @@ def compare(
 
 
 def main() -> None:
-    """Compare, and print the worst."""
+    """Compare both ways, and print the largest differences."""
     parser = cluster.arguments("Compares a plan's runs by the harness with those by Dask.")
     parser.add_argument(
         "--out", type=Path, metavar="DIRECTORY",

@@ -55,7 +55,7 @@ def sweep(amplitude: float, seconds: float) -> pd.DataFrame:
 
 
 def runs(seconds: float) -> list[tuple[str, Parameters, pd.DataFrame]]:
-    """Return name, parameters and torque of every run."""
+    """Return the name, the parameters and the torque of every run that is compared."""
     all_runs: list[tuple[str, Parameters, pd.DataFrame]] = []
     torque = sweep(0.1, 300.0)
     for slosh, friction in itertools.product(SLOSH, FRICTION):
@@ -71,19 +71,19 @@ def runs(seconds: float) -> list[tuple[str, Parameters, pd.DataFrame]]:
 
 
 def signals(*fmus: Path) -> list[str]:
-    """Return outputs and locals, no arrays, that all builds have; not the gyro's reading."""
+    """Return the outputs and local variables that all builds have, without arrays and gyro."""
     names = [Fmu.open(fmu).names("output", "local") for fmu in fmus]
     common = set(names[0]).intersection(*names) - {"omega_imu"}
     return [name for name in names[0] if name in common and "[" not in name and "(" not in name]
 
 
 def run(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: list[str]) -> pd.DataFrame:
-    """Simulate one run."""
+    """Simulate one run with an FMU, and return the signals ``names``."""
     return simulate(fmu, parameters, torque, outputs=names, tolerance=TOLERANCE)
 
 
 def difference(one: pd.DataFrame, other: pd.DataFrame, names: list[str]) -> tuple[float, str]:
-    """Return the largest difference over its signal's maximum, and the signal."""
+    """Return the largest difference of a signal over its maximum, and the name of the signal."""
     largest = (0.0, "")
     for name in names:
         a, b = one[name].to_numpy(float), other[name].to_numpy(float)
@@ -94,7 +94,7 @@ def difference(one: pd.DataFrame, other: pd.DataFrame, names: list[str]) -> tupl
 
 
 def sensitivity(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: list[str]) -> float:
-    """Return the difference that the last bit of one parameter makes, the largest of four."""
+    """Return the largest difference that a change of a parameter's last bit makes."""
     reference = run(fmu, parameters, torque, names)
     found = 0.0
     for name, toward in itertools.product(("hub.I", "tank.r"), (0.0, math.inf)):
@@ -105,7 +105,7 @@ def sensitivity(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: 
 
 
 def main() -> int:
-    """Compare, print a table in Markdown, return 1 if something is too far apart."""
+    """Compare both builds, print a table in Markdown, and return 1 if a difference is too large."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--before", type=Path, default=RELEASE)
     parser.add_argument("--now", type=Path, default=ROOT / "dist/HubSlosh.fmu")

@@ -22,7 +22,7 @@ NUMBER = re.compile(r"-?\d+\.?\d*")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Say where the FMUs and the program are."""
+    """Add the options for the paths of the FMUs and of the program."""
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
@@ -30,12 +30,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker of tests that take seconds each."""
+    """Declare the marker of tests that take several seconds each."""
     config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests) runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the long tests, unless all are wanted."""
+    """Leave out the long tests, unless the option for all tests is given."""
     if not config.getoption("--long"):
         items[:] = [item for item in items if item.get_closest_marker("long") is None]
 
@@ -49,14 +49,14 @@ def fmu(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def program(request: pytest.FixtureRequest) -> Path:
-    """Return the program, which the package finds from here on."""
+    """Return the program ``hubslosh``, which the package uses from here on."""
     path: Path = request.config.getoption("--hubslosh").absolute()
     os.environ["HUBSLOSH"] = os.fspath(path)
     return path
 
 
 def same_picture(drawing: str, committed: Path) -> None:
-    """Compare a drawing with the book's: the same text, places to 0.2 px."""
+    """Compare a drawing with the one in the book: the same text, positions equal to 0.2 px."""
     texts = (drawing, committed.read_text(encoding="utf-8"))
     assert NUMBER.sub("0", texts[0]) == NUMBER.sub("0", texts[1])
     places = [np.array(NUMBER.findall(text), float) for text in texts]

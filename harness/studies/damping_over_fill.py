@@ -29,7 +29,7 @@ NU, GRAVITY = 1e-6, 0.3  # m²/s, m/s²
 
 
 def damping(shape: str, fills: list[str]) -> pd.DataFrame:
-    """Damping ratio of mode 1 with its interval over the fill, by ``hubslosh tank --sweep``."""
+    """Damping ratio of mode 1 at each fill, with its interval, by ``hubslosh tank --sweep``."""
     with tempfile.TemporaryDirectory() as folder:
         tank = Path(folder) / "tank.toml"
         tank.write_text(f"density = 1000\nshape = {{ {shape} }}\n", encoding="utf-8")
@@ -40,7 +40,7 @@ def damping(shape: str, fills: list[str]) -> pd.DataFrame:
 
 
 def main() -> None:
-    """Compute and draw."""
+    """Compute the damping ratios, and draw them."""
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     percent = list(range(5, 95))
     figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")

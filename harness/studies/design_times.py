@@ -31,7 +31,7 @@ RATE = 1e-3
 
 @dataclass(frozen=True)
 class Time:
-    """Time that a step took."""
+    """CPU time and elapsed time of a design step."""
 
     what: str
     count: int
@@ -54,7 +54,7 @@ HEAD = (
 
 
 def timed(what: str, count: int, step: Callable[[], Any]) -> tuple[Time, Any]:
-    """Return the time of a step, and what it returns."""
+    """Return the time that ``step`` takes, and the value that it returns."""
     before, begin = os.times(), time.monotonic()
     found = step()
     after, end = os.times(), time.monotonic()
@@ -62,7 +62,7 @@ def timed(what: str, count: int, step: Callable[[], Any]) -> tuple[Time, Any]:
 
 
 def satellite() -> tuple[Any, Any]:
-    """Return the example's modules for craft and review."""
+    """Return the modules of example 14 for the craft and for its design review."""
     sys.path.insert(0, str(EXAMPLE))
     import design_review
     import telecom
@@ -71,7 +71,7 @@ def satellite() -> tuple[Any, Any]:
 
 
 def loop_of(given: dict[str, Any]) -> Any:
-    """Return the loop of a file."""
+    """Return the control loop that a file describes."""
     import control
 
     import hubslosh
@@ -105,7 +105,7 @@ def loop_steps(loop: Any, inertia: float, runs: int, stop: float) -> list[Time]:
 
 
 def now(fills: int, points: int, runs: int, stop: float) -> tuple[list[Time], dict[str, Any]]:
-    """Return the times of this version, and the loop as a file has it."""
+    """Return the times of the design steps in this version, and the loop as a file describes it."""
     import numpy as np
 
     import hubslosh
@@ -154,7 +154,7 @@ for step in design_times.loop_steps(loop, 1150.0, int(sys.argv[3]), float(sys.ar
 
 
 def before(wheel: Path, given: dict[str, Any], runs: int, stop: float) -> str:
-    """Return the rows of an older wheel."""
+    """Return the table's rows for the version of HubSlosh in an older wheel."""
     with tempfile.TemporaryDirectory(prefix="hubslosh-") as folder:
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(folder)

@@ -59,7 +59,7 @@ def cross(v: np.ndarray) -> np.ndarray:
 
 
 def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a × b; for two short vectors much faster than NumPy's."""
+    """Return a × b; for two short vectors this is much faster than NumPy's function."""
     (a1, a2, a3), (b1, b2, b3) = a.tolist(), b.tolist()
     return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
 
@@ -95,7 +95,8 @@ class Craft:
     def solve(self, x: np.ndarray, u: np.ndarray, slope: np.ndarray) -> np.ndarray:
         """Solve for specific force, w', p'' and the pull T of each rod.
 
-        x: w, then p and p' of each bob. u: force, torque, momentum of the wheels; slope: h'.
+        ``x`` has w, then p and p' of each bob; ``u`` has force, torque and momentum h of the
+        wheels; ``slope`` is h'.
         """
         w, (force, torque, h) = x[:3], u.reshape(3, 3)
         m, right = self.matrix.copy(), np.zeros(len(self.matrix))
@@ -171,7 +172,7 @@ class Craft:
 
 
 def names(what: str) -> list[str]:
-    """Return the names of a vector's components."""
+    """Return the names of the three components of a vector variable."""
     return [f"{what}[{i}]" for i in (1, 2, 3)]
 
 
@@ -180,7 +181,7 @@ OMEGA, FORCE = names("omega"), names("specific_force")
 
 
 def drawn_tanks(program: str, folder: Path) -> dict[str, float]:
-    """Return what `hubslosh tank` says of both tanks."""
+    """Return the modal parameters of both tanks by `hubslosh tank`."""
     drawing, found = folder / "tank.toml", {}
     drawing.write_text(TANK, encoding="utf-8")
     for i, fill in enumerate(FILLS, 1):
@@ -202,7 +203,7 @@ def drawn_tanks(program: str, folder: Path) -> dict[str, float]:
 
 
 def manoeuvre(flight: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return attitudes (rad) and sideways forces (N) of a flight at its rows."""
+    """Return the commanded attitudes (rad) and the sideways forces (N) of a flight at its rows."""
     time = STEP * np.arange(ROWS)
     slew, pulse = np.zeros((ROWS, 3)), np.zeros((ROWS, 2))
     for k, start in enumerate(range(10, 190, 20)):
@@ -221,7 +222,10 @@ def measured(
     errors: np.ndarray,
     truth: dict,
 ) -> pd.DataFrame:
-    """Return what the sensors read of a flight; adds the biases to the true value."""
+    """Return the sensors' readings of a flight.
+
+    Adds the biases of the sensors to the true values.
+    """
     number = 1 + sum(name.startswith("bias(omega[1])") for name in truth)
     table = flight.copy()
     table[OMEGA] = flight[OMEGA].to_numpy() @ (np.eye(3) + errors).T
@@ -242,7 +246,7 @@ def measured(
 
 
 def deviation(name: str, start: dict[str, float]) -> float:
-    """Return the standard deviation of a known value."""
+    """Return the standard deviation with which a known value is known."""
     size = TOLERANCES[name]
     if not size.endswith("%"):
         return float(size.removeprefix("±"))
@@ -250,7 +254,7 @@ def deviation(name: str, start: dict[str, float]) -> float:
 
 
 def free_flags(start: dict[str, float], noise: dict[str, float], known_as: str) -> list[str]:
-    """Return the flags of `hubslosh identify` and `design` but for files."""
+    """Return the flags of `hubslosh identify` and `design` without the names of files."""
     free = [f"craft.J{i}{i}={start[f'craft.J{i}{i}']}:200:2500" for i in "xyz"]
     free += [f"{name}={start[name]}:-1:1" for name in names("craft.r")]
     for i in (1, 2):
@@ -286,7 +290,7 @@ def free_flags(start: dict[str, float], noise: dict[str, float], known_as: str) 
 def twin(
     seed: int, kind: str, program: str, fmu: str, folder: Path, known_as: str = "exact"
 ) -> tuple[dict, dict[str, Any], float]:
-    """Fly and identify one; returns truth, result and CPU time (s)."""
+    """Simulate and identify one flight; return true values, result and CPU time (s)."""
     random, noise = default_rng(seed), NOISE[kind]
     start = drawn_tanks(program, folder) | {"craft.mass": 1180.0}
     start |= {"craft.Jxx": 910.0, "craft.Jyy": 860.0, "craft.Jzz": 640.0}

@@ -106,7 +106,7 @@ class Setup:
     arguments: list[str] = field(default_factory=list)
 
     def bench(self) -> Bench:
-        """Return the bench for the compiled plant."""
+        """Return the bench as the structure that the compiled plant reads."""
         p = self.parameters
         mass, length, liquid = first_mode(p["tank.d"], p["tank.h"], self.density)
         effects = dict(self.effects)
@@ -147,7 +147,7 @@ class Setup:
         return bench
 
     def move(self, plant: ctypes.CDLL, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants and the hub's rates; the torque has its commands at `rows`."""
+        """Return instants and the hub's rates there; the torque is commanded at `rows`."""
         count = round(1 / (self.rate * STEP))
         part = np.arange(count) / count
         begin = (rows[:-1, None] + np.diff(rows)[:, None] * part).ravel()
@@ -168,7 +168,7 @@ class Setup:
         return np.append(0.0, begin + length), np.append(0.0, rate)
 
     def record(self, plant: ctypes.CDLL, random: Generator) -> Twin:
-        """Record the bench."""
+        """Record the bench as its logger does, with the errors of its sensors."""
         rows = np.arange(0.0, self.duration + 1e-9, 1 / self.rate)
         if self.jitter:
             rows[1:-1] += self.jitter / self.rate * random.uniform(-1, 1, rows.size - 2)
@@ -233,7 +233,10 @@ def turning(amplitude: float, duration: float) -> Callable:
 
 
 def draw(random: Generator, duration: float) -> Setup:
-    """Draw a bench within 30 % of the thesis's, known values within their tolerances."""
+    """Return a bench drawn within 30 % of the thesis's.
+
+    Its known values are within their tolerances.
+    """
 
     def near(value: float) -> float:
         return value * random.uniform(0.7, 1.3)
@@ -305,7 +308,7 @@ class Plant:
 
 
 def effects(**ranges: tuple[float, float]) -> Callable[[Setup, Generator, float], None]:
-    """Return a change of a bench's effects, each drawn from a range."""
+    """Return a function that changes a bench by these effects, each drawn from its range."""
 
     def change(setup: Setup, random: Generator, _: float) -> None:
         for name, (low, high) in ranges.items():
@@ -315,7 +318,10 @@ def effects(**ranges: tuple[float, float]) -> Callable[[Setup, Generator, float]
 
 
 def actuator(law: Callable) -> Callable[[Setup, Generator, float], None]:
-    """Return a change of the torque that acts: `law` of torque, a random number and amplitude."""
+    """Return a function that changes the acting torque of a bench by `law`.
+
+    The arguments of `law` are the torque, a random number and the amplitude.
+    """
 
     def change(setup: Setup, random: Generator, amplitude: float) -> None:
         x = random.uniform()
@@ -336,7 +342,7 @@ def periodic_friction(setup: Setup, random: Generator, amplitude: float) -> None
 
 
 def slow_clipped_gyro(setup: Setup, random: Generator, _: float) -> None:
-    """Filter and clip the gyro."""
+    """Give the gyro a filter, and clip its readings."""
     setup.gyro_lag, setup.clip = random.uniform(0.01, 0.04), 0.8
 
 
@@ -427,7 +433,7 @@ def run(program: str, twin: Twin, arguments: Iterable[str], path: Path) -> tuple
 def beyond(found: dict, truth: dict[str, float], spread: dict[str, float]) -> list[str]:
     """Return the parameters that are more than five standard deviations off.
 
-    A parameter with a spread changes during the recording, by this part to both sides at most.
+    A parameter with a spread changes during the recording, by this fraction to both sides at most.
     """
     wrong = []
     for name, e in (found["parameters"] | found["measurement"]).items():
@@ -442,14 +448,14 @@ def beyond(found: dict, truth: dict[str, float], spread: dict[str, float]) -> li
 
 
 def named(found: dict) -> list[str]:
-    """Return the causes that a result names."""
+    """Return the causes of the misfit that a result names."""
     cause = found.get("cause")
     causes = [cause["effect"] if isinstance(cause, dict) else str(cause)] if cause else []
     return causes + [missing["follows"] for missing in found.get("missing") or []]
 
 
 def judge(found: dict, plant: Plant, twin: Twin) -> list[str]:
-    """Return the faults of a result for a bench outside the model."""
+    """Return the wrong statements in a result for a bench outside the model."""
     off = beyond(found, twin.truth, plant.spread) if found["fits"] else []
     faults = [f"fits, but {name}" for name in off]
     causes = named(found)
@@ -461,7 +467,7 @@ def judge(found: dict, plant: Plant, twin: Twin) -> list[str]:
 
 
 def options_of(setup: Setup, seed: int, models: str | None) -> list[str]:
-    """Return the options of a user, who knows of even seeds how the torque runs between rows."""
+    """Return the options of a user, who knows the torque between rows for twins with even seeds."""
     hold = ["--torque", setup.hold] if seed % 2 == 0 else []
     return ["--model", models or setup.liquid, *hold, *setup.arguments]
 

@@ -29,7 +29,7 @@ from scipy.integrate import solve_ivp
 
 @dataclass
 class Twin:
-    """A recording and what is true of it, by the names of the unknowns."""
+    """A simulated recording, with the true values of the unknowns by name."""
 
     table: pd.DataFrame
     truth: dict[str, float]
@@ -37,7 +37,7 @@ class Twin:
 
 @dataclass
 class Case:
-    """An FMU, what is asked of it, and who makes its recordings."""
+    """An FMU, its unknowns, and the function that simulates its recordings."""
 
     fmu: str
     arguments: list[str]
@@ -51,7 +51,7 @@ def draw_near(random: Generator, value: float) -> float:
 
 
 def noisy(random: Generator, signal: np.ndarray, part: float) -> np.ndarray:
-    """Add noise that is a part of the signal's spread."""
+    """Add noise whose standard deviation is the fraction ``part`` of the signal's."""
     return signal + part * signal.std() * random.normal(size=signal.size)
 
 
@@ -237,9 +237,9 @@ def run(case: Case, twin: Twin, program: str, folder: str) -> dict:
 
 
 class Tally:
-    """Errors of the estimates of twins over their standard deviations.
+    """Errors of the estimates of all twins over their standard deviations.
 
-    A result that does not fit states itself that its intervals cannot be trusted: it is counted
+    A result that does not fit says itself that its intervals cannot be trusted: it is counted
     apart.
     """
 
@@ -250,7 +250,7 @@ class Tally:
         self.unfit: list[int] = []
 
     def add(self, seed: int, found: dict | str, truth: dict[str, float]) -> None:
-        """Count the result of a twin; words are a refusal."""
+        """Count the result of a twin; a text in place of a result is a refusal."""
         if isinstance(found, str):
             self.refused.append(seed)
             return

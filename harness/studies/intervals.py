@@ -33,14 +33,14 @@ GYRO = 4.07e-4
 
 
 class Bench:
-    """Runs the command in a folder."""
+    """Runs the command `hubslosh` in a folder."""
 
     def __init__(self, program: str, fmu: str, folder: Path) -> None:
         """Keep the paths of the command, of HubSlosh.fmu and of the folder."""
         self.program, self.fmu, self.folder = program, fmu, folder
 
     def call(self, *arguments: str) -> str:
-        """Return what the command prints."""
+        """Run the command with these arguments, and return its output."""
         done = subprocess.run(
             [self.program, *arguments], cwd=self.folder, capture_output=True, text=True, check=False
         )
@@ -84,7 +84,7 @@ Draws = Callable[[Bench, int], Iterator[Result]]
 
 
 def ends(found: dict[str, object], truth: float) -> tuple[float, float, float]:
-    """Return truth and ends; an end that is null is open."""
+    """Return the true value and the ends of its interval; an end that is null is open."""
     low, high = found["interval"]  # type: ignore[misc]
     return truth, -np.inf if low is None else low, np.inf if high is None else high
 
@@ -168,7 +168,7 @@ def planned_free(bench: Bench, rng: np.random.Generator) -> Result:
 def free_fit(
     bench: Bench, rng: np.random.Generator
 ) -> tuple[dict[str, dict[str, object]], list[str]]:
-    """Return the parameters that `identify fmu` finds, and the flags that `design` takes too."""
+    """Return the parameters that `identify fmu` finds, and the flags that `design` accepts too."""
     inertia, b = FREE.values()
     step = 0.05
     time = step * np.arange(600)
@@ -190,7 +190,10 @@ def free_fit(
 
 
 def foretold(found: dict[str, object], truth: float, std: float) -> tuple[float, ...]:
-    """Return truth, ends by a deviation that was foretold, and its ratio to that of the fit."""
+    """Return the true value, the predicted interval, and the ratio of deviations.
+
+    The ratio is that of the predicted standard deviation to the deviation of the fit.
+    """
     value, fitted = float(found["value"]), float(found["std"])  # type: ignore[arg-type]
     return truth, value - 1.96 * std, value + 1.96 * std, std / fitted
 
@@ -318,7 +321,7 @@ def tank_damping(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def each(method: Callable[[Bench, np.random.Generator], Result]) -> Draws:
-    """Return the draws of a method, which have the seeds 0, 1 and so on."""
+    """Return the draws of a method, with the seeds 0, 1 and so on."""
 
     def draw(bench: Bench, draws: int) -> Iterator[Result]:
         for seed in range(draws):
@@ -331,7 +334,7 @@ CLEAN: dict[str, tuple[Vector, Vector, Vector]] = {}
 
 
 def clean(bench: Bench, *settings: str, profile: str) -> tuple[Vector, Vector, Vector]:
-    """Return a run without noise, which is made once."""
+    """Return a run without noise; it is simulated only once."""
     if profile not in CLEAN:
         CLEAN[profile] = bench.run(*settings, profile=profile)
     return CLEAN[profile]
@@ -351,7 +354,7 @@ METHODS: dict[str, Draws] = {
 
 
 def census(bench: Bench, only: str, draws: int) -> Iterator[str]:
-    """Yield the rows of the table."""
+    """Yield the rows of the table, one for each estimated quantity."""
     for name, method in METHODS.items():
         if only not in name:
             continue

@@ -70,7 +70,7 @@ class Row:
 
     @property
     def passed(self) -> bool:
-        """Say whether the two intervals overlap; results.csv keeps six digits of a share."""
+        """Return True if the two intervals overlap; results.csv keeps six digits of a share."""
         rounding = 1e-5 if self.unit == "share" else 0.0
         return abs(self.measured - self.ours) <= self.error + self.band + rounding
 
@@ -85,7 +85,7 @@ def share(
 
 
 def most(count: int) -> int:
-    """Return how many of a set of points must pass."""
+    """Return how many points of a set of ``count`` must be inside."""
     return math.floor(SHARE * count + 1e-9)
 
 
@@ -147,7 +147,7 @@ def rectangular_tanks() -> tuple[list[Row], str]:
     unit = "density = 1000\nbox = [1, 1.5]\n"
 
     def band(h: float) -> tuple[float, float, float]:
-        """Small waves, largest waves of the third order's range, and the shift's sign."""
+        """Return the range of natural frequencies at the depth ``h`` (third order)."""
         of, found = tank(unit, h, 1)
         slow = frequency(of) / math.sqrt(G)
         # without coefficients (secondary resonance) there is no statement
@@ -221,7 +221,10 @@ def box_decay() -> tuple[list[Row], str]:
 
 
 def ring_down(start: float = 7.2) -> tuple[np.ndarray, np.ndarray]:
-    """Release SloshTank's first mode at an X in %: amplitudes and free frequencies, rad/s."""
+    """Release mode 1 of SloshTank at an X in % of the box; return amplitudes and frequencies.
+
+    Frequencies are of the free oscillation, rad/s.
+    """
     parameters, found = tank(BOX, 0.4, model="SloshTank")
     # the first mode's share of the liquid's mass
     share = parameters["tank.mass[1]"] / found["m_liq"]
@@ -646,14 +649,14 @@ def as_built() -> list[Row]:
 
 
 def dots(panel: Panel, x: np.ndarray, y: np.ndarray, style: str) -> None:
-    """Draw points."""
+    """Draw points in a panel."""
     for point in zip(x, y, strict=True):
         px, py = panel.at(*point)
         panel.parts.append(f'<circle class="{style}" cx="{px:.1f}" cy="{py:.1f}" r="2.6"/>')
 
 
 def legend(panel: Panel, words: list[tuple[str, str]], x: float, y: float) -> None:
-    """Write what the styles mean, line by line."""
+    """Write the meaning of the styles into a panel, line by line."""
     for i, (word, style) in enumerate(words):
         panel.text(x, y + 17 * i, word, f"{style} end")
 
@@ -694,7 +697,7 @@ def short(value: float, digits: int = 3) -> str:
 
 
 def ours_of(row: Row) -> str:
-    """Return our side of a comparison; of a share the least that passes."""
+    """Return our value of a comparison; for a share the smallest one that passes."""
     if row.unit == "share":
         return f"at least {short(row.ours - row.band)}"
     return with_band(row.ours, row.band)
@@ -707,19 +710,22 @@ def name_of(row: Row) -> str:
 
 
 def with_band(value: float, band: float) -> str:
-    """Return a number and what it may be off by."""
+    """Return a number with its uncertainty."""
     if band < 1e-12:
         return short(value)
     return f"{short(value)} ± {short(band, 2)}"
 
 
 def verdict(rows: list[Row]) -> str:
-    """Return how many comparisons pass, in the words that README has too."""
+    """Return how many comparisons pass, in the words that README uses."""
     return f"{sum(row.passed for row in rows)} of {len(rows)} comparisons"
 
 
 def computed() -> list[tuple[float, float, float]]:
-    """Return depth, frequency by CFD and ours: what others computed is not a measurement."""
+    """Return depth, frequency by CFD and our frequency.
+
+    Results of others' computations are no measurements, and are therefore kept apart.
+    """
     data = table("box_cfd.csv")
     return [
         (h, w, frequency(tank("density = 1000\nbox = [1, 1]\n", h, 1)[0]) / math.sqrt(G))
@@ -734,7 +740,7 @@ def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 
 
 def page(rows: list[Row], cfd: list[tuple[float, float, float]]) -> str:
-    """Return the page: the template with the results in it."""
+    """Return the page: the template filled with the results."""
     results = markdown(
         ("experiment", "quantity", "measured ± its error", "computed ± its band", "result"),
         [
@@ -776,7 +782,7 @@ FIELDS = tuple(field.name for field in fields(Row))
 
 
 def write_results(rows: list[Row]) -> None:
-    """Keep the comparisons."""
+    """Write the comparisons to results.csv."""
     with RESULTS.open("w", newline="", encoding="utf-8") as file:
         file.write("# Written by harness/studies/measured.py.\n")
         writer = csv.writer(file, lineterminator="\n")
@@ -787,13 +793,13 @@ def write_results(rows: list[Row]) -> None:
 
 
 def read_results() -> list[Row]:
-    """Return the comparisons that were kept."""
+    """Read the comparisons from results.csv."""
     data = pd.read_csv(RESULTS, comment="#", dtype={"unit": str})
     return [Row(**row) for row in data.to_dict("records")]
 
 
 def main() -> None:
-    """Compare, draw and write."""
+    """Compute the comparisons, draw the pictures and write the page."""
     rows = []
     for name, experiment in EXPERIMENTS.items():
         more, drawing = experiment()

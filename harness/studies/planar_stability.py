@@ -66,7 +66,7 @@ class Plant:
     def half_period(
         self, state: np.ndarray, torque: np.ndarray, phase: np.ndarray, frequency: np.ndarray
     ) -> np.ndarray:
-        """States half a period later, mirrored: symmetric motion comes back to its start."""
+        """States half a period later, mirrored; a symmetric motion returns to its start."""
         step = 0.5 / (frequency * STEPS)
         turn = np.pi / STEPS
         push = torque * np.sin(phase)
@@ -82,7 +82,7 @@ class Plant:
         return MIRROR[:, None] * state
 
     def guess(self, angle: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-        """Rate, x, x', torque and phase of nearly linear motion at its turning point (5, n)."""
+        """Estimate rate, x, x', torque and phase of nearly linear motion as it turns (5, n)."""
         speed, natural = 2j * np.pi * frequency, GRAVITY / self.length
         y = self.length * np.sin(angle)
         rate = -(natural * (1 - angle**2 / 8) + speed**2 + speed * self.drag) * y / (ARM * speed)

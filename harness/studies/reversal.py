@@ -33,7 +33,7 @@ OUTPUTS = [
 
 
 def simulate() -> pd.DataFrame:
-    """Return the run, a row every 0.1 s."""
+    """Return the simulated run, with a row every 0.1 s."""
     times = [0.0, REVERSED, REVERSED, RESUMED, RESUMED, END]
     # Off the axis by 0.2 % forwards, so that the liquid does not come back in the middle.
     along = [FORWARD, FORWARD, BACK, BACK, FORWARD, FORWARD]

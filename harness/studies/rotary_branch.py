@@ -49,13 +49,13 @@ def sweep(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drive(model: str, inputs: pd.DataFrame) -> pd.DataFrame:
-    """Run the sweep with a slosh model."""
+    """Simulate the sweep with a slosh model."""
     outputs = ["omega", "slosh_angle", "slosh_angle_radial"]
     return hubslosh.simulate(FMU, parameters={"slosh.model": model}, inputs=inputs, outputs=outputs)
 
 
 def envelope(signal: pd.Series) -> np.ndarray:
-    """Largest magnitude in each window."""
+    """Return the largest magnitude of a signal in each window."""
     count = round(WINDOW / STEP)
     whole = len(signal) // count * count
     return np.abs(signal.to_numpy()[:whole]).reshape(-1, count).max(axis=1)
@@ -87,7 +87,7 @@ class Panel:
         self.parts.append(f'<path class="frame" d="{frame}"/>')
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Place of a point, px."""
+        """Return the place of a point on the drawing, px."""
         across = (x - self.x[0]) / (self.x[1] - self.x[0])
         up = (y - self.y[0]) / (self.y[1] - self.y[0])
         width, height = self.right - self.left, self.bottom - self.top

@@ -47,7 +47,7 @@ ROWS = [
 
 
 def parameters(case: str) -> dict[str, float | str]:
-    """Return what is set before the start."""
+    """Return the start values that a case sets."""
     if case == "hub":
         return {
             "slosh.model": "spherical",
@@ -96,7 +96,7 @@ def parameters(case: str) -> dict[str, float | str]:
 
 
 def count_instructions(program: Path, folder: Path, case: str, tolerance: float) -> float:
-    """Return the instructions of one fmi2DoStep, the mean of 1000."""
+    """Return the number of instructions of one fmi2DoStep, the mean of 1000."""
     values = parameters(case)
     if case == "hub":
         w, swing = 13.0, {"tau_cmd": 0.05}

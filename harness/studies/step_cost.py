@@ -94,7 +94,7 @@ def arguments(
 
 
 def count_instructions(program: Path, told: Iterable[str]) -> list[int]:
-    """Return the instructions of each fmi2DoStep, in order."""
+    """Return the number of instructions of each fmi2DoStep, in order."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out")
         tool = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}"]

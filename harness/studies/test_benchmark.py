@@ -24,7 +24,7 @@ SHOWN = 0.1
 
 
 def kept(name: str) -> dict[str, dict[str, str]]:
-    """Return the rows of the table of an implementation by case."""
+    """Return the rows that the stored table has for an implementation, by case."""
     return {row["case"]: row for row in compare.read_scores() if row["implementation"] == name}
 
 
@@ -86,13 +86,13 @@ def test_the_benchmark_is_small() -> None:
 
 
 def reference(case: str) -> list[str]:
-    """Return the lines of a reference."""
+    """Return the lines of a case's reference result."""
     text = BENCHMARK.joinpath(case, "results.csv").read_text(encoding="utf-8")
     return [line for line in text.splitlines() if not line.startswith("#")]
 
 
 def scored(lines: list[str], folder: Path, case: str = "bench_linear") -> score.Score:
-    """Return the score of these lines."""
+    """Return the score that ``score.py`` gives to these lines."""
     path = folder / case / "results.csv"
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -100,7 +100,7 @@ def scored(lines: list[str], folder: Path, case: str = "bench_linear") -> score.
 
 
 def changed(change: Callable[[list[float]], list[float]]) -> list[str]:
-    """Return the reference of bench_linear with changed rows."""
+    """Return the reference result of bench_linear with changed rows."""
     head, *rows = reference("bench_linear")
     return [head, *(",".join(map(repr, change([*map(float, row.split(","))]))) for row in rows)]
 
@@ -166,7 +166,7 @@ HEAD = "time [s],theta [rad],omega [rad/s],alpha [rad]"
 def test_a_file_that_cannot_be_scored_says_why(
     lines: list[str], words: str, tmp_path: Path
 ) -> None:
-    """The message has the place and what is allowed."""
+    """The message names the place of the fault and the allowed values."""
     with pytest.raises(score.ResultsError) as error:
         scored(lines, tmp_path)
     assert words in str(error.value)
@@ -191,7 +191,7 @@ def test_measurements_that_are_missing_count_as_failed(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_cases_is_an_error(tmp_path: Path) -> None:
-    """The message says where a results.csv belongs."""
+    """The message says in which folder a results.csv belongs."""
     scores, errors = score.collect(tmp_path)
     assert not scores
     assert "CASE/results.csv" in errors[0]

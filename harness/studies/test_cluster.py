@@ -56,7 +56,7 @@ def long_runs(monkeypatch) -> None:
     right = cluster.drive_here
 
     def drive_here(fmu, run, torque, columns):
-        """Take some time."""
+        """Simulate a run after half a second of sleep."""
         import time
 
         time.sleep(0.5)
@@ -97,7 +97,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
     right = cluster.drive_here
 
     def drive_here(fmu, run, torque, columns):
-        """Drive, but die in one run."""
+        """Simulate a run, but end the process in one of them."""
         if run["settings"]["tank.h"] == 0.07:
             import os
 

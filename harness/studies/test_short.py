@@ -55,13 +55,13 @@ def cells(page: str, first: str) -> list[str]:
 
 
 def half_digit(text: str) -> float:
-    """Return half a unit of the last digit of a number."""
+    """Return half a unit of the last digit of a printed number."""
     return 0.5 * 10.0 ** Decimal(text).as_tuple().exponent
 
 
 @pytest.fixture(autouse=True)
 def style() -> None:
-    """Undo what studies set of matplotlib."""
+    """Undo the changes that studies make to matplotlib's settings."""
     plt.rcdefaults()
 
 
@@ -115,9 +115,9 @@ def test_damping_over_the_fill_of_a_capsule_has_no_step() -> None:
 
 
 def slowed(depth: float) -> float:
-    """Return by how much a tilt of 60 degrees lowers the frequency along the slope, %.
+    """Return by how much, in %, a tilt of 60 degrees lowers the frequency along the slope.
 
-    One tilt of the study's eleven.
+    It is one of the study's eleven tilts.
     """
     upright, tilted = (tilted_tank.frequencies(depth, tilt)[0] for tilt in (0, 60))
     return 100 * (1 - tilted / upright)

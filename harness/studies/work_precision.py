@@ -79,7 +79,7 @@ def build() -> Path:
 
 
 def run(program: Path, *arguments: str) -> tuple[float, float]:
-    """Return nanoseconds per 20 ms and the largest error of omega, rad/s."""
+    """Run a method. Return its nanoseconds per 20 ms and its largest error of omega, rad/s."""
     done = subprocess.run([program, *arguments], cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"error: {program.name} {' '.join(arguments)}: {done.stderr}")
@@ -88,9 +88,10 @@ def run(program: Path, *arguments: str) -> tuple[float, float]:
 
 
 def instructions(program: Path, method: str, tolerance: str) -> float:
-    """Return a method's instructions per 20 ms, without the torque's; nan without valgrind.
+    """Return a method's instructions per 20 ms, without those for the torque; nan without valgrind.
 
-    The FMU's are those of its functions, the host's calls left out.
+    Of the FMU only the instructions of its own functions are counted, not those of the host's
+    calls.
     """
     if method in ("linear", "spherical"):
         return counted(program, method, tolerance, "--toggle-collect=fmi2*")
@@ -118,7 +119,7 @@ def counted(program: Path, method: str, tolerance: str, *options: str) -> float:
 
 
 def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, float]:
-    """Solve the smoothed equations by SciPy; the same results as ``run``."""
+    """Solve the smoothed equations by SciPy; returns the same quantities as ``run``."""
     m, length, r, g = 0.756293271862872, 0.045241351252659934, 0.225, 9.81
     i0, c = 0.322414 + 1.3304311084678084 * r * r, 0.06627875369876737
     rate = math.log(3.5 / 1.25) / SWEEP
@@ -160,12 +161,15 @@ def basilisk() -> list[tuple[str, float, float]]:
 
 
 def at_error(points: list[tuple], error: float) -> float:
-    """Return the least cost at which a method is at least that exact."""
+    """Return the smallest cost at which a method has at most this error."""
     return min((cost for _, cost, err, _ in points if err <= error), default=math.inf)
 
 
 def draw(all_points: dict[str, list[tuple]], unit: float) -> None:
-    """Write the diagram; Basilisk's costs are relative to ours of the spherical model at 1e-8."""
+    """Draw the diagram.
+
+    Basilisk's costs are given relative to those of our spherical model at 1e-8.
+    """
     plt.rcParams.update({"svg.hashsalt": "hubslosh", "font.size": 10})
     figure, axes = plt.subplots(figsize=(8, 5.2), layout="constrained")
     for (name, points), marker in zip(all_points.items(), "osD<^vPX", strict=True):

@@ -55,7 +55,7 @@ Solution = Callable[[list], np.ndarray]
 
 
 def pieces(rounds: int, every: float) -> list[tuple[float, float, np.ndarray, np.ndarray]]:
-    """Return the pieces of time with constant inputs, and the rows in each."""
+    """Return the stretches of time in which the inputs are constant, and the rows in each."""
     made = []
     for k in range(rounds):
         turned = np.array([1, 1, 1, 1, 1, 1.0]) if k % 2 == 0 else np.array([-1, -1, 1, -1, -1, -1])
@@ -70,14 +70,14 @@ class Heyoka:
     """heyoka's Taylor integrator, dense output between its steps."""
 
     def __init__(self, tolerance: float) -> None:
-        """Compile."""
+        """Compile the integrator."""
         equations, self.start = heyoka_taylor.craft_system(cases.parameters(CASE))
         self.taylor = hy.taylor_adaptive(
             equations, self.start, pars=[0.0] * 6, tol=tolerance, compact_mode=False
         )
 
     def __call__(self, given: list) -> np.ndarray:
-        """Solve."""
+        """Solve the motion for the given rows."""
         ta, found = self.taylor, []
         ta.time = 0.0
         ta.state[:] = self.start
@@ -89,7 +89,7 @@ class Heyoka:
 
 
 def compiling() -> float:
-    """Return the CPU time in which heyoka compiles, s, of a craft that no cache knows."""
+    """Return the CPU time, s, that heyoka takes to compile a craft that is in no cache."""
     p = cases.parameters(CASE)
     p["mass"] *= 1 + 1e-9 * np.random.default_rng().random()
     begin = time.process_time()
@@ -99,16 +99,16 @@ def compiling() -> float:
 
 
 class Compiled:
-    """The right-hand side that heyoka compiles, for integrators that want rates."""
+    """The right-hand side, compiled by heyoka, for integrators that call it."""
 
     def __init__(self) -> None:
-        """Compile."""
+        """Compile the right-hand side."""
         equations, self.start = heyoka_taylor.craft_system(cases.parameters(CASE))
         variables = [x for x, _ in equations]
         self.rates = hy.cfunc([hy.expression(rate) for _, rate in equations], variables)
 
     def of(self, wrench: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
-        """Return a function that writes and returns the rates under a wrench."""
+        """Return a function that computes the rates under this force and torque."""
         rates = self.rates
 
         def written(t: float, y: np.ndarray, y_d: np.ndarray) -> np.ndarray:
@@ -154,7 +154,7 @@ def dop853(right: Compiled, tolerance: float) -> Solution:
 
 
 def fmu(tolerance: float) -> Solution:
-    """Return Spacecraft.fmu in steps from row to row; its set-up is part of the time."""
+    """Return Spacecraft.fmu in steps from row to row; the time for its set-up is included."""
     p = cases.parameters(CASE)
     settings, axes = hubslosh_fmus.with_tanks(p)
     names = hubslosh_fmus.columns_of(len(axes))
@@ -207,7 +207,7 @@ def cost(solution: Solution, every: float, rounds: int, runs: int) -> float:
 
 
 def basilisk_row(step: float) -> tuple[float, float]:
-    """Return error and cost of Basilisk's RK4 at a step, s."""
+    """Return the error and the cost of Basilisk's RK4 with this step, s."""
     begin = time.process_time()
     found = basilisk.run(CASE, "RK4", step)
     spent = time.process_time() - begin
@@ -215,7 +215,10 @@ def basilisk_row(step: float) -> tuple[float, float]:
 
 
 def measure() -> list[tuple[str, str, float, list[float]]]:
-    """Return method, tolerance, error, and costs with rows every 1 s and every 50 ms."""
+    """Return for each method tolerance, error, and costs.
+
+    Costs are with rows every 1 s and every 50 ms.
+    """
     rows = []
     right = Compiled()
     methods: list[tuple[str, list[float], Callable, int, int]] = [
@@ -246,7 +249,7 @@ AT = 1e-10
 
 
 def at_error(rows: list[tuple[str, str, float, list[float]]]) -> str:
-    """Return each method's least cost at this error or a smaller one, in words."""
+    """Return in words the smallest cost of each method at this error or a smaller one."""
     least: dict[str, float] = {}
     for name, _, wrong, (_, fine) in rows:
         if wrong <= AT:
