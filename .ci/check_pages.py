@@ -165,7 +165,7 @@ M_host, C, V, omega = np.eye(6), np.eye(3), np.zeros(3), np.zeros(3)
 
 @dataclass
 class Block:
-    """A block of code."""
+    """A block of code of a page, with its language and its line."""
 
     page: str
     line: int
@@ -210,10 +210,10 @@ def commands(block: Block) -> list[tuple[int, str]]:
 
 
 class Reader:
-    """A machine with the wheel and the system's programs, and the folders of the pages."""
+    """A machine on which a reader follows the pages: it has the wheel and the system's programs."""
 
     def __init__(self, folder: Path, wheel: Path, find_links: Path | None) -> None:
-        """Install the wheel with what its pages use."""
+        """Install the wheel with the packages that the pages use."""
         self.folder = folder
         venv = folder / "venv"
         subprocess.run([sys.executable, "-m", "venv", venv], check=True)
@@ -255,7 +255,7 @@ class Reader:
         return folder
 
     def run(self, arguments: list, folder: Path) -> tuple[int, str]:
-        """Return exit code and output."""
+        """Run a command in a folder; return its exit code and its output."""
         done = subprocess.run(
             arguments, cwd=folder, env=self.environment, text=True, encoding="utf-8",
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, check=False,
@@ -281,7 +281,7 @@ for page, line, code in json.loads(Path(sys.argv[1]).read_text()):
 
 
 class Check:
-    """Failures of the pages, and which entries of the lists were used."""
+    """The failures found in the pages, and the entries of the lists that fitted a command."""
 
     def __init__(self, reader: Reader, dear: bool) -> None:
         """Store the reader of the pages; ``dear``: also run commands of more than ten seconds."""
@@ -291,13 +291,13 @@ class Check:
         self.slow: list[tuple[float, str]] = []
 
     def matches(self, patterns: object, command: str) -> str | None:
-        """Return the entry that a command fits, and note it."""
+        """Return the entry of a list that a command fits, and note that it was used."""
         found = next((p for p in patterns if re.match(p, command)), None)
         self.used |= {found} if found else set()
         return found
 
     def page(self, page: str) -> None:
-        """Run a page."""
+        """Run all blocks of a page."""
         folder = self.reader.prepare(page)
         own = blocks(page)
         prelude = [Block(page, 1, "python", GIVEN[page])] if page in GIVEN else []
@@ -323,12 +323,12 @@ class Check:
             self._python(page, [*prelude, *before, *python], folder)
 
     def _before(self, block: Block) -> str:
-        """Return the paragraph before a block."""
+        """Return the paragraph of the page that precedes a block."""
         lines = (ROOT / block.page).read_text().splitlines()[: block.line - 2]
         return " ".join(lines[-4:])
 
     def _shell(self, block: Block, folder: Path) -> None:
-        """Run a block of the shell, in one shell, up to its first failure."""
+        """Run a block of shell commands in one shell, up to the first failure."""
         script, lines = ["set -uo pipefail"], []
         for line, command in commands(block):
             if self.matches(LEFT_OUT, command):
@@ -355,7 +355,7 @@ class Check:
             self._fail(f"{block.page}:{line}", command, said[marks[-1].end() :])
 
     def _python(self, page: str, run: list[Block], folder: Path) -> bool:
-        """Run blocks of Python as one program."""
+        """Run the Python blocks of a page as one program."""
         import json
 
         (folder / ".blocks.json").write_text(json.dumps([(b.page, b.line, b.code) for b in run]))

@@ -17,7 +17,7 @@ RANGE = "document.querySelector('.plot').layout.xaxis.range.map(Number)"
 
 
 def clicks(page: Page) -> None:
-    """Hover, legend, zoom and reset in the first figure; the contents list."""
+    """Try out hovering, legend, zoom and reset in the first figure, and the list of contents."""
     plot = page.locator(".plot").first
     plot.scroll_into_view_if_needed()
     point = plot.locator(".points path, .point path")
@@ -95,7 +95,7 @@ FAULTS = """
 
 
 def background(page: Page) -> int:
-    """Return how light the page is, 0 to 765."""
+    """Return how light the background of the page is, from 0 (black) to 765 (white)."""
     color = page.evaluate("getComputedStyle(document.body).backgroundColor")
     return sum(int(part) for part in re.findall(r"\d+", color)[:3])
 

@@ -54,7 +54,7 @@ VIEWS = ((1400, "light"), (400, "light"), (1400, "dark"))
 
 @dataclass(frozen=True)
 class Drawn:
-    """Expected picture of one tank's mode, body axes, m."""
+    """Expected position of one slosh mode's bob in the picture, body axes, m."""
 
     hinge: Vector
     bob: Vector
@@ -88,7 +88,7 @@ def cylinder(n: int, radius: float, depth: float) -> Mode:
 
 @dataclass(frozen=True)
 class Case:
-    """A run, how it is shown, and where its bobs are by the table's numbers."""
+    """A run, how its page is made, and a function that computes its bobs from the table."""
 
     name: str
     fmu: str
@@ -105,7 +105,7 @@ class Case:
 
 
 def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
-    """Draw the bench's tank: sines of the slosh angles are displacements over the length."""
+    """Return the bob of the bench's tank; sines of slosh angles are displacements over l."""
     radius, depth, arm = 0.163 / 2, 0.1, 0.225
     data = [cylinder(n, radius, depth) for n in range(len(sines))]
     p = [(x, y, -math.sqrt(1 - x * x - y * y)) for x, y in sines]
@@ -113,7 +113,7 @@ def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
 
 
 def sweep(row: Row) -> list[list[Drawn]]:
-    """One mode."""
+    """Return the bob of the sweep's only mode."""
     return bench(row, [(math.sin(row["slosh_angle_radial"]), math.sin(row["slosh_angle"]))])
 
 
@@ -144,13 +144,16 @@ def slew(row: Row) -> list[list[Drawn]]:
 
 
 def modes(row: Row, prefix: str, data: list[Mode], at: Vector, level: float) -> list[Drawn]:
-    """Return a tank's modes by their directions p."""
+    """Return the bobs of a tank's modes, computed from their directions p in the table."""
     p = [[row[f"{prefix}.p[{n},{i}]"] for i in (1, 2, 3)] for n in range(1, len(data) + 1)]
     return draw_modes(data, p, at, level)
 
 
 def draw_modes(data: list[Mode], p: Sequence[Vector], at: Vector, level: float) -> list[Drawn]:
-    """Return a tank's modes by the pendulums' directions; the wall has all of them."""
+    """Return the bobs of a tank's modes from the pendulums' directions.
+
+    The wave at the wall is the sum over all modes.
+    """
     angles = [(math.asin(one[0]), math.asin(one[1])) for one in p]
     wall = [sum(mode.wave * a[i] for mode, a in zip(data, angles, strict=True)) for i in (0, 1)]
     found = []
@@ -186,13 +189,13 @@ def torques(t: float) -> Row:
 
 
 def shaken(t: float) -> Row:
-    """Return what shakes a tank sideways while it drains."""
+    """Return the force that shakes a tank sideways while it drains."""
     flow = 4.5 if 2 < t < 58 else 0.0
     return {"mass_flow": flow, "a[1]": 0.25 * math.sin(4.4 * t)}
 
 
 def pushed(t: float) -> Row:
-    """Return what shakes a tank in two directions, each for a while."""
+    """Return the force that shakes a tank in two directions, each for a while."""
     return {
         "a[1]": 0.06 * math.sin(3.9 * t) * pulse(t, 0, 8),
         "a[2]": 0.2 * pulse(t, 5, 6) - 0.2 * pulse(t, 6, 7),
@@ -221,7 +224,7 @@ TWO_TANKS = (
 
 
 def settings(text: str) -> list[str]:
-    """Return flags that set what stands between spaces."""
+    """Return the command's flags for the settings in a text, which spaces separate."""
     return [part for name in text.split() for part in ("--set", name)]
 
 
@@ -313,7 +316,7 @@ def rows(file: Path) -> list[Row]:
 
 
 def record(case: Case, binary: Path, fmus: Path, folder: Path) -> tuple[Path, Path]:
-    """Make the run and its page; return its table as CSV and the page."""
+    """Simulate the case and write its page; return the run's table as CSV, and the page."""
     run, page = folder / f"{case.name}.parquet", folder / f"{case.name}.html"
     drive = []
     if case.inputs:
@@ -423,9 +426,10 @@ def keys(page: Page) -> None:
 
 
 def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str:
-    """Show a run whose FMU has a unit that opens a comment and a script; the page shows it as text.
+    """Show a run whose FMU has a unit with the text "<!--" and "<script>".
 
-    A browser that reads both as markup does not see the end of the page's data: nothing is drawn.
+    The page must show both as text. A browser that read them as markup would not find the end of
+    the page's data, and nothing would be drawn.
     """
     unit, hostile = "<!--<script>rad/s", folder / "hostile_unit.fmu"
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(hostile, "w") as out:

@@ -69,7 +69,7 @@ class Machine:
         }
 
     def run(self, *command: str | Path) -> tuple[str, float]:
-        """Return what a command prints, and how long it took, s; end the program if it fails."""
+        """Run a command; return its output and its time, s. If it fails, the program ends."""
         begin = time.monotonic()
         done = subprocess.run(
             command, cwd=self.folder, env=self.environment, text=True, encoding="utf-8",
@@ -82,7 +82,7 @@ class Machine:
 
 
 def within(what: str, seconds: float, limit: float) -> None:
-    """Say how long something took, and fail if that is too long."""
+    """Print how long something took, and fail if it took longer than ``limit``."""
     print(f"{what}: {seconds:.2f} s (allowed: {limit:g} s)", flush=True)
     if seconds > limit:
         sys.exit(f"error: {what} took too long")
@@ -103,7 +103,7 @@ def main() -> None:
 
 
 def check(machine: Machine, args: argparse.Namespace) -> None:
-    """Use all of the wheel."""
+    """Use everything that the wheel contains."""
     run, python = machine.run, machine.python
     begin = time.monotonic()
     source = (

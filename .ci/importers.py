@@ -21,12 +21,12 @@ from lxml import etree
 
 
 def version_of(fmu: Path) -> int:
-    """Return 2 or 3."""
+    """Return the version of FMI of an FMU, 2 or 3."""
     return int(read_model_description(str(fmu), validate=False).fmiVersion[0])
 
 
 def schema_findings(fmu: Path) -> list[str]:
-    """Return the errors of modelDescription.xml by the schema of its FMI version in fmpy."""
+    """Return the findings of FMI's XML schema, as fmpy contains it, about modelDescription.xml."""
     name = f"fmi{version_of(fmu)}"
     folder = Path(fmpy.__file__).parent / "schema" / name
     schema = etree.XMLSchema(etree.parse(str(folder / f"{name}ModelDescription.xsd")))
@@ -37,7 +37,7 @@ def schema_findings(fmu: Path) -> list[str]:
 
 
 def fmpy_findings(fmu: Path) -> list[str]:
-    """Return what fmpy's validation finds, and what keeps it from simulating."""
+    """Return the findings of fmpy's validation, and the error if fmpy cannot simulate the FMU."""
     findings = [str(problem) for problem in validate_fmu(str(fmu))]
     for interface in ("CoSimulation", "ModelExchange"):
         try:
@@ -68,7 +68,7 @@ def fmutool_findings(fmu: Path, version: int) -> list[str]:
 
 
 def fmi_library_findings(fmu: Path) -> list[str]:
-    """Return what Modelon's FMI Library, inside libcosim, says while it loads and steps the FMU."""
+    """Return the messages of Modelon's FMI Library in libcosim while it loads and steps the FMU."""
     # Its messages are the process's, so it gets one of its own.
     program = """
 import sys
@@ -91,7 +91,7 @@ sys.exit(not run.step(50))
 
 
 def casadi_findings(fmu: Path) -> list[str]:
-    """Return where CasADi's Model Exchange fails, or the FMU's Jacobians are not the slopes."""
+    """Return the failures of CasADi's Model Exchange, and Jacobians that differ from slopes."""
     name = read_model_description(str(fmu)).modelName
     with tempfile.TemporaryDirectory() as folder:
         with zipfile.ZipFile(fmu) as archive:
@@ -132,7 +132,7 @@ def casadi_findings(fmu: Path) -> list[str]:
 
 
 def main() -> None:
-    """Ask all, show what they find."""
+    """Run all tools, and print their findings."""
     if len(sys.argv) != 2:
         sys.exit("usage: python importers.py FMU")
     fmu = Path(sys.argv[1])

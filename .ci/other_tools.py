@@ -39,7 +39,7 @@ def passes_fmutool(fmu: Path) -> bool:
 
 
 def passes_vdmcheck(fmu: Path) -> bool:
-    """Return True if VDMCheck2 does not end with "No errors found."."""
+    """Return True if VDMCheck2 reports anything, that is, prints no "No errors found."."""
     done = subprocess.run(
         [os.environ["VDMCHECK2"], fmu.resolve()], capture_output=True, text=True, check=False
     )
@@ -52,7 +52,7 @@ if "VDMCHECK2" in os.environ:
 
 
 def main() -> None:
-    """Print a row a group of rules, and what each tool reports."""
+    """Print a row for each group of rules with the number of faults that each tool reports."""
     folder = Path(sys.argv[1])
     rows = [
         row.split("\t") for row in (folder / "index.tsv").read_text(encoding="utf-8").splitlines()

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """Yield the browser, which draws without a graphics processor."""
+    """Yield the browser Chromium, which draws without a graphics processor."""
     program = shutil.which("chromium")
     if program is None:
         sys.exit("no chromium: .ci/browser installs it")
@@ -23,7 +23,10 @@ def chromium() -> Iterator[Browser]:
 
 
 def open_page(browser: Browser, file: Path, width: int, scheme: str = "light", **more: str) -> Page:
-    """Open a page and wait until it is drawn; anything fetched is an error."""
+    """Open a page and wait until it is drawn.
+
+    A page that fetches anything from the network is an error.
+    """
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme, **more)
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))

@@ -44,7 +44,7 @@ def git(folder: Path, *arguments: str) -> bytes | None:
 
 
 def fetch(repository: str, rows: list[dict]) -> None:
-    """Fetch FMUs of one repository into the cache, as far as it can be reached."""
+    """Download the FMUs of one repository into the cache, as far as the network allows."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         git(folder, "init", "--quiet", "--bare")
@@ -63,7 +63,10 @@ def fetch(repository: str, rows: list[dict]) -> None:
 
 
 def findings(fmu: Path) -> tuple[dict[str, set[str]], set[str]]:
-    """Return the rules with errors and those with warnings, and those that this machine decides."""
+    """Return the rules with errors, the rules with warnings, and the machine-dependent rules.
+
+    The findings of the last ones may differ between machines.
+    """
     with tempfile.TemporaryDirectory() as name:
         report = Path(name) / "report.json"
         command = [os.environ["HUBSLOSH"], "check", str(fmu), f"--json={report}"]
@@ -84,7 +87,7 @@ def findings(fmu: Path) -> tuple[dict[str, set[str]], set[str]]:
 
 
 def main() -> None:
-    """Check the FMUs that can be reached; leave with 1 if a finding differs from the record."""
+    """Check all FMUs that can be downloaded; exit with 1 if a finding differs from the record."""
     parser = argparse.ArgumentParser(prog=".ci/public-fmus", description=__doc__)
     parser.add_argument("--folder", type=Path, action="append", default=[])
     parser.add_argument("--offline", action="store_true")

@@ -13,19 +13,19 @@ import pytest
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let no example leave the range in which its model is known."""
+    """Make a warning that an example leaves the range of its model an error."""
     config.addinivalue_line("filterwarnings", "error::hubslosh.FmuWarning")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Say where the FMU is, and what example 7 made in the harness."""
+    """Add the options for the paths of the FMU and of the harness's files of example 7."""
     parser.addoption("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.addoption("--folder", type=Path, default=Path("dist"))
 
 
 @pytest.fixture(scope="session")
 def fmu(request: pytest.FixtureRequest) -> str:
-    """Return the FMU."""
+    """Return the path of HubSlosh.fmu."""
     name: str = request.config.getoption("--fmu")
     return str(Path(name).absolute()) if name.endswith(".fmu") else name
 

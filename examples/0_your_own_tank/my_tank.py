@@ -31,7 +31,7 @@ TORQUE = [(0, 10), (2, 10), (2, -10), (4, -10), (4, 0), (20, 0)]
 
 
 def compare(fmu: str = "HubSlosh") -> dict[str, hubslosh.Run]:
-    """Run the manoeuvre with rigid and with sloshing liquid."""
+    """Simulate the manoeuvre with rigid and with sloshing liquid."""
     inputs = pd.DataFrame(TORQUE, columns=["time", "tau_cmd"])
     return {
         liquid: hubslosh.simulate(
@@ -46,7 +46,7 @@ def compare(fmu: str = "HubSlosh") -> dict[str, hubslosh.Run]:
 
 
 def pointing_error(runs: dict[str, hubslosh.Run]) -> pd.Series:
-    """Return by how much sloshing turns the craft away from where it would point, 0.001°."""
+    """Return the difference of the craft's angle with sloshing and with rigid liquid, 0.001°."""
     return 1e3 * np.degrees(runs["spherical"]["theta"] - runs["frozen"]["theta"])
 
 
@@ -68,7 +68,7 @@ def summary(runs: dict[str, hubslosh.Run]) -> str:
 
 
 def figure(runs: dict[str, hubslosh.Run]) -> plt.Figure:
-    """Draw pointing error and wave, with the answer above them."""
+    """Draw the pointing error and the wave, with the result above them."""
     drawing, (pointing, wave) = plt.subplots(2, figsize=(8, 5), sharex=True, layout="constrained")
     time = runs["spherical"]["time"]
     pointing.plot(time, pointing_error(runs), color=COLORS[1])
@@ -87,7 +87,7 @@ def figure(runs: dict[str, hubslosh.Run]) -> plt.Figure:
 
 
 def main() -> None:
-    """Draw what the liquid does to the pointing."""
+    """Simulate the manoeuvre and draw how the liquid changes the pointing."""
     parser = argparse.ArgumentParser(description="What the liquid does to your craft.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.add_argument("--out", type=Path, default=Path("my_tank.png"))

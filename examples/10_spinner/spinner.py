@@ -23,7 +23,7 @@ START = (0.06, 0.02, SPIN)  # rad/s
 
 
 def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[str, float | int]:
-    """Return the FMU's: two tanks at ±0.45 m whose bottoms look outwards."""
+    """Return parameters of the FMU: two tanks at ±0.45 m whose bottoms point outwards."""
     values: dict[str, float | int] = {
         "craft.mass": 310.0, "craft.r[3]": 0.05, "craft.Jxx": 152.0, "craft.Jyy": 148.0,
         "craft.Jzz": j_zz, "tanks": 2,
@@ -79,7 +79,7 @@ def nutation(fmu: str, j_zz: float, stop: float, slosh: bool = True) -> pd.DataF
 
 
 def mean_growth(history: pd.DataFrame, until: float = np.inf) -> float:
-    """Return the rate of growth of the nutation angle, 1/s, once its wobble is averaged out."""
+    """Return the mean growth rate of the nutation angle, 1/s, over whole periods of its wobble."""
     part = history[(history["time"] > 60) & (history["time"] < until)]
     return float(np.polyfit(part["time"], np.log(part["angle"]), 1)[0])
 

@@ -56,7 +56,7 @@ def body(mass: float, centre: np.ndarray, inertia: np.ndarray) -> Values:
 
 
 def tank(name: str) -> Values:
-    """Return the tank's parameters: ``tank`` in SloshTank.fmu, ``tank[1]`` in Spacecraft.fmu."""
+    """Return the tank's parameters; ``name`` is ``tank`` (SloshTank) or ``tank[1]`` (Spacecraft)."""
     values: Values = {f"{name}.position[{i}]": float(x) for i, x in enumerate(POSITION, 1)}
     values |= {
         f"{name}.m_0": M_0, f"{name}.H_0": H_0, f"{name}.I_0": I_0, f"{name}.mass[1]": BOB,
@@ -68,9 +68,9 @@ def tank(name: str) -> Values:
 
 
 def lumped() -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass, centre of mass and inertia of the host with rigid liquid and bob at its hinge.
+    """Return mass, centre of mass and inertia of the host with the liquid lumped into it.
 
-    That is what coupling = rigid_body expects of the host.
+    The liquid is the rigid liquid and the bob at its hinge, as coupling = rigid_body expects.
     """
     e = np.array([0.0, 0.0, 1.0])
     parts = [
@@ -86,7 +86,7 @@ def lumped() -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def simulate_whole(folder: Path | None) -> pd.DataFrame:
-    """Return what Spacecraft.fmu makes of host and tank together: the reference."""
+    """Return the motion of host and tank that Spacecraft.fmu computes, the reference."""
     settings = body(MASS, CENTRE, INERTIA) | tank("tank[1]") | {"tanks": 1} | START
     return hubslosh.simulate(
         fmu(folder, "Spacecraft"), settings, stop=STOP, step=STEPS[0], outputs=RECORDED,
@@ -100,9 +100,9 @@ def fmu(folder: Path | None, name: str) -> str | Path:
 
 
 def coupled(folder: Path | None, step: float, wrench: bool = False) -> pd.DataFrame:
-    """Couple the two FMUs: the host steps first, values are held.
+    """Simulate both FMUs coupled: the host steps first, and values are held over the step.
 
-    wrench: the tank's force and torque as they are, on a host without liquid, the naive way.
+    With ``wrench`` the host receives the tank's total force and torque, the naive way.
     """
     if wrench:
         host_settings, loads = body(MASS, CENTRE, INERTIA), {p: p for p in LOADS.values()}
@@ -256,7 +256,7 @@ def on_basilisk(folder: Path | None, step: float) -> pd.DataFrame:
 
 
 def error(found: pd.DataFrame, reference: pd.DataFrame) -> float:
-    """Return the largest difference of the rate at common times, of the largest rate."""
+    """Return the largest difference of the angular rate at common times, over its largest value."""
     at = np.interp(reference["time"], found["time"], np.arange(len(found)))
     rows = np.rint(at).astype(int)
     aligned = np.abs(found["time"].to_numpy()[rows] - reference["time"].to_numpy()) < 1e-9

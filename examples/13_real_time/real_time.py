@@ -30,7 +30,7 @@ SILENCE = 5.0
 
 
 def controller(port: int) -> None:
-    """Answer every state with a torque, until nothing comes for `SILENCE`."""
+    """Answer every received state with a torque, until no state arrives for `SILENCE`."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
         peer.bind(("127.0.0.1", 0))
         peer.settimeout(SILENCE)
@@ -45,7 +45,7 @@ def controller(port: int) -> None:
 
 
 def wait(until: float) -> None:
-    """Sleep for most of the time, then look at the clock: a sleep may end a tick late."""
+    """Wait until a time: sleep most of it, then read the clock, as a sleep may end late."""
     rest = until - time.perf_counter() - 2e-4
     if rest > 0:
         time.sleep(rest)
@@ -54,13 +54,13 @@ def wait(until: float) -> None:
 
 
 def run(fmu: str | Path, cycles: int) -> pd.DataFrame:
-    """Run so many cycles in real time.
+    """Simulate this number of cycles in real time.
 
-    One row a cycle: ``start`` (s after it was due), ``work`` (s that it took: the newest torque in,
-    a step, the state out), ``missed`` (it ended after the next was due), ``age`` (cycles between a
-    torque and the state that it answers; -1 before the first answer), ``theta`` (rad) and
-    ``time`` of the FMU (s). A cycle that is late is made all the same, at
-    once: time of the FMU does not stop.
+    The table has one row for each cycle: ``start`` (s after it was due), ``work`` (s that it took:
+    newest torque in, a step, state out), ``missed`` (it ended after the next was due), ``age``
+    (cycles between a torque and the state that it answers; -1 before the first answer), ``theta``
+    (rad) and ``time`` of the FMU (s). A late cycle is not skipped but begins at once, so that the
+    time of the FMU falls behind only for a while.
     """
     rows = np.empty((cycles, 6))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
@@ -100,7 +100,7 @@ def run(fmu: str | Path, cycles: int) -> pd.DataFrame:
 
 
 def lines(table: pd.DataFrame) -> list[str]:
-    """Say what is found of a run."""
+    """Return the results of a run as lines of text."""
     cycles = len(table)
     shown = [
         f"{cycles} cycles of {1e3 * PERIOD:g} ms, {int(table['missed'].sum())} missed deadlines"
@@ -120,7 +120,7 @@ def lines(table: pd.DataFrame) -> list[str]:
 
 
 def figure(table: pd.DataFrame, path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     import matplotlib.pyplot as plt
 
     whole, (when, share) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
@@ -145,7 +145,7 @@ def figure(table: pd.DataFrame, path: Path) -> None:
 
 
 def main() -> None:
-    """Print the numbers, draw the figure."""
+    """Print the results of a run and draw the figure."""
     parser = argparse.ArgumentParser(description="The FMU at 1 kHz against a UDP peer.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.add_argument("--cycles", type=int, default=10_000, help="1 ms each, 60,000 at most")

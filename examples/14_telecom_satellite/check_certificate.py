@@ -8,7 +8,7 @@ import numpy as np
 
 
 def check(path: str | Path) -> float:
-    """Return the largest eigenvalue of X in a certificate; below 0, all it says is proved."""
+    """Return the largest eigenvalue of X in a certificate; below 0, stability is proved."""
     c = np.load(path)
     copies, period, n = np.repeat(np.arange(len(c["counts"])), c["counts"]), c["period"], 9
     same = copies[:, None] == copies

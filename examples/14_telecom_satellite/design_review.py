@@ -8,7 +8,10 @@ import hubslosh
 
 
 def review(fills: list[str] = telecom.FILLS, draws: int = 200) -> hubslosh.Review:
-    """Return the review with 5 % of inertia, 10 mm of a tank's place and 50 ms of delay open."""
+    """Return the design review with uncertain inertia, tank position and delay.
+
+    The inertia varies by 5 %, a tank's position by 10 mm, and the delay by 50 ms.
+    """
     return telecom.craft.review(
         telecom.controller(), telecom.PERIOD, fills, measured=telecom.MEASURED,
         delay=telecom.DELAY, draws=draws,

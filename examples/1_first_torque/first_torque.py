@@ -17,13 +17,13 @@ PULSE = pd.DataFrame(
 
 
 def run(fmu: str | Path, model: str) -> pd.DataFrame:
-    """Return the answer to the pulse, on the bench's sticking bearing."""
+    """Return the response to the pulse, on the bench with its sticking bearing."""
     outputs = ["omega", "omega_dot", "slosh_angle", "stuck"]
     return hubslosh.simulate(fmu, {"slosh.model": model}, PULSE, step=0.01, outputs=outputs)
 
 
 def main() -> None:
-    """Print what the liquid does, draw the figure."""
+    """Print how the liquid changes the response, and draw the figure."""
     parser = argparse.ArgumentParser(description="A pulse of torque on the hub.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

@@ -71,13 +71,13 @@ DURATION = {"bang-stop-bang": 3.6, "smoothed": 4.8}
 
 
 def inertia(fmu: str | Path) -> float:
-    """Return the moment of inertia of hub and rigid liquid, kg·m²."""
+    """Return the moment of inertia of the hub with rigid liquid, kg·m²."""
     frozen = hubslosh.linearize(fmu, FREE | {"slosh.model": "frozen"}, ["tau_cmd"], ["omega"])
     return 1 / frozen.B[0, 0]
 
 
 def slew(fmu: str | Path, profile: Profile, model: str) -> pd.DataFrame:
-    """Simulate the slew; the column ``error`` is theta less what the profile wants, rad."""
+    """Simulate the slew; the column ``error`` is theta minus the angle of the profile, rad."""
     I, w = inertia(fmu), 2 * np.pi * BANDWIDTH
 
     def law(time: float, measured: np.ndarray) -> float:
@@ -96,7 +96,7 @@ def slew(fmu: str | Path, profile: Profile, model: str) -> pd.DataFrame:
 
 
 def settling_time(run: pd.DataFrame, profile: str) -> float:
-    """Return when the slew is over and the pointing error below `TOLERANCE` for good, s."""
+    """Return the time, s, after which the pointing error stays below `TOLERANCE`."""
     outside = run["time"][run["error"].abs() >= TOLERANCE]
     return max(DURATION[profile], outside.max() + PERIOD)
 
@@ -108,14 +108,14 @@ def results(fmu: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
 
 
 def title(runs: dict[tuple[str, str], pd.DataFrame], profile: str) -> str:
-    """Say how long the slew takes and when it has settled."""
+    """Return a title that says how long the slew takes and when the craft has settled."""
     settled = settling_time(runs[profile, "spherical"], profile)
     over = f"{profile.capitalize()}: over at {DURATION[profile]} s"
     return f"{over}, settled at {settled:.1f} s"
 
 
 def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     figure, axes = plt.subplots(3, 2, figsize=(10, 9), layout="constrained")
     for column, profile in zip(axes.T, PROFILES, strict=True):
         torque, error, path_of = column

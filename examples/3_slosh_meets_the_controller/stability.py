@@ -48,7 +48,7 @@ class Bench:
     """The FMU at rest, with its linear models."""
 
     def __init__(self, fmu: str | Path = "HubSlosh", parameters: dict | None = None) -> None:
-        """Take the FMU, and parameters in addition to `VISCOUS`."""
+        """Store the FMU, and parameters that are set in addition to `VISCOUS`."""
         self.fmu = fmu
         self.parameters = VISCOUS | (parameters or {})
         self.linear = self._linearize({})
@@ -145,7 +145,7 @@ def slosh_damping(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> 
 
 @dataclass(frozen=True)
 class Margins:
-    """Distance of a loop from -1."""
+    """Margins of a loop: how far its loop gain stays away from -1."""
 
     gain: float
     """Largest factor of the gains that leaves the loop stable, dB; negative: it is unstable."""
@@ -295,9 +295,9 @@ def threshold(bench: Bench, bandwidth: float) -> float:
 
 
 def settled(bench: Bench, bandwidth: float, stop: float) -> list[float]:
-    """Return to which amplitudes a run with spherical pendulums tends.
+    """Return the amplitudes that a run with spherical pendulums approaches.
 
-    Slosh angle, tangential and radial, in rad, and the hub's rate, rad/s.
+    They are the slosh angles, tangential and radial, in rad, and the hub's rate, rad/s.
     """
     columns = ["slosh_angle", "slosh_angle_radial", "omega"]
     parameters = {"slosh.model": "spherical", "init.slosh_angle": 0.3}
@@ -339,7 +339,7 @@ def table(full: Bench, drained: Bench) -> pd.DataFrame:
 
 
 def figure(full: Bench, drained: Bench, path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     _, axes = plt.subplots(3, 2, figsize=(11, 12), layout="constrained")
     (damping, nyquist), (notch_slow, notch_fast), (decay, cycles) = axes
     blue, orange, green, pink = COLORS[:4]

@@ -28,7 +28,7 @@ WIDTHS = (1e-2, 1e-3, 1e-5)
 def run(
     fmu: str | Path, angle: float, stop: float, parameters: dict, integral: float = 0.0
 ) -> pd.DataFrame:
-    """Simulate a step of the wanted angle (rad) under a PID, spherical pendulums."""
+    """Simulate a step of the commanded angle (rad) under a PID, with spherical pendulums."""
     w, area = 2 * np.pi * BANDWIDTH, 0.0
 
     def law(time: float, measured: np.ndarray) -> float:
@@ -45,7 +45,7 @@ def run(
 
 
 def saturation(fmu: str | Path) -> dict[str, pd.DataFrame]:
-    """Return steps of 90 degrees on a free bearing: any torque, and the wheel's."""
+    """Return steps of 90 degrees on a free bearing: with unlimited torque, and with the wheel's."""
     free = {"friction.model": "none"}
     return {
         "any torque": run(fmu, np.pi / 2, 20, free),
@@ -61,13 +61,13 @@ def friction_laws() -> dict[str, dict]:
 
 
 def stiction(fmu: str | Path, integral: float, stop: float) -> dict[str, pd.DataFrame]:
-    """Return steps of 1 degree by friction law."""
+    """Return for each friction law the motion after a step of 1 degree."""
     angle = np.radians(1)
     return {name: run(fmu, angle, stop, law, integral) for name, law in friction_laws().items()}
 
 
 def summary(fmu: str | Path) -> pd.DataFrame:
-    """Return the pointing error (deg) some times after the step, by controller and law."""
+    """Return the pointing error (deg) at some times after the step, by controller and law."""
     rows = {}
     for controller, integral in (("PD", 0.0), ("PID", INTEGRAL)):
         for name, table in stiction(fmu, integral, 60).items():
@@ -78,7 +78,7 @@ def summary(fmu: str | Path) -> pd.DataFrame:
 
 
 def figure(fmu: str | Path, path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     whole, axes = plt.subplots(2, 2, figsize=(10, 7), layout="constrained")
     (angle, speed), (pd_error, pid_error) = axes
     for (name, table), color in zip(saturation(fmu).items(), COLORS, strict=False):

@@ -46,7 +46,7 @@ def specific_force() -> pd.DataFrame:
 
 
 def linear(fmu: str | Path, model: str = "linear") -> hubslosh.LinearModel:
-    """Return the craft under thrust."""
+    """Return the linear model of the craft under thrust."""
     parameters = CRAFT | {"slosh.model": model, "g_axial": THRUST}
     return hubslosh.linearize(fmu, parameters, ["tau_cmd"], ["theta", "omega"])
 
@@ -78,7 +78,7 @@ def run(fmu: str | Path, bandwidth: float, model: str = "spherical") -> pd.DataF
 
 
 def decay(table: pd.DataFrame) -> float:
-    """Return the rate at which slosh decays under thrust, from 10 and 90 % of it, 1/s."""
+    """Return the decay rate of the slosh under thrust, 1/s, from its times at 90 and 10 %."""
     thrust = table.query("@START + 150 <= time < @END")
     n = len(thrust) // 4
     first, last = (np.std(thrust["slosh_angle"].iloc[s]) for s in (slice(0, n), slice(-n, None)))
@@ -86,7 +86,7 @@ def decay(table: pd.DataFrame) -> float:
 
 
 def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     whole, (error, slosh, damping) = plt.subplots(
         3, figsize=(8, 9), layout="constrained", height_ratios=(1, 1, 1)
     )

@@ -36,7 +36,7 @@ TOLERANCE = np.radians(0.01)
 
 
 def gains() -> np.ndarray:
-    """Return [kp, kd]."""
+    """Return the gains [kp, kd] of the PD controller."""
     w = 2 * np.pi * BANDWIDTH
     return INERTIA * np.array([w**2, 2 * ZETA * w])
 
@@ -60,7 +60,7 @@ def draws(runs: int, seed: int) -> pd.DataFrame:
 
 
 def one(row: dict[str, float], fmu: str) -> dict[str, float]:
-    """Return what a worker finds for one draw: largest pole (linear, viscous) and settling time."""
+    """Return the results of one draw: largest pole (linear, viscous) and settling time."""
     k = gains()
     parameters = {"slosh.zeta_from_correlation": False} | row
     viscous = parameters | {"friction.model": "viscous"}
@@ -80,7 +80,10 @@ def one(row: dict[str, float], fmu: str) -> dict[str, float]:
 
 
 def study(client: "Client | None", runs: int, seed: int, fmu: str) -> pd.DataFrame:
-    """Return the draws with what dask's workers found, or processes of this machine."""
+    """Return the draws with their results.
+
+    They are computed by dask's workers, or by processes of this machine.
+    """
     table = draws(runs, seed)
     rows = table.to_dict("records")
     if client:
@@ -92,7 +95,7 @@ def study(client: "Client | None", runs: int, seed: int, fmu: str) -> pd.DataFra
 
 
 def figure(table: pd.DataFrame, path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     whole, (poles, times, ranks) = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained")
     stable = table["largest_pole"] < 1
     fill = 100 * table["tank.h"]

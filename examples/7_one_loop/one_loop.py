@@ -30,7 +30,7 @@ TOLERANCE = 1e-9
 
 @dataclass
 class Loop:
-    """Plant and controller, connected; a Jacobi master's view of them."""
+    """Plant and controller, connected, as a Jacobi master sees them."""
 
     plant: hubslosh.Plant
     controller: hubslosh.Plant
@@ -40,7 +40,7 @@ class Loop:
     steps: int = field(default=0, init=False)
 
     def exchange(self) -> list[float]:
-        """Read all outputs, then set all inputs; return tau and what is recorded."""
+        """Read all outputs, then set all inputs; return tau and the recorded signals."""
         theta, omega, omega_dot = self.plant.get(["theta", "omega", "omega_dot"])
         row = self.plant.get(RECORDED)
         self.controller.set("theta", theta)
@@ -55,18 +55,18 @@ class Loop:
         return [tau, *row]
 
     def step(self, end: float) -> None:
-        """Step both to ``end``, s."""
+        """Step both FMUs to the time ``end``, s."""
         self.plant.step(end)
         self.controller.step(end)
         self.time = end
         self.steps += 1
 
     def save(self) -> tuple:
-        """Return both FMUs' states."""
+        """Return the saved states of both FMUs."""
         return self.plant.save(), self.controller.save()
 
     def restore(self, saved: tuple) -> None:
-        """Roll back to what `save` returned."""
+        """Return to the states that `save` returned."""
         self.plant.restore(saved[0])
         self.controller.restore(saved[1])
         self.time = saved[0][0]
@@ -143,12 +143,12 @@ WATCHED = ["theta", "omega", "slosh_angle"]
 
 
 def exactly(fmu: str | Path) -> hubslosh.Plant:
-    """Return the plant, its own solver so exact that the coupling's errors are the larger ones."""
+    """Return the plant with a solver so accurate that only errors of the coupling matter."""
     return hubslosh.Plant(fmu, PLANT, tolerance=1e-11)
 
 
 def jump(loop: Loop) -> float:
-    """Set the torque from outside as it is now; return when it changes next, s."""
+    """Set the external torque of the present time; return when it changes next, s."""
     loop.plant.set("tau_ext", [torque for start, torque in PULSES if start <= loop.time][-1])
     return min((start for start, _ in PULSES if start > loop.time), default=STOP)
 
@@ -228,7 +228,7 @@ def exact(fmu: str | Path, times: np.ndarray) -> np.ndarray:
 
 
 def hosts(folder: Path, fmu: str | Path) -> dict[str, float]:
-    """Return the hosts' differences from the harness, by name; libcosim's if it is there."""
+    """Return the differences between each host and the harness, by host; libcosim if installed."""
     held, slopes = (pd.read_csv(folder / f"loop_{name}.csv") for name in ("held", "slopes"))
     found = {
         "fmpy, inputs held": difference(in_fmpy(folder, fmu, False), held),
@@ -243,7 +243,7 @@ def hosts(folder: Path, fmu: str | Path) -> dict[str, float]:
 
 
 def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> None:
-    """Draw what README explains."""
+    """Draw the figure that README explains."""
     import matplotlib.pyplot as plt
 
     from hubslosh.plot import COLORS, save

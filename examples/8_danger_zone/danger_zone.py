@@ -29,13 +29,13 @@ BOB = (128.211, 0.248039, 0.136534)
 
 @dataclass(frozen=True)
 class Craft:
-    """The craft with its tank's origin at the height ``z``, m."""
+    """The craft with the origin of its tank at the height ``z``, m."""
 
     z: float
     zeta: float = 0.0
 
     def __post_init__(self) -> None:
-        """Take rigid liquid and dry craft together."""
+        """Compute mass, centre of mass and inertia of rigid liquid and dry craft together."""
         (m_b, z_b, I_b), (m_0, H_0, I_0) = DRY, LIQUID
         M = m_b + m_0
         z_R = (m_b * z_b + m_0 * (self.z + H_0)) / M
@@ -90,7 +90,7 @@ class Craft:
         return max(self.predicted_growth, 0.0) / (np.sqrt(THRUST / (self.M + m) / l) * sigma)
 
     def parameters(self) -> dict[str, float]:
-        """Return the FMU's, with O at the gimbal."""
+        """Return the parameters of the FMU, with O at the gimbal."""
         m, l, hinge = BOB
         return {
             "craft.mass": DRY[0], "craft.r[3]": DRY[1] - GIMBAL, "craft.Jyy": DRY[2],
@@ -131,7 +131,7 @@ def growth(fmu: str, craft: Craft) -> float:
 
 
 def simulate(fmu: str, craft: Craft, stop: float, period: float = 0.01) -> pd.DataFrame:
-    """Simulate the loop, sampled, after the liquid is let go 1 degree off its rest."""
+    """Simulate the sampled loop after the liquid is released 1 degree from its rest."""
     k_p, k_d = craft.gains
 
     def law(_: float, seen: np.ndarray) -> float:

@@ -35,7 +35,7 @@ FREQUENCY, ZETA = 0.08, 0.01
 
 
 def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, float | int]:
-    """Return the FMU's: tanks at ±ARM across, their axes along the thrust axis x."""
+    """Return parameters of the FMU: tanks at ±ARM, their axes along the thrust axis x."""
     values: dict[str, float | int] = {
         "craft.mass": 900.0, "craft.Jxx": J_XX, "craft.Jyy": 380.0, "craft.Jzz": 400.0, "tanks": 2,
         "craft.r[1]": 0.0, "craft.r[2]": 0.0, "craft.r[3]": 0.0,
@@ -69,10 +69,10 @@ def reference(time: float) -> tuple[float, float, float]:
 
 
 class Observer:
-    """Kalman filter of roll rate and slosh from the gyro and the torques that were commanded."""
+    """Kalman filter of the roll rate and the slosh, from the gyro and the commanded torques."""
 
     def __init__(self, fmu: str, frequency: float) -> None:
-        """Take the FMU's own linear model; frequency: what the liquid is thought to have, Hz."""
+        """Use the FMU's own linear model; ``frequency`` is the assumed slosh frequency, Hz."""
         believed = parameters(frequency=frequency)
         model = hubslosh.linearize(fmu, believed, ["torque[1]"], ["omega[1]"])
         self.rate = model.states.index("omega[1]")
@@ -110,9 +110,9 @@ def slew(
     frequency: float = FREQUENCY,
     stop: float = STOP,
 ) -> pd.DataFrame:
-    """Simulate one slew; ``estimate`` is the observer's slosh torque at each row, N·m.
+    """Simulate one slew; ``estimate`` is the observer's slosh torque in each row, N·m.
 
-    frequency: what the observer takes for the liquid's, Hz.
+    ``frequency`` is the slosh frequency that the observer assumes, Hz.
     """
     observer = Observer(fmu, frequency) if slosh else None
     random = np.random.default_rng(1)

@@ -224,7 +224,7 @@ def residual_of(model: Model, step: float, torque: Real, rate: Real) -> Real:
 
 
 def coherence(step: float, torque: Real, output: Real, length: int) -> tuple[Real, Real]:
-    """Welch's coherence: Hamming windows, half overlap, four times the length with zeros."""
+    """Welch's coherence: Hamming windows, half overlap, zeros added to four times the length."""
     window = signal.windows.hamming(length, sym=True)
     return signal.coherence(
         torque - torque.mean(),
@@ -306,7 +306,7 @@ def analyse(path: Path) -> tuple[Features, Features]:
 def compare(
     campaign: Path, analyse: Callable[[Path], tuple[Features, Features]] = analyse
 ) -> list[str]:
-    """Analyse every run of a campaign; return what differs by more than its tolerance."""
+    """Analyse all runs of a campaign; return the features that exceed their tolerances."""
     rows = {}
     with (campaign / "runs.csv").open(newline="") as file:
         rows["features.csv"] = [row for row in csv.DictReader(file) if not row["error"]]

@@ -165,7 +165,7 @@ def drive_here(
 
 
 class Package(WorkerPlugin):
-    """The package hubslosh, without FMUs, in every worker's folder: no zip holds compiled code."""
+    """The package hubslosh without FMUs, as a folder: compiled code cannot be loaded from a zip."""
 
     def __init__(self) -> None:
         """Read the package's files; the compiled half gets the name that Python looks for."""

@@ -132,7 +132,7 @@ class Craft:
         return dx
 
     def fly(self, slew: np.ndarray, pulse: np.ndarray) -> pd.DataFrame:
-        """Fly: attitudes that are commanded and sideways forces, row by row; angles are small."""
+        """Simulate a flight with commanded attitudes and sideways forces; angles are small."""
         x = np.concatenate([np.zeros(3), *(np.array([0, 0, -1.0, 0, 0, 0]) for _ in self.bobs)])
         angle, h, rows = np.zeros(3), np.zeros(3), []
         # the engine is trimmed: thrust through the centre of mass turns nothing

@@ -31,7 +31,7 @@ Harness = Callable[..., dict[str, np.ndarray]]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Say where the FMU and the harness are."""
+    """Add the options for the paths of the FMU and of the harness."""
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     wheels = sorted((ROOT / "dist").glob("hubslosh-*.whl"))
@@ -42,7 +42,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the markers: Octave is not on every machine, and `cargo test` is for minutes."""
+    """Declare the markers of tests that need Octave and of long tests."""
     config.addinivalue_line("markers", "octave: needs Octave; --octave (.ci/octave) runs it")
     config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests) runs it")
 
@@ -56,7 +56,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def option(request: pytest.FixtureRequest, name: str) -> Path:
-    """Return the file that a flag names."""
+    """Return the path of the file that an option of pytest names."""
     path: Path = request.config.getoption(name).absolute()
     if not path.is_file():
         pytest.exit(f"{name}: there is no file {path}; cargo run --release -- pack", returncode=4)
@@ -95,7 +95,7 @@ def run_with_wheel(arguments: list[str | Path], wheel: Path, folder: Path, reque
 
 @pytest.fixture(scope="session")
 def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Harness:
-    """Return a function that makes one run with ``hubslosh run`` and reads what it wrote."""
+    """Return a function that simulates with ``hubslosh run`` and reads the written table."""
     binary = option(request, "--hubslosh")
 
     def run(*arguments: str, columns: tuple[str, ...] = COLUMNS) -> dict[str, np.ndarray]:
@@ -126,7 +126,7 @@ def drive(
 def single_calls(
     fmu: Path, parameters: dict, inputs: pd.DataFrame, columns: list[str], hold: bool
 ) -> pd.DataFrame:
-    """Return what `simulate` does, by one call for each input, step and output."""
+    """Return the result of `simulate`, computed by one call for each input, step and output."""
     time, names = inputs["time"].to_numpy(), list(inputs)[1:]
     start = {name: inputs[name][0] for name in names}
     rows = []

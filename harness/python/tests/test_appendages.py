@@ -45,7 +45,7 @@ def craft(fmu: Path) -> Craft:
 
 
 def crossed(v: np.ndarray) -> np.ndarray:
-    """Return the matrix of a cross product."""
+    """Return the matrix of the cross product with the vector ``v``."""
     x, y, z = v
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 

@@ -118,7 +118,7 @@ WRONG = [
 
 @pytest.fixture(scope="module")
 def given(fmu: Path) -> SimpleNamespace:
-    """Return what some of the calls need."""
+    """Return the arguments that some of the calls need."""
     model = hubslosh.linearize(fmu, VISCOUS, "tau_cmd", "omega")
     return SimpleNamespace(run=hubslosh.simulate(fmu, VISCOUS, SWEEP), model=model, fmu=fmu)
 

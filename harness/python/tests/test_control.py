@@ -39,7 +39,10 @@ def craft() -> dict[str, float]:
 
 
 def three_axes(model: Path) -> Loop:
-    """Return a PD on quaternion and rate of that craft, with a filter, 0.13 s late."""
+    """Return a PD controller on quaternion and rate of that craft.
+
+    It has a filter and a delay of 0.13 s.
+    """
     w, J = 2 * np.pi * 0.03, np.diag([300.0, 170.0, 260.0])
     gains = np.hstack([2 * w**2 * J, 1.4 * w * J])
     smooth = control.ss(0.5 * np.eye(3), 0.5 * np.eye(3), np.eye(3), 0, PERIOD)

@@ -42,7 +42,7 @@ PARAMETERS = {
 
 
 def three(fmu: Path, model: str = "HubSlosh") -> Path:
-    """Return the FMU 3.0 in the same folder as an FMU 2.0."""
+    """Return the FMU 3.0 of a model, in the folder of the FMU 2.0."""
     return fmu.with_name(f"{model}-fmi3.fmu")
 
 
@@ -83,7 +83,7 @@ def test_linear_inputs_are_passed_by_intermediate_update(fmu: Path, model: str) 
 
 
 def _sizes(table: pd.DataFrame) -> list[tuple[str, float]]:
-    """Return the columns that move, with their largest values."""
+    """Return the columns of a table that change, each with its largest value."""
     return [(name, np.abs(table[name]).max()) for name in table if table[name].any()]
 
 

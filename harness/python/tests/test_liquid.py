@@ -17,17 +17,17 @@ XI = 1.841183781340659  # first zero of J1'
 
 
 def lambdas(found: LiquidModes) -> np.ndarray:
-    """Return ω²/g of the modes."""
+    """Return the eigenvalues λ = ω²/g of the modes, 1/m."""
     return (2 * np.pi * found.modes["frequency"].to_numpy()) ** 2 / found.gravity
 
 
 def error(found: LiquidModes, mode: int = 0) -> float:
-    """Return the stated error of λ, which is the frequency's squared."""
+    """Return the stated relative error of λ, which is twice that of the frequency."""
     return 2 * float(found.error["frequency"][mode])
 
 
 def line(a: complex, b: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points, derivative and weights of a straight piece of a boundary, x + i z."""
+    """Return points, derivative and weights of a straight line of a boundary, with x + i z."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
     return a + (b - a) * (nodes + 1) / 2, np.full_like(nodes, b - a, complex), weights / 2
 

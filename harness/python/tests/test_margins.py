@@ -20,7 +20,7 @@ TURN = 2 * np.pi
 
 
 def crossings(found, kind: str) -> np.ndarray:
-    """Return the frequencies of one kind, rad/s."""
+    """Return the frequencies of the crossings of one kind, gain or phase, rad/s."""
     table = found.crossings
     return table.loc[table["crossing"] == kind, "frequency"].to_numpy() * TURN
 

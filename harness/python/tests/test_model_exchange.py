@@ -37,7 +37,7 @@ def quickly(chosen: str) -> list:
 
 
 def tau() -> np.ndarray:
-    """Return a torque that changes twice a second, N·m, often less than the bearing holds."""
+    """Return a torque, N·m, that changes twice a second and is often less than static friction."""
     levels = np.array([0.1, 0.0, -0.2, 0.004, 0.3, 0.0, 0.0, -0.3])
     return levels[np.arange(len(TIME)) // HELD % len(levels)]
 
@@ -57,14 +57,14 @@ def steps_for_fmpy(torque: np.ndarray, held: int) -> np.ndarray:
 
 
 def difference(a: dict[str, np.ndarray], b: dict[str, np.ndarray], name: str) -> float:
-    """Return by how much a signal differs at most, SI."""
+    """Return the largest difference of a signal between two runs, in SI units."""
     largest = float(np.abs(a[name] - b[name]).max())
     print(f"{name}: {largest:.1e} of {np.abs(b[name]).max():.1e}")
     return largest
 
 
 def start_values(model: str) -> dict[str, float]:
-    """Return what the runs start from: turning, with the liquid displaced."""
+    """Return the start values of the runs: a turning hub with displaced liquid."""
     values = {"slosh.model": MODELS[model], "init.omega": 0.5, "init.slosh_angle": 0.3}
     return values | {"init.slosh_angle_radial": 0.2}
 
@@ -77,7 +77,7 @@ def model_exchange(
     interval: float = STEP,
     **arguments,
 ) -> dict[str, np.ndarray]:
-    """Return the signals at TIME as fmpy's integrator finds them."""
+    """Return the signals at TIME, simulated by the integrator of fmpy (Model Exchange)."""
     result = simulate_fmu(
         str(fmu),
         fmi_type="ModelExchange",
@@ -95,7 +95,7 @@ def model_exchange(
 
 
 def co_simulation(fmu: Path, start: dict[str, float], torque: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the signals at TIME as the FMU itself finds them, to 1e-12."""
+    """Return the signals at TIME, simulated by the FMU itself with the tolerance 1e-12."""
     columns = [*SIGNALS, "event_count"]
     return drive(fmu, TIME, torque, start, tolerance=1e-12, hold=True, columns=columns)
 

@@ -34,7 +34,7 @@ def craft(fmu: Path) -> Craft:
 
 
 def numbers(found: hubslosh.Margins) -> np.ndarray:
-    """Return all crossings with their margins."""
+    """Return all crossings of the loops, with their margins, as numbers."""
     return found.crossings[["frequency", "gain_margin", "phase_margin"]].to_numpy()
 
 

@@ -103,7 +103,7 @@ def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
 
 
 def test_errors_of_the_command_are_passed_on(fmu: Path, tmp_path: Path, request) -> None:
-    """The file given as a plan is not a plan."""
+    """A file that is no plan is given as a plan; the error is the command's."""
     binary = option(request, "--hubslosh")
     with pytest.raises(FmuError, match=r"(?s)hubslosh campaign: .*sewer"):
         hubslosh.campaign("sewer=1\n", tmp_path, model=fmu, program=binary)
@@ -122,7 +122,7 @@ def test_a_missing_command_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def with_binary(fmu: Path, binary: bytes, path: Path) -> Path:
-    """Write an FMU that has another binary."""
+    """Write a copy of an FMU that has another binary."""
     with zipfile.ZipFile(fmu) as packed, zipfile.ZipFile(path, "w") as new:
         for name in packed.namelist():
             new.writestr(name, binary if "binaries/" in name else packed.read(name))
@@ -292,7 +292,7 @@ SPUN_DOWN = {
 
 
 def spun_down() -> list[pd.DataFrame]:
-    """Return records of a hub with viscous friction in closed form, spun down twice."""
+    """Return two recordings, in closed form, of a hub that viscous friction stops."""
     random = np.random.default_rng(1)
     time = np.arange(0.0, 20.0, 0.1)
     return [

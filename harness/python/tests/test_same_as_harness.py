@@ -31,7 +31,10 @@ def by_fmpy(
     fmu: Path, folder: Path, time: np.ndarray, torque: np.ndarray, settings: dict,
     tolerance: float | None = None, hold: bool = False,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Drive an instance with fmpy, call by call; straight lines between the rows, or held."""
+    """Simulate an FMU with fmpy, call by call.
+
+    Inputs are straight lines between the rows, or held.
+    """
     description = read_model_description(str(fmu))
     variables = {v.name: v for v in description.modelVariables}
     plant = fmi2.FMU2Slave(
@@ -65,7 +68,7 @@ def by_fmpy(
 
 
 def shared(quick: set[tuple], *values: list) -> list:
-    """Return every combination of the values; those that are not quick are long."""
+    """Return every combination of the values as test cases; cases that are not quick are long."""
     long = pytest.mark.long
     return [
         case if case in quick else pytest.param(*case, marks=long)

@@ -25,7 +25,7 @@ EVERYTHING = {
 
 
 def go_on(plant: Plant, steps: int) -> bytes:
-    """Step on with a small torque, so that the hub sticks at times; all signals as bits."""
+    """Continue with a small torque, so that the hub sticks at times; return all signals as bits."""
     names = plant.names("output", "local")
     rows = []
     first = round(plant.time / STEP)

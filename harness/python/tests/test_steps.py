@@ -14,7 +14,7 @@ TORQUE = 0.05 * np.sin(2 * np.pi * 2.35 * KNOTS)
 
 
 def communication_points(cut: str) -> np.ndarray:
-    """Return growing times, s, all knots among them."""
+    """Return ascending communication points, s, which include all knots of the torque."""
     if cut == "random":
         between = np.random.default_rng(1).uniform(0, DURATION, 1200)
         return np.union1d(KNOTS, between)

@@ -56,12 +56,12 @@ def cells(table: pd.DataFrame) -> list[str]:
 
 
 def study(folder: Path | None, runs: int = 40, **more) -> pd.DataFrame:
-    """Make the study of this file."""
+    """Run the study of this file's outcome in a folder."""
     return monte_carlo(RANGES, runs, 3, more.pop("outcome", outcome), folder=folder, **more)
 
 
 def not_called(values: dict) -> dict[str, float]:
-    """Say that a stored run was simulated again."""
+    """Fail, because a run that was stored is simulated again."""
     raise AssertionError(values)
 
 
@@ -103,7 +103,7 @@ def test_integers_of_numpy_count_as_seed_and_runs(tmp_path: Path) -> None:
 
 
 def edited(path: Path, change) -> None:
-    """Change what a stored run says."""
+    """Change the text of a stored run by ``change``."""
     stored = json.loads(path.read_text())
     change(stored)
     path.write_text(json.dumps(stored) + "\n")
@@ -199,7 +199,7 @@ def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
 
 
 def simulated(folder: Path) -> list[dict]:
-    """Make the study, and return the draws that it simulated."""
+    """Run the study, and return the draws that it has simulated."""
     called: list[dict] = []
     study(folder, outcome=lambda values: called.append(values) or outcome(values))
     return called
@@ -263,7 +263,7 @@ Door = Callable[[Path], tuple[bool, str]]
 
 @pytest.fixture
 def doors(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str, Door]:
-    """Return the command's campaign and the package's study."""
+    """Return two functions that open a folder: the command's campaign and the package's study."""
     program = option(request, "--hubslosh")
     plan = tmp_path / "plan.toml"
     plan.write_text('profile = "sine:duration=0.2"\n[vary]\nhub.I = [0.3, 0.31]\n')
@@ -358,7 +358,7 @@ DRIVER = "from test_study import killed; import sys; killed(sys.argv[1], int(sys
 
 
 def slow(values: dict) -> dict[str, float]:
-    """Leave a moment in which a process can be killed."""
+    """Simulate a run that lasts long enough for the process to be killed."""
     time.sleep(0.001)
     return outcome(values)
 

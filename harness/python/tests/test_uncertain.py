@@ -133,7 +133,7 @@ STILL = {
 
 
 def fit(names: list[str], matrix: np.ndarray) -> Identification:
-    """Return what `identify` finds, with a covariance."""
+    """Return a result of `identify` for these unknowns, with this covariance."""
     of_fit = {"correlations": [dict.fromkeys(names)], "covariance": matrix.tolist()}
     return Identification({}, {}, None, {}, True, True, (), of_fit)
 
@@ -381,7 +381,7 @@ def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
         matrix[1] /= 1e3
 
         def seen(first: float, N: np.ndarray = matrix) -> complex:
-            """Return what the second parameter sees: 1 over the δ that makes I - N Δ singular."""
+            """Return 1 over the second parameter δ that makes I - N Δ singular, for a first one."""
             closing = np.linalg.solve(np.eye(3) - N[:3, :3] * first, N[:3, 3])
             return complex(N[3, 3] + first * N[3, :3] @ closing)
 

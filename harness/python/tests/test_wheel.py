@@ -23,9 +23,9 @@ NOTEBOOKS = sorted((HERE / "notebooks").glob("*.ipynb"))
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory) -> Path:
-    """Return the Python of an environment that pip filled with the wheel and what it asks for.
+    """Return the Python of an environment with the wheel and the packages that it requires.
 
-    It begins empty whenever the wheel asks for something else; otherwise only the wheel is new.
+    The environment begins empty whenever these packages change; otherwise only the wheel is new.
     """
     with zipfile.ZipFile(wheel) as archive:
         metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
@@ -83,7 +83,7 @@ for model in ("HubSlosh", "Spacecraft", "SloshTank"):
 
 
 def test_the_wheel_tag_names_only_this_machine(wheel: Path) -> None:
-    """Tags in the file's name and in the wheel's metadata agree."""
+    """The tags in the name of the file and in the metadata of the wheel agree."""
     tags = parse_wheel_filename(wheel.name)[3]
     assert set(tags) & set(sys_tags())
     with zipfile.ZipFile(wheel) as archive:
