@@ -56,7 +56,7 @@ def body(mass: float, centre: np.ndarray, inertia: np.ndarray) -> Values:
 
 
 def tank(name: str) -> Values:
-    """Return the tank's parameters; ``name`` is ``tank`` (SloshTank) or ``tank[1]`` (Spacecraft)."""
+    """Return the tank's parameters; ``tank`` is SloshTank's name, ``tank[1]`` Spacecraft's."""
     values: Values = {f"{name}.position[{i}]": float(x) for i, x in enumerate(POSITION, 1)}
     values |= {
         f"{name}.m_0": M_0, f"{name}.H_0": H_0, f"{name}.I_0": I_0, f"{name}.mass[1]": BOB,
