@@ -17,7 +17,7 @@ use crate::state::BallState;
 /// Carrier of tanks whose liquid can detach: the spacecraft, or the host's craft of a SloshTank. `lump` is
 /// the number of a detached liquid, `t` is the time since the start of the call, s. Vectors are in body axes.
 pub(crate) trait Carrier {
-    /// Copy of everything that a change may alter, to undo it.
+    /// Copy of everything that a change may alter, from which the carrier can be restored.
     type Memory;
 
     fn memory(&self) -> Self::Memory;

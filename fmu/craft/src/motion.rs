@@ -101,11 +101,12 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
-    /// At the start of the expansion in `state.kept`, which this step continues.
+    /// The states at the start are those of the expansion in `state.kept`, which this step
+    /// continues.
     Kept,
     /// At the start of the step, in `before`, because the expansion starts with the step.
     Step,
-    /// In `begin`, because the expansion starts within the step.
+    /// The states at the start are in `begin`, because the expansion starts within the step.
     Within,
 }
 

@@ -313,7 +313,8 @@ fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
     })
 }
 
-/// Bond number below which capillarity adds more than 3 % to omega_1^2.
+/// Bond number of the tank below which capillarity adds more than 3 % to the squared frequency of
+/// mode 1.
 const LOW_BOND: f64 = 100.0;
 
 impl Calculated {

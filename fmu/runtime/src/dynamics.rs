@@ -37,7 +37,7 @@ pub enum StepEnd {
 /// A clone is a saved state, so a model must keep no data elsewhere. Times are in s. Functions that a smooth
 /// model without events does not need have a default.
 pub trait Dynamics: Clone + Debug + Sized + 'static {
-    /// All parameters; the default has the start values.
+    /// All parameters of the model; their default values are the start values.
     type Parameters: Clone + Debug + Default;
     /// All inputs, each with its present value and its slope over the step; the default has the start values
     /// and slopes of 0.
@@ -123,13 +123,14 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         false
     }
 
-    /// Returns the continuous states in the model's own order (see `Variable::state`).
+    /// Returns the continuous states in the order in which the model counts them (see
+    /// `Variable::state`).
     fn continuous_states(&self) -> &[f64];
 
     /// Sets the continuous states from the host's integrator (Model Exchange).
     fn set_continuous_states(&mut self, x: &[f64]);
 
-    /// Sets the present time of the host's clock.
+    /// Sets the present time by the host's clock, in Model Exchange.
     fn set_time(&mut self, now: Instant);
 
     /// Computes the derivatives of the continuous states.
@@ -183,7 +184,7 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         Ok(false)
     }
 
-    /// Returns the time of the next time event, s.
+    /// Returns the time at which the model's next time event is due, s; `None` if there is none.
     fn next_time_event(&self) -> Option<f64> {
         None
     }
@@ -204,7 +205,7 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         None
     }
 
-    /// Returns the number of events since the start.
+    /// Returns the number of events since the start, by which the runtime notices new ones.
     fn event_count(&self) -> i32 {
         0
     }

@@ -579,7 +579,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Returns true if a Model Exchange host may set single states now.
+    /// Returns true if the host may set single continuous states now, that is, in Model Exchange in
+    /// event mode or continuous-time mode.
     fn takes_states(&self) -> bool {
         self.interface == Interface::ModelExchange
             && matches!(self.state, InstanceState::Event | InstanceState::Continuous)
@@ -1370,7 +1371,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 
-    /// Converts the parameters for the model even if they are not allowed.
+    /// Returns the parameters in the model's form, even if their values are not allowed.
     fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {

@@ -92,7 +92,7 @@ fn fmi3InstantiateCoSimulation(instanceName: fmi3String, instantiationToken: fmi
         co_simulation(arrays, with, required)
     })
 };
-/// Returns NULL, because there is no Scheduled Execution.
+/// Returns NULL, because the FMU does not support Scheduled Execution.
 fn fmi3InstantiateScheduledExecution(instanceName: fmi3String, instantiationToken: fmi3String, resourcePath: fmi3String, _visible: fmi3Boolean, _loggingOn: fmi3Boolean, instanceEnvironment: fmi3InstanceEnvironment, logMessage: fmi3LogMessageCallback, _clockUpdate: fmi3ClockUpdateCallback, _lockPreemption: fmi3LockPreemptionCallback, _unlockPreemption: fmi3UnlockPreemptionCallback) -> fmi3Instance = {
     let texts = (instanceName, instantiationToken, resourcePath);
     instantiate::<M>("fmi3InstantiateScheduledExecution", texts, (instanceEnvironment, logMessage), |_| {
@@ -307,7 +307,7 @@ fn fmi3DoStep(instance: fmi3Instance, currentCommunicationPoint: fmi3Float64, co
     };
     do_step::<M>(instance, step, answers)
 };
-/// Fails, because there are no model partitions.
+/// Fails, because the FMU has no model partitions (Scheduled Execution).
 fn fmi3ActivateModelPartition(instance: fmi3Instance, _clockReference: fmi3ValueReference, _activationTime: fmi3Float64) -> fmi3Status = {
     const CALL: &Call = &Call::new("fmi3ActivateModelPartition", ANY);
     perform_if_allowed::<M, Fmi3>(instance, CALL, |_| Err(CALL.error("this FMU has no Scheduled Execution")))

@@ -47,11 +47,11 @@ impl Value {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Causality {
-    /// Set by the host, at any time.
+    /// An input, which the host sets at any time.
     Input,
     Output,
     Local,
-    /// Set by the host before the end of initialization mode.
+    /// A parameter, which the host sets before the end of initialization mode.
     Parameter,
     CalculatedParameter,
 }
@@ -163,7 +163,7 @@ pub enum Access<M: Dynamics> {
         get: fn(&M::Parameters, usize) -> i32,
         set: fn(&mut M::Parameters, usize, i32),
     },
-    /// Function of the model that is constant in time.
+    /// A calculated parameter: the function computes it from the model, and it is constant in time.
     Calculated(fn(&M, usize) -> f64),
     /// A continuous state that is not an output.
     State,

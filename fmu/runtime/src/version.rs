@@ -15,11 +15,11 @@ pub trait Version: std::fmt::Debug + 'static {
     /// Data that an instance keeps about its host in this version of FMI, other than the logger.
     type Host<M: Model>;
 
-    /// The instance state after a failed call, if it changes.
+    /// The instance state after a call has failed; `None` if the state does not change.
     const AFTER_ERROR: Option<InstanceState>;
     /// Severity of the failure if a call sets a value outside its range.
     const OUT_OF_RANGE: Severity;
-    /// The instance state after initialization mode if the host handles events.
+    /// The instance state that follows initialization mode if the host handles events.
     const FIRST_EVENT: InstanceState;
     /// True if Model Exchange hosts may set single continuous states, and may not go back before an event.
     const SETS_STATES: bool;
@@ -47,10 +47,12 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// Returns the GUID (FMI 2.0) or instantiationToken (FMI 3.0).
+    /// Returns the text by which the FMU recognises its model description: the GUID (FMI 2.0) or
+    /// instantiationToken (FMI 3.0).
     fn token<M: Model>(layout: Layout) -> &'static str;
 
-    /// Returns the default handler of events for an interface.
+    /// Returns the party that handles events of an instance with this interface, if the host does
+    /// not choose.
     fn events(interface: Interface) -> Events;
 
     /// Returns true if a host may choose this handler of events for an interface.

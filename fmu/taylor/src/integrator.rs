@@ -199,11 +199,11 @@ pub trait KeptMotion: Motion {
         0.0
     }
 
-    /// Returns to the states that [`Motion::keep`] has stored.
+    /// Restores the states that [`Motion::keep`] has stored.
     #[inline(always)]
     fn return_to_start(&mut self) {}
 
-    /// Stores the states as the start of the next kept [`Expansion`].
+    /// Stores the present states as the start of the next kept [`Expansion`].
     #[inline(always)]
     fn keep(&mut self) {}
 }

@@ -19,7 +19,8 @@ use super::under_test::{FmuUnderTest, Interface, Observed, STEPS, Session, skip}
 /// Number of initial points from which the FMU is simulated. The first point has the declared start values, all further
 /// points have parameters drawn at random.
 const STARTS: u64 = 12;
-/// Relative change of a value below which it is rounding.
+/// Relative change of a value in event mode below which the change is rounding and no event was
+/// missed.
 const ROUNDING: f64 = 1e-9;
 /// Time to the next time event, as a fraction of the step, below which the event counts as due.
 const NEARLY_DUE: f64 = 1e-6;

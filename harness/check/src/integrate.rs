@@ -39,7 +39,7 @@ const PARTS: f64 = 8.0;
 /// Accuracy with which an event indicator's zero crossing is located, as a fraction of the communication
 /// step.
 const LOCATED: f64 = 1e-3;
-/// Shortest integrator step, as a fraction of the communication step.
+/// Shortest step that the integrator tries, as a fraction of the communication step.
 const SHORTEST: f64 = 1e-12;
 
 enum Trial {

@@ -150,7 +150,7 @@ pub struct UnderTest<V: Tested = Fmi2> {
     path: PathBuf,
     /// State of the process before the binary was loaded, by name; see [`surroundings`].
     pub before: Vec<(&'static str, String)>,
-    /// One binary, or two if modelIdentifier differs between the interfaces.
+    /// The loaded binaries: one, or two if modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu<V>>,
     /// The interfaces that can be called, Co-Simulation first, each with the index of its binary.
     interfaces: Vec<(Interface, usize)>,

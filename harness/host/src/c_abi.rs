@@ -27,7 +27,7 @@ pub enum Status {
     Discard,
     Error,
     Fatal,
-    /// The step goes on in the background (FMI 2.0 only).
+    /// The step continues in the background, which only FMI 2.0 allows.
     Pending,
 }
 

@@ -405,13 +405,14 @@ struct Messages<F> {
 // Kinds of messages.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
-/// The first binary is loaded. Content: size of the temporary files, bytes.
+/// Kind of the message that the first binary is loaded. Its content is the size of the temporary
+/// files, bytes.
 const LOADS: u8 = b'+';
 const ANSWER: u8 = b'>';
-/// Our code has panicked. Content: the report.
+/// Kind of the message that our own code has panicked. Its content is the report of the panic.
 const PANICS: u8 = b'?';
 const CATCHES: u8 = b'-';
-/// The work is done. Content: the exit code.
+/// Kind of the message that the process has done its work. Its content is the exit code.
 const DONE: u8 = b'=';
 
 impl<F: FnMut(&[u8])> Messages<F> {

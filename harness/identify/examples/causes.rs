@@ -33,7 +33,7 @@ struct Way {
     torque: &'static str,
     /// Change of the gyro's readings, if the effect is a fault of the gyro.
     gyro: fn(&mut Recording),
-    /// Words of the verdict or the notes that name the effect.
+    /// Words by which the verdict or the notes must name the effect.
     named: &'static str,
 }
 

@@ -230,7 +230,6 @@ pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
 
 const LEFT_OUT: &str = "the coefficients that give the wave's energy are left out, because";
 
-/// Reason why a tank has no coefficients that give the wave's energy.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 enum NoEnergy {
     #[error("the tank is not a body of revolution")]

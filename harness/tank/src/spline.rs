@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 
-/// Angle between straight pieces, rad, above which the curve keeps a corner.
+/// Smallest angle between two straight pieces of the polyline, rad, at which the curve keeps a
+/// corner.
 const CORNER: f64 = 0.7;
 
 const MANY: usize = 100;

@@ -184,7 +184,7 @@ impl Shape {
     }
 }
 
-/// Deliberate mistakes, which the reference records have to show.
+/// Deliberate mistakes in the equations, each of which at least one reference record must show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mistake {
     Nothing,

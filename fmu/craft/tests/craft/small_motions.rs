@@ -238,7 +238,7 @@ fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
 const K_P: f64 = 0.04;
 const K_D: f64 = 0.28;
 
-/// Point of attack of the lateral force, height above O, m.
+/// Height of the point at which the lateral force acts, above O, m.
 const ENGINE: f64 = -1.3;
 
 /// Returns the growth rate of the slosh pole, 1/s, in a loop that makes tau = -K_p theta - K_d

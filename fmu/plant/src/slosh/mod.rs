@@ -201,7 +201,8 @@ pub trait SloshMode {
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
     fn error_scale(&self) -> f64;
     fn coefficient_norm(&self, n: usize) -> f64;
-    /// Returns coefficient n of the mode's dissipated power, W, after `hub_reaction`.
+    /// Returns coefficient n of the power that the mode dissipates, W. `hub_reaction` must have
+    /// computed this order.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
     /// Returns coefficient n of the slosh mass times its height above rest (kg m), which is the potential energy
     /// divided by g.

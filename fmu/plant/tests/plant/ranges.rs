@@ -9,7 +9,7 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// Wave height at the wall over angle, in radii: 2/(xi_1^2 - 1).
+/// Height of the first mode's wave at the wall over the slosh angle, in tank radii: 2/(xi_1^2 - 1).
 const WAVE: f64 = 2.0 / (1.841_183_781_340_659_5 * 1.841_183_781_340_659_5 - 1.0);
 
 /// By the thesis (2.3.5) slosh is linear for waves below 0.15 R and nonlinear above 0.25 R.

@@ -148,7 +148,7 @@ const CALLS: [&Call; 40] = [
     Fmi2::GET_NOMINALS,
 ];
 
-/// Calls that both interfaces allow in every state except "fatal".
+/// Names of the functions that both interfaces allow in every instance state except "fatal".
 const ALWAYS: [&str; 12] = [
     "SetDebugLogging",
     "Reset",

@@ -100,7 +100,7 @@ fn values_of_another_type_are_refused() {
     assert_eq!(why(&a_real("m"), Integer(1)), "p = 1 (allowed: any finite number)");
 }
 
-/// An input cannot cross its range in less than 1 ns.
+/// An input may change at most so fast that it crosses its allowed range in 1 ns.
 #[test]
 fn rates_are_bounded_by_the_range() {
     let free = a_real("m");

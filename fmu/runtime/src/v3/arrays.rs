@@ -14,7 +14,7 @@ use crate::variable::{Access, Dimension, Value, Variable};
 /// present.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
-    /// Value references of the scalars, variable by variable.
+    /// Value references that the scalars have in the layout of scalars, variable by variable.
     scalars: Vec<u32>,
     ends: Vec<usize>,
     types: Vec<CType>,
@@ -64,8 +64,8 @@ impl Arrays {
         arrays
     }
 
-    /// Returns the scalars, by their indices in the table, that the variable with this value
-    /// reference has; `None` if there is no such variable.
+    /// Returns the scalars of the variable with this value reference, by the value references that they
+    /// have in the layout of scalars; `None` if there is no such variable.
     pub fn scalars(&self, reference: u32) -> Option<&[u32]> {
         let n = (reference as usize).checked_sub(1)?;
         let begin = if n == 0 { 0 } else { *self.ends.get(n - 1)? };

@@ -51,7 +51,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     assert!(format!("{refused:#}").contains("friction.b = -1"), "{refused:#}");
 }
 
-/// Misbehaviours of the shim, and the rule that must find each.
+/// Misbehaviours of the shim around our binary, each with the rule that must find it.
 const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("crashes_when_loaded", "load.opens"),
     ("types_platform", "load.types_platform"),

@@ -9,7 +9,8 @@ use crate::common::{
     XML, breaks, broken, changed, described, look, with, words_break, xml, zipped,
 };
 
-/// Defines ten entities, each of ten times the one before: 10^10 characters.
+/// Returns a DOCTYPE that defines ten entities, each of which expands to ten times the one before:
+/// 10^10 characters in all.
 fn entity_bomb() -> String {
     let mut entities = "<!ENTITY e0 \"xxxxxxxxxx\">".to_string();
     for n in 1..10 {

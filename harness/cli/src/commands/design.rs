@@ -329,16 +329,16 @@ type Bounds = Vec<(String, f64, f64)>;
 
 struct Sweep {
     profile: String,
-    /// Largest slosh angle, rad.
+    /// Largest slosh angle that the sweep causes, rad.
     angle: f64,
     bounds: Bounds,
 }
 
 struct Plan {
     factor: f64,
-    /// Largest torque, N·m.
+    /// Largest torque of the plan, N·m.
     peak: f64,
-    /// Largest slosh angle, rad.
+    /// Largest slosh angle that the planned torque causes, rad.
     angle: f64,
     /// Least and largest speed of the reaction wheel, rad/s.
     speeds: (f64, f64),

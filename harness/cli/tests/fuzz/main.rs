@@ -29,7 +29,7 @@ use report::view;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::{self, Table};
 
-/// Time limit of one input, s.
+/// Longest time that a reader may take for one input, s.
 const LIMIT: u64 = 10;
 const MEMORY: u64 = 1_000_000;
 

@@ -13,9 +13,7 @@ use host::fmi2::PLATFORM;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Memory that no process may exceed, bytes.
 const MEMORY: i64 = 500 << 20;
-/// Size that temporary files together may never exceed, bytes.
 const DISK: u64 = 100 << 20;
 
 /// Runs the program in a folder of its own, with a folder for temporary files.

@@ -38,9 +38,9 @@ pub enum Unmodelled {
     Nutation,
     /// The bearing warms up: its friction falls by [`WARM`] with a time constant of 600 s.
     Warming,
-    /// The wheel gives at most nine tenths of the largest commanded torque.
+    /// The wheel gives at most nine tenths of the largest torque that is commanded.
     Clipping,
-    /// Air slows the hub by [`AIR`] ω|ω|.
+    /// Air brakes the hub with the torque [`AIR`] ω|ω|, N·m, at the rate ω, rad/s.
     Drag,
     /// The wheel's torque follows its command with the time constant [`LAG`].
     ActuatorLag,
@@ -48,7 +48,6 @@ pub enum Unmodelled {
     GyroLag,
 }
 
-/// Frequency at which the hub rocks on its bearing, Hz.
 const ROCKING: f64 = 4.1;
 const ROCKING_DAMPING: f64 = 0.01;
 /// Rate of the rocking that the gyro reads, relative to the hub's rate, at frequencies far below

@@ -24,7 +24,6 @@ use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
 use identify::methods::output_error;
 
-/// Bias of the gyro, rad/s.
 const BIAS: f64 = 0.002;
 
 struct Answer {

@@ -21,7 +21,8 @@ pub struct Set {
     pub courses: [Course; 3],
 }
 
-/// Sine that goes linearly from one frequency to another, Hz, within `seconds`.
+/// Returns at the time `t`, s, a sine whose frequency goes linearly `from` one value `to` another,
+/// Hz, within `seconds`.
 fn sweep(t: f64, (from, to): (f64, f64), seconds: f64) -> f64 {
     (TAU * (from * t + (to - from) / (2.0 * seconds) * t * t)).sin()
 }

@@ -21,7 +21,6 @@ const XI: f64 = 1.841_183_781_340_659;
 const TOLERANCE: f64 = 1e-11;
 /// Two instants closer than this, s, count as the same.
 const SAME: f64 = 1e-13;
-/// Rate below which the hub counts as resting, rad/s.
 const REST: f64 = 1e-13;
 /// Largest torque beyond static friction at which the hub still counts as held, N·m.
 const TOUCH: f64 = 1e-12;
@@ -131,7 +130,6 @@ impl Drive<'_> {
     }
 }
 
-/// Contact of bearing and hub: the hub slips or sticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Contact {
     /// The hub slips; the number has the sign of its rate ω.
@@ -149,12 +147,12 @@ pub struct Motion {
     pub slosh: f64,
 }
 
-/// The equations of the bench for one piece of the torque.
+/// Equations of motion of the bench between two knots of the torque, where the torque is smooth.
 struct Equations<'a> {
     bench: &'a Bench,
-    /// Inertia that turns with the hub, kg·m².
+    /// Inertia of everything that turns rigidly with the hub, kg·m².
     inertia: f64,
-    /// Mass (kg), length (m) and natural frequency (rad/s) of the mode.
+    /// Mass (kg), length (m) and natural frequency (rad/s) of the liquid's first mode.
     mode: (f64, f64, f64),
     drive: &'a Drive<'a>,
     piece: usize,

@@ -51,7 +51,6 @@ pub struct Twin {
     /// Scales of the torque and of the clock of the recording: recorded value divided by true value.
     torque_scale: f64,
     clock: f64,
-    /// Drift of the gyro at each row, rad/s.
     drift: Vec<f64>,
 }
 

@@ -30,7 +30,6 @@ use identify::bench::identification::Identification;
 /// interval with an infinite end states that the end is not known.
 const WRONG: f64 = 5.0;
 
-/// Results for one parameter over all twins.
 #[derive(Default)]
 struct Row {
     /// Errors of the estimates over their standard deviations.

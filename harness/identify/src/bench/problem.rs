@@ -26,7 +26,7 @@ use crate::model::unknown::range;
 const RATE: usize = 0;
 const ANGLE: usize = 1;
 
-/// Drift of a MEMS gyro (the thesis's LSM6DS3).
+/// Expected drift of the gyro: that of a MEMS gyro (the thesis's LSM6DS3).
 const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
 /// Drift of an encoder's angle: it integrates the rate that the model does not explain, whose size is unknown, so that its width
 /// is large.

@@ -18,7 +18,7 @@ use crate::tuning::SAME_INSTANT;
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
 
-/// The FMU's parameters that friction is proportional to.
+/// The FMU's parameters to which the friction of the bearing is proportional.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
 #[derive(Clone, Debug, Default)]

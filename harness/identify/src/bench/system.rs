@@ -42,9 +42,9 @@ pub enum Target {
     GyroLag,
     FrictionDrift,
     GyroScale,
-    /// Reading of the gyro at rest, rad/s.
+    /// Bias of the gyro: its reading at rest, rad/s.
     GyroBias,
-    /// Reading of the encoder at angle 0, rad.
+    /// Offset of the encoder: its reading at the hub's angle 0, rad.
     AngleOffset,
     /// Asymmetry of the dry friction of a hub that turns only one way. The search has the friction c and d in this direction; the
     /// asymmetry converts them to the mean of both directions.
@@ -59,7 +59,7 @@ pub enum Target {
     /// Difference between the largest torque command and the torque at which the actuator
     /// saturates, over the largest command.
     Limit,
-    /// Compliance of the bearing before it slips, rad/(N·m).
+    /// Compliance of the bearing, rad/(N·m): the elastic twist over the torque before it slips.
     Compliance,
     SecondMode,
     Besides(usize),

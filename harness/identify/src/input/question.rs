@@ -79,7 +79,7 @@ pub struct Tolerance {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Size {
     Part(f64),
-    /// A number, with a unit if it is not the variable's own.
+    /// Tolerance as a number, with a unit if it is not the variable's own.
     Absolute(String),
 }
 
@@ -198,7 +198,7 @@ impl Setting {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
     Own,
-    /// The solver of the host, in Model Exchange, with this relative tolerance.
+    /// The solver of the host integrates the FMU (Model Exchange) with this relative tolerance.
     Host(f64),
 }
 

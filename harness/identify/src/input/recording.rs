@@ -198,7 +198,7 @@ impl Recording {
         self.first_rows(rows.min(self.time.len()))
     }
 
-    /// Returns the first rows. They begin at rest if the recording does.
+    /// Returns a recording of the first `rows` rows, which begins at rest if this recording does.
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
         Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
     }

@@ -86,7 +86,7 @@ pub struct Setup {
     tolerance: Option<f64>,
     /// Communication steps from one row to the next, of an FMU that steps itself.
     substeps: usize,
-    /// Steps of the host's solver from one row to the next.
+    /// Largest number of steps that the host's solver may take from one row to the next.
     most_steps: usize,
 }
 

@@ -319,7 +319,8 @@ fn the_report_of_a_fit_is_a_complete_page() {
     }
 }
 
-/// slosh.zeta has an effect only if slosh.zeta_from_correlation is false.
+/// The parameter slosh.zeta has an effect only if slosh.zeta_from_correlation is false: it is
+/// warned of once, and cannot be an unknown.
 #[test]
 fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() {
     let records = [record(1, 0.0, 0.0), record(2, 0.0, 0.0)];

@@ -262,7 +262,7 @@ struct Moving {
     tank: Tank,
     point: f64,
     i_0: f64,
-    /// Amplitudes of displacement, m, and angle, rad.
+    /// Amplitudes of the tank's displacement, m, and of its angle, rad.
     size: [f64; 2],
 }
 

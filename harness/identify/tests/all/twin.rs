@@ -25,9 +25,8 @@ use crate::bench::{Bench, Drive};
 use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
 use crate::friction::{is_one_way, push};
 
-/// The thesis's sweep of 2700 s.
 const LONG: &str = "lin-sweep:amplitude=0.1";
-/// A faster sweep, for tests in which only gross faults matter.
+/// A faster sweep than the thesis's, for tests in which only gross faults matter.
 const SHORT: &str = "lin-sweep:amplitude=0.1,duration=300,f0=1.8,f1=3";
 
 fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {

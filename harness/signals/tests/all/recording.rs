@@ -55,7 +55,7 @@ const TIME: [f64; 3] = [0.0, 0.02, 0.04];
 const TORQUE: [f64; 3] = [0.1, 0.25, -0.3];
 const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::consts::PI / 180.0];
 
-/// A plan for an FMU without inputs has only times.
+/// A table whose only column is the time, such as a plan for an FMU without inputs, is read.
 #[test]
 fn a_table_with_only_times_is_read() {
     let directory = tempfile::tempdir().unwrap();
@@ -179,7 +179,8 @@ fn stored(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/data")).join(name)
 }
 
-/// The files were written by `data/make_parquet.py`.
+/// Timestamps in Parquet files of several libraries, written by `data/make_parquet.py`, become
+/// seconds from the first one.
 #[test]
 fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
     for name in ["ts_s", "ts_ms", "ts_us", "ts_ns", "pandas_ts", "polars_ts"] {
@@ -226,7 +227,8 @@ fn parquet_columns_of_rare_types_are_refused_with_advice_to_use_the_python_packa
     assert!(error.contains("column time holds INT64 (allowed: timestamps, floating"), "{error}");
 }
 
-/// Columns "t [ms]" with dates and "T [mNm]": dates need no unit.
+/// The unit in the name of the time column "t [ms]" is not applied to its dates, and the unit of "T
+/// [mNm]" is.
 #[test]
 fn the_unit_in_the_name_of_the_time_column_is_not_applied_to_other_columns() {
     // dates need no unit, but milli- of the torque is the same factor as milli- of the time
@@ -313,7 +315,7 @@ fn errors_in_a_recording_state_line_column_and_allowed_values() {
     assert!(error.contains("; and 4 more (allowed"), "{error}");
 }
 
-/// Earlier versions refused each of these files, or read it wrongly.
+/// Each of these files was refused or read wrongly by an earlier version.
 #[test]
 fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written() {
     let renamed = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";

@@ -16,7 +16,8 @@ use hubslosh_tank::finite_amplitude::amplitude_dependence;
 
 use crate::common::tank;
 
-/// Slosh angle, rad, with the frequencies of planar and rotary waves.
+/// Slosh angle, rad, and the frequencies of planar and of rotary waves at this angle, relative to
+/// small waves.
 type Row = (f64, [Option<f64>; 2]);
 
 fn backbones() -> Vec<(f64, Vec<Row>)> {
