@@ -208,8 +208,8 @@ impl Spacecraft {
         }
     }
 
-    /// Returns the same outputs as [`Spacecraft::outputs`], but with contact of liquids and jumps
-    /// of inputs as the last step or event has left them.
+    /// Returns the same outputs as [`Spacecraft::outputs`], but without the effect of a jump of `h_wheels`
+    /// or `mass_flow` since the last step, and with the ranges of validity of the last event.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
