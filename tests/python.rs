@@ -1,7 +1,7 @@
 //! The FMU in Python's hands: runs the tests of `harness/python`, the studies' short forms and the examples with pytest,
 //! in a virtual environment of their own in the target directory.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use pack::{Fmi, MODELS};
@@ -32,7 +32,7 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Test files of `harness/python` that need no wheel. Together they take as long as all other files, so that both halves
+/// Test files of `harness/python` that need only HubSlosh. Together they take as long as all other files, so that both halves
 /// run in parallel.
 const BESIDE: [&str; 6] = [
     "test_liquid.py",
@@ -53,18 +53,20 @@ fn of_the_package() -> Command {
     command
 }
 
-fn wheel() -> PathBuf {
-    let fmus = Fmi::ALL
+/// Packs every FMU in each version of FMI, as the tests of the package expect them in one folder.
+fn fmus() -> Vec<&'static Path> {
+    let all = Fmi::ALL
         .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));
-    pack::wheel::for_tests(fmus.as_flattened())
+    all.concat()
 }
 
-/// Builds the wheel and runs pytest on harness/python, except six files that need no wheel.
+/// Runs pytest on harness/python, except six files that need only HubSlosh.
 #[test]
 fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     let tests = pack::root().join("harness/python");
     let mut command = of_the_package();
-    command.args([Path::new("--wheel"), &wheel()]).arg(&tests);
+    fmus();
+    command.arg(&tests);
     for file in BESIDE {
         command.arg("--ignore").arg(tests.join("tests").join(file));
     }
@@ -78,14 +80,14 @@ fn the_python_tests_of_the_fmus_with_fmpy_pass() {
 fn long_tests_of_the_package_pass() {
     pytest(
         of_the_package()
-            .args([Path::new("--wheel"), &wheel()])
+            .args([Path::new("--wheel"), &pack::wheel::for_tests(&fmus())])
             .arg("--long")
             .arg(pack::root().join("harness/python")),
         "the long tests in Python failed",
     );
 }
 
-/// Runs pytest on the six files of harness/python/tests that need no wheel.
+/// Runs pytest on the six files of harness/python/tests that need only HubSlosh.
 #[test]
 fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     let tests = pack::root().join("harness/python/tests");

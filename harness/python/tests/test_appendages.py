@@ -228,6 +228,7 @@ def test_an_uncertain_model_is_the_linear_model_of_its_parameters(craft: Craft) 
         assert np.abs(model.at(delta).response(f) - want).max() < 1e-9 * size.max()
 
 
+@pytest.mark.long
 def test_a_review_varies_frequencies_of_appendages_and_the_delay(craft: Craft) -> None:
     """The frequencies reach the ends of their range, and a larger range lowers the margins."""
     uncertain = {"north.frequency[1]": "20%", "delay": (0.05, 0.15)}

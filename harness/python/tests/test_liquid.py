@@ -90,6 +90,7 @@ def test_a_fill_in_per_cent_equals_the_height_of_that_volume(
     assert volume(found.surface) == pytest.approx(0.4, abs=1e-4)
 
 
+@pytest.mark.long
 def test_an_upright_cylinder_equals_its_closed_forms() -> None:
     """Frequency, slosh mass, its height, wave and inertia agree to 1e-4.
 
@@ -180,6 +181,7 @@ def test_upright_sectors_have_the_modes_of_bessel_s_functions(inner: float, angl
     assert abs(found.modes["arm"][0]) > 0.5
 
 
+@pytest.mark.long
 def test_a_box_drags_liquid_about_its_vertical() -> None:
     """Lamb's series for a square box about its vertical gives 0.1565 of the rigid inertia."""
     found = liquid_modes(
@@ -290,6 +292,7 @@ def test_small_tilts_change_frequencies_by_their_square() -> None:
     assert (upright - twice) / (upright - small) == pytest.approx(4, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
     """At h/R = 1 the frequencies agree to second order in the tilt with perturbation theory.
 
@@ -308,6 +311,7 @@ def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
     assert across == pytest.approx(0.23149 * slope**2, abs=3e-4)
 
 
+@pytest.mark.long
 def test_a_box_from_a_step_file_equals_the_box_given_by_dimensions(tmp_path: Path) -> None:
     """A box given by its dimensions equals the same box read from a STEP file."""
     import gmsh
@@ -327,6 +331,7 @@ def test_a_box_from_a_step_file_equals_the_box_given_by_dimensions(tmp_path: Pat
     assert drawn.modes["frequency"][0] == pytest.approx(plain.modes["frequency"][0], rel=1e-3)
 
 
+@pytest.mark.long
 def test_stated_errors_hold() -> None:
     """The stated error, the difference of two meshes, exceeds the true error of the finer mesh."""
     k = np.pi / 0.4

@@ -42,6 +42,7 @@ def installed(wheel: Path, tmp_path_factory) -> Path:
     return python
 
 
+@pytest.mark.long
 def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
     """The test checks the file RECORD as an installer does."""
     with zipfile.ZipFile(wheel) as archive:
@@ -82,6 +83,7 @@ for model in ("HubSlosh", "Spacecraft", "SloshTank"):
     assert done.stdout.split() == every
 
 
+@pytest.mark.long
 def test_the_wheel_tag_names_only_this_machine(wheel: Path) -> None:
     """The tags in the name of the file and in the metadata of the wheel agree."""
     tags = parse_wheel_filename(wheel.name)[3]

@@ -162,6 +162,7 @@ fn a_mixture_lies_between_its_correlations_and_its_interval_holds_them() {
 /// does, far from the sphere the shape is quite different. At 0.8 of the height the sphere has ten layers, which the
 /// interval of a spheroid a few per cent off holds.
 #[test]
+#[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn near_a_sphere_every_shape_has_its_damping() {
     let solved = |e: f64| {
         let height = 0.3 * (1.0 + e);
