@@ -19,9 +19,7 @@ FILLS = (3.1, 7.7, 15.2, 29.1, 44.3, 67.2, 87.9, 96.9)  # per cent
 G = 9.81  # m/s²
 
 
-@pytest.mark.parametrize(
-    "shape", ["cylinder", pytest.param("sphere", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("shape", ["cylinder", pytest.param("sphere", marks=pytest.mark.long)])
 def test_between_its_points_a_fill_table_gives_the_parameters_of_the_tank(
     shape: str, request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:

@@ -12,7 +12,6 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 use super::ball::{V, off_axis_craft, rotation, thrust, v, with_states};
 use super::equations::output_slopes;
 use super::random::Random;
-use super::seeds::every_or;
 
 type Six = SVector<f64, 6>;
 
@@ -325,8 +324,7 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[test]
 fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_energy() {
     let (mut seen, mut impulses) = ([0; 6], 0);
-    let seeds = every_or(&[0, 1], 0..6);
-    for &seed in &seeds {
+    for seed in 0..6 {
         let p = one(&mut Random::new(seed));
         let [back, forward] = [-0.2, 0.5].map(|g| thrust(g * p.craft.mass));
         let mut own = Spacecraft::new(&p, &back, 0.0, 1e-12).unwrap();
@@ -377,8 +375,8 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
         assert!(errors[3] < if has_settled { 1e-2 } else { 1e-8 }, "{seed} {errors:?}");
         impulses += craft.impulses;
     }
-    assert!(impulses > 5 * seeds.len(), "{impulses}");
-    assert!(seen[1..4].iter().all(|count| *count > 500 * seeds.len()), "{seen:?}");
+    assert!(impulses > 30, "{impulses}");
+    assert!(seen[1..4].iter().all(|count| *count > 3_000), "{seen:?}");
 }
 
 /// Motion along the axis does not rotate the host, so the lag of the host within a step is known. Two steps a second

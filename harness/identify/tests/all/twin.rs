@@ -422,6 +422,7 @@ fn twenty_spikes_are_reported_and_left_out() {
 /// A gyro cannot distinguish a held torque that comes 5 ms late from a linear torque that comes 15 ms late, so that neither may
 /// be stated as sure.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_sure() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let known = [
@@ -737,6 +738,7 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for way in [1.0, -1.0] {
