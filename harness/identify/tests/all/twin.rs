@@ -705,6 +705,7 @@ fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
 /// it does depend on the torque. The sweep is too gentle to determine friction.b and friction.c: any value along a flat valley
 /// may be the nearest fit, and their intervals are what must not move.
 #[test]
+#[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_asymmetry_not_at_all()
 {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
