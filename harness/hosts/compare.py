@@ -14,9 +14,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
-from hubslosh import TORQUE, FmuError, drive, read_table, setting
+from hubslosh import TORQUE, FmuError, Plant
 
 SIGNALS = ["omega", "slosh_angle"]
 
@@ -31,6 +32,16 @@ def sine(duration: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times (s) and a torque near the slosh frequency, held from each to the next (N·m)."""
     time = np.arange(round(duration / STEP) + 1) * STEP
     return time, 0.05 * np.sin(2 * math.pi * 2.4 * time)
+
+
+def drive(
+    fmu: Path | str, time: np.ndarray, torque: np.ndarray, settings: Mapping[str, str]
+) -> Signals:
+    """Return omega and slosh_angle at the times (s), under a torque (N·m) held to the next time."""
+    with Plant(
+        fmu, settings, tolerance=1e-12, start=time[0], stop=time[-1], torque=torque[0]
+    ) as plant:
+        return plant.run(time, {TORQUE: torque}, None, SIGNALS)
 
 
 def compare(here: Signals, there: Signals, allowed: float | None = None) -> None:
@@ -50,7 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Compares a host's results with fmpy's.")
     parser.add_argument("results", type=Path, help="table of the host, .csv or .parquet")
     parser.add_argument("fmu", type=Path, help="the FMU that it ran")
-    parser.add_argument("settings", type=setting, nargs="*", metavar="NAME=VALUE")
+    parser.add_argument("settings", nargs="*", metavar="NAME=VALUE")
     parser.add_argument("--prefix", default="", help="what the host puts before the FMU's names")
     parser.add_argument(
         "--driven", action="store_true",
@@ -59,17 +70,17 @@ def main() -> None:
     args = parser.parse_intermixed_args()
     names = [*SIGNALS, TORQUE] if args.driven else SIGNALS
     try:
-        table = read_table(args.results, ["time", *(args.prefix + name for name in names)])
+        columns = ["time", *(args.prefix + name for name in names)]
+        read = pd.read_parquet if args.results.suffix == ".parquet" else pd.read_csv
+        table = {name: values.to_numpy() for name, values in read(args.results)[columns].items()}
         # Hosts write a row before and one after an event: the last of a time counts.
         _, last = np.unique(table["time"][::-1].round(6), return_index=True)
         time = table["time"][::-1][last]
         found = {name: table[args.prefix + name][::-1][last] for name in names}
         torque = found.pop(TORQUE, np.zeros(len(time)))
-        there = drive(
-            args.fmu, time, torque, dict(args.settings), hold=True, tolerance=1e-12,
-            columns=SIGNALS,
-        )  # fmt: skip
-    except FmuError as error:
+        settings = dict(text.split("=", 1) for text in args.settings)
+        there = drive(args.fmu, time, torque, settings)
+    except (FmuError, KeyError, OSError, ValueError) as error:
         sys.exit(f"error: {error}")
     compare(found, there)
 
