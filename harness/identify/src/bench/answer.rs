@@ -11,14 +11,13 @@ use names::hubslosh::{SloshModel, friction};
 
 use super::causes::{self, Cause, Missing};
 use super::combination::{self, ONE_WAY};
-use super::options::Options;
 use super::problem::LEAST_FRICTION;
 use super::system::{BenchSystem, Target};
 use crate::bench::identification::{Details, Identification, ModelFit};
 use crate::bench::verdict::{self, Findings};
 use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
-use crate::engine::hold::{EARLIEST, Rival};
+use crate::engine::hold::Rival;
 use crate::engine::minimum::{Curvature, places};
 use crate::engine::{ENDS, Fit, Part, Solution, Z};
 use crate::estimate::{Estimated, fit_percent, mean_square, prose};
@@ -107,7 +106,6 @@ pub fn conclude(
     mut best: Fitted,
     near: (f64, &mut [(f64, Fitted)]),
     question: &verdict::Question,
-    options: &Options,
     tell: &mut dyn FnMut(News),
 ) -> Result<Identification> {
     let (system, solution) = (best.system, &mut best.solution);
@@ -142,7 +140,7 @@ pub fn conclude(
     }
     let mut fit = best.fit.clone();
     fit.simulations = solution.fit.simulations();
-    let findings = findings(system, solution, &found, options, question);
+    let findings = findings(system, solution, &found, question);
     let fits = findings.fits();
     let mut verdict = verdict::words(question, &findings, &fit, &combinations, &parameters);
     let unknowns = &solution.fit.problem.unknowns;
@@ -230,21 +228,18 @@ fn findings(
     system: &BenchSystem,
     solution: &Solution,
     found: &[Effect],
-    options: &Options,
     question: &verdict::Question,
 ) -> Findings {
     let problem = solution.fit.problem;
     let named = cause(found);
     let mut doubts = question.doubts.to_vec();
-    if let Some(j) = solution.fit.delay() {
-        let (delay, step) = (solution.minimum.point.z[j], problem.recordings[0].step);
-        if !options.acausal && solution.fit.free[j] && delay < -EARLIEST * step {
-            doubts.push(format!(
-                "the rate comes {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
-                 --also early_rate allows it)",
-                -1e3 * delay
-            ));
-        }
+    let z = &solution.minimum.point.z;
+    if let Some(j) = solution.fit.delay().filter(|_| solution.fit.is_early(z, 0.0)) {
+        doubts.push(format!(
+            "the rate comes {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
+             --also early_rate allows it)",
+            -1e3 * z[j]
+        ));
     }
     for j in &solution.at_bound {
         let unknown = &problem.unknowns[*j];

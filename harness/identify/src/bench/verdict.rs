@@ -117,7 +117,7 @@ fn unknown_cause(findings: &Findings, fit: &ModelFit) -> String {
     };
     let ((in_frequency, f), (in_time, t)) = (worst(|t| t.in_frequency), worst(|t| t.in_time));
     let why = match findings.alike.len() {
-        0 => "no effect that was tried leaves noise alone".to_string(),
+        0 => "no effect that was tried explains it".to_string(),
         _ => format!("{} explain it about as well", findings.alike.join(", ")),
     };
     format!(

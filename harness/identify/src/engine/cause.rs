@@ -12,15 +12,19 @@
 //! number: an estimate can be off by ten standard deviations without a sign in a general test. The candidates with the largest
 //! scores are fitted with all unknowns, from the recordings' own noise, because the noise that is estimated from a misfit
 //! contains the misfit and would hide it.
+//!
+//! An effect may imitate another one that is not among the candidates. For example, a lag with a negative delay changes the gain
+//! over the frequency as a wrong inertia does. Therefore a fitted effect is no cause if an output then precedes its input, if it
+//! drives a further unknown to a bound, or if the residual has a score beyond chance of another candidate.
 
-use analysis::innovations::{LIMIT, Tests};
+use analysis::innovations::LIMIT;
 use anyhow::Result;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::minimum::{Curvature, End, places};
+use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::Part;
-use super::{DECIDES, ENDS, Fit, SEEN, Solution};
+use super::{ALIKE, DECIDES, ENDS, Fit, SEEN, Solution, Unknown, Z};
 use crate::news::News;
 
 /// Largest number of candidates that are fitted, those with the largest scores.
@@ -32,15 +36,48 @@ pub struct Effect {
     pub size: (f64, f64),
     /// Decrease of −2 ln L by the effect.
     pub gain: f64,
-    /// True if the residual is noise once the effect is fitted.
+    /// True if the residual is noise once the effect is fitted, and if nothing tells that the effect imitates another one.
     pub fits: bool,
 }
 
 struct Score {
     unknown: usize,
     size: f64,
-    std: f64,
     score: f64,
+}
+
+/// Returns the score of each candidate about a minimum, the largest first. A candidate that the unknowns cancel, or that the
+/// system refuses, has none.
+///
+/// # Errors
+/// If the system refuses the minimum.
+fn scores(fit: &mut Fit, minimum: &Minimum, candidates: &[usize]) -> Result<Vec<Score>> {
+    let unknowns = &fit.problem.unknowns;
+    let is_known = |(u, free): (&Unknown, &bool)| *free || u.part == Part::Tolerance;
+    let known: Vec<bool> = unknowns.iter().zip(&minimum.free).map(is_known).collect();
+    let base = &minimum.point;
+    let jacobian = fit.derivatives(base, &known)?.matrix;
+    let covariance = Curvature::new(&jacobian, places(&known)).covariance(known.len());
+    let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
+    let one = |&unknown: &usize| -> Option<Score> {
+        let mut z = base.z.clone();
+        // a plausible size: the first order of a lag is a delay, that of a limit is nothing
+        let step = unknowns[unknown].reach;
+        z[unknown] += step;
+        let there = fit.at(&z).ok()?;
+        let change = (there.e - &base.e) / step;
+        let seen = rest(&change);
+        let norm = seen.norm();
+        // the rest the unknowns cancel
+        if !(norm.is_finite() && norm > SEEN * change.norm()) {
+            return None;
+        }
+        let score = -seen.dot(&base.e) / norm;
+        Some(Score { unknown, size: score / norm, score })
+    };
+    let mut scores: Vec<Score> = candidates.par_iter().filter_map(one).collect();
+    scores.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
+    Ok(scores)
 }
 
 /// Returns the effects that explain a part of a solution's residual, the largest gain first. Only candidates with a score beyond
@@ -50,9 +87,10 @@ struct Score {
 /// If the system refuses the minimum. A candidate that it refuses is left out.
 pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<Effect>> {
     let problem = solution.fit.problem;
-    let is_part =
-        |part: Part| -> Vec<bool> { problem.unknowns.iter().map(|u| u.part == part).collect() };
-    let candidates = places(&is_part(Part::Candidate));
+    let name = |j: usize| &problem.unknowns[j].name;
+    let is_candidate: Vec<bool> =
+        problem.unknowns.iter().map(|u| u.part == Part::Candidate).collect();
+    let candidates = places(&is_candidate);
     if candidates.is_empty() {
         return Ok(Vec::new());
     }
@@ -65,41 +103,22 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         let z = base.point.z.clone();
         base = fit.minimise(&z, &solution.fit.free, None, End::new(6, ENDS.0))?;
     }
-    let tolerances = is_part(Part::Tolerance);
-    let known: Vec<bool> = tolerances.iter().zip(&fit.free).map(|(t, free)| *t || *free).collect();
-    let jacobian = fit.derivatives(&base.point, &known)?.matrix;
-    let covariance = Curvature::new(&jacobian, places(&known)).covariance(known.len());
-    let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
-    let one = |&unknown: &usize| -> Option<Score> {
-        let mut z = base.point.z.clone();
-        // a plausible size: the first order of a lag is a delay, that of a limit is nothing
-        let step = problem.unknowns[unknown].reach;
-        z[unknown] += step;
-        let there = fit.at(&z).ok()?;
-        let change = (there.e - &base.point.e) / step;
-        let seen = rest(&change);
-        let norm = seen.norm();
-        // the rest the unknowns cancel
-        if !(norm.is_finite() && norm > SEEN * change.norm()) {
-            return None;
-        }
-        let score = -seen.dot(&base.point.e) / norm;
-        Some(Score { unknown, size: score / norm, std: 1.0 / norm, score })
+    let words = |scores: &[Score]| -> String {
+        let all = scores.iter().map(|s| format!("{} {:.1}", name(s.unknown), s.score));
+        all.collect::<Vec<_>>().join(", ")
     };
-    let mut scores: Vec<Score> = candidates.par_iter().filter_map(one).collect();
-    scores.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
-    let name = |j: usize| &problem.unknowns[j].name;
-    let said: Vec<String> =
-        scores.iter().map(|s| format!("{} {:.1}", name(s.unknown), s.score)).collect();
-    news(&News::Detail(format!("scores of effects that are not estimated: {}", said.join(", "))));
+    let first_scores = scores(&mut fit, &base, &candidates)?;
+    let said = words(&first_scores);
+    news(&News::Detail(format!("scores of effects that are not estimated: {said}")));
     let own = fit.noise.clone();
     fit.renew_noise(&base.point);
     let before = fit.deviance(&fit.point(&base.point.z, base.point.motion.clone()));
     fit.set(own, 1.0);
     let chance = DECIDES + (base.point.e.len() as f64).ln();
     let noise = fit.noise.clone();
+    let at_bound = fit.stuck(&base.point.z).len();
     let mut found = Vec::new();
-    for score in scores.iter().take(FITTED).filter(|s| s.score.abs() >= LIMIT) {
+    for score in first_scores.iter().take(FITTED).filter(|s| s.score.abs() >= LIMIT) {
         let j = score.unknown;
         fit.set(noise.clone(), 1.0);
         let mut free = fit.free.clone();
@@ -112,40 +131,72 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
             size = size.copysign(score.size);
         }
         z[j] = size.clamp(fit.ends[j].0, fit.ends[j].1);
-        let Ok(first) = fit.minimise(&z, &free, None, End::new(8, ENDS.0)) else { continue };
+        let end = End { gain: ALIKE, ..End::new(8, ENDS.0) };
+        let Ok(first) = fit.minimise(&z, &free, None, end) else { continue };
+        if base.point.cost - first.point.cost < chance {
+            continue;
+        }
         fit.renew_noise(&first.point);
         let z = first.point.z.clone();
         let Ok(mut other) = fit.minimise(&z, &free, None, End::new(6, ENDS.0 * 0.2)) else {
             continue;
         };
         fit.renew_noise(&other.point);
-        let there = fit.point(&other.point.z, other.point.motion.clone());
-        let gain = before - fit.deviance(&there);
-        let fits = fit.tests(&there).iter().all(Tests::passed) && !fit.is_loud();
-        let std = fit.derivatives_at(&mut other).map_or(score.std, |found| {
-            let covariance = Curvature::new(&found.matrix, places(&free)).covariance(free.len());
-            covariance[(j, j)].sqrt()
-        });
-        let size = (there.z[j], std);
+        other.point = fit.point(&other.point.z, std::mem::take(&mut other.point.motion));
+        other.derivatives = None;
+        let gain = before - fit.deviance(&other.point);
+        let Ok(found_there) = fit.derivatives_at(&mut other) else { continue };
+        let curvature = Curvature::new(&found_there.matrix, places(&free));
+        let covariance = curvature.covariance(free.len());
+        let std = |i: usize| covariance[(i, i)].sqrt();
+        let rivals: Vec<usize> = candidates.iter().copied().filter(|i| *i != j).collect();
+        let why_not = if !fit.is_noise(&other.point) {
+            Some("more than noise is left".into())
+        } else if fit.is_early(&other.point.z, Z * fit.delay().map_or(0.0, std)) {
+            Some("the rate would precede the torque".into())
+        } else if fit.stuck(&other.point.z).len() > at_bound {
+            Some("an unknown is at its bound".into())
+        } else {
+            let mut asked = scores(&mut fit, &other, &rivals)?;
+            asked.retain(|score| score.score.abs() >= LIMIT);
+            (!asked.is_empty()).then(|| format!("noise is left that asks for {}", words(&asked)))
+        };
+        let size = (other.point.z[j], std(j));
         news(&News::Detail(format!(
             "with {} = {:.3e} ± {:.1e}, −2 ln L falls by {gain:.1}, and {}",
             name(j),
             size.0,
             size.1,
-            if fits { "noise is left" } else { "more than noise is left" }
+            why_not.as_deref().unwrap_or("noise is left")
         )));
         if gain > chance {
-            found.push(Effect { unknown: j, size, gain, fits });
+            found.push(Effect { unknown: j, size, gain, fits: why_not.is_none() });
         }
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Ok(found)
 }
 
-/// Returns the effect that is the cause: it leaves noise as residual, and no other effect that does so explains the recordings
-/// about as well.
+/// Returns the effect that is the cause: it leaves noise as residual, no effect explains the recordings clearly better, and no
+/// other effect that leaves noise explains them about as well.
 pub fn cause(effects: &[Effect]) -> Option<&Effect> {
+    let best = effects.first()?.gain;
     let mut fitting = effects.iter().filter(|effect| effect.fits);
-    let first = fitting.next()?;
+    let first = fitting.next().filter(|first| first.gain > best - DECIDES)?;
     fitting.next().is_none_or(|second| first.gain > second.gain + DECIDES).then_some(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_wins_against_effects_that_fit_and_loses_to_better_ones_that_do_not() {
+        let effect = |gain: f64, fits: bool| Effect { unknown: 0, size: (1.0, 0.1), gain, fits };
+        let named = |all: &[Effect]| cause(all).map(|effect| effect.gain);
+        assert_eq!(named(&[effect(100.0, true), effect(80.0, true)]), Some(100.0));
+        assert_eq!(named(&[effect(100.0, true), effect(95.0, true)]), None);
+        assert_eq!(named(&[effect(105.0, false), effect(100.0, true)]), Some(100.0));
+        assert_eq!(named(&[effect(200.0, false), effect(100.0, true)]), None);
+    }
 }

@@ -11,7 +11,7 @@ use super::problem::{Hold, Role};
 use super::{ALIKE, DECIDES, ENDS, Fit, SETS};
 
 /// Delay below 0, in rows, up to which it counts as none, because the time stamps of two channels may differ by so much.
-pub const EARLIEST: f64 = 0.05;
+const EARLIEST: f64 = 0.05;
 
 /// A course of the inputs between rows that was not chosen, at its own minimum.
 #[derive(Clone, Debug)]
@@ -41,6 +41,14 @@ impl Fit<'_> {
         self.problem.unknowns.iter().position(|u| u.role == Role::Delay(0))
     }
 
+    /// Returns true if at the coordinates `z` an output would precede its cause by more than the uncertainty `spare` of the
+    /// delay, s, although the problem does not allow it.
+    pub fn is_early(&self, z: &[f64], spare: f64) -> bool {
+        let step = self.problem.recordings.first().map_or(0.0, |r| r.step);
+        let delay = self.delay().filter(|j| self.free[*j] && !self.problem.acausal);
+        delay.is_some_and(|j| z[j] + spare < -EARLIEST * step)
+    }
+
     /// Searches a minimum for each course of the inputs between rows. Returns the minimum of the best course, which is then set,
     /// and the other courses. A course that cannot be simulated is left out.
     ///
@@ -52,17 +60,14 @@ impl Fit<'_> {
         }
         let delay = self.delay().filter(|j| self.free[*j]);
         let step = self.problem.recordings.first().map_or(0.0, |r| r.step);
-        let acausal = self.problem.acausal;
-        let is_early = |minimum: &Minimum| {
-            !acausal && delay.is_some_and(|j| minimum.point.z[j] < -EARLIEST * step)
-        };
         let (now, free) = (self.hold, self.free.clone());
         let mut found = found;
         if found.decrement >= ENDS.0 {
             let z = found.point.z.clone();
             found = self.minimise(&z, &free, found.derivatives, End::new(12, ENDS.0))?;
         }
-        let mut least = if is_early(&found) { f64::INFINITY } else { found.point.cost };
+        let mut least =
+            if self.is_early(&found.point.z, 0.0) { f64::INFINITY } else { found.point.cost };
         let mut all: Vec<(Hold, Minimum)> = vec![(now, found.clone())];
         for hold in self.problem.holds.iter().copied().filter(|hold| *hold != now) {
             self.hold = hold;
@@ -75,7 +80,7 @@ impl Fit<'_> {
             let Ok(other) = self.minimise(&z, &free, found.derivatives.clone(), end) else {
                 continue;
             };
-            if !is_early(&other) {
+            if !self.is_early(&other.point.z, 0.0) {
                 least = least.min(other.point.cost);
             }
             all.push((hold, other));
@@ -83,8 +88,9 @@ impl Fit<'_> {
         let mut best = 0;
         for (k, (_, other)) in all.iter().enumerate().skip(1) {
             let first = &all[best].1;
-            let is_better = is_early(first) || other.point.cost < first.point.cost - ALIKE;
-            if !is_early(other) && is_better {
+            let is_better =
+                self.is_early(&first.point.z, 0.0) || other.point.cost < first.point.cost - ALIKE;
+            if !self.is_early(&other.point.z, 0.0) && is_better {
                 best = k;
             }
         }
@@ -95,7 +101,7 @@ impl Fit<'_> {
             more: other.point.cost - found.point.cost,
             shift: other.point.z.iter().zip(&found.point.z).map(|(a, b)| a - b).collect(),
             delay: delay.map(|j| other.point.z[j]),
-            early: is_early(&other),
+            early: self.is_early(&other.point.z, 0.0),
             lost: other.decrement >= 1.0,
         });
         let rivals = rivals.collect();

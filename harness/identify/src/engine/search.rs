@@ -467,7 +467,7 @@ impl Fit<'_> {
     }
 
     /// Returns true if the residual at a point is noise of the size that neighbouring rows show.
-    fn is_noise(&self, point: &super::fit::Point) -> bool {
+    pub fn is_noise(&self, point: &super::fit::Point) -> bool {
         self.tests(point).iter().all(Tests::passed) && !self.is_loud()
     }
 

@@ -238,7 +238,7 @@ fn identify_whole(
         }
     };
     let own = if rivals.is_empty() { 1.0 } else { probabilities[0] };
-    let mut found = conclude(best, (own, &mut rivals), &question, options, &mut tell)?;
+    let mut found = conclude(best, (own, &mut rivals), &question, &mut tell)?;
     let details = &mut found.details;
     let fit = &details.fit;
     let chosen = models.iter().position(|m| *m.model == fit.model && m.friction == fit.friction);
