@@ -35,13 +35,22 @@ def sine(duration: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drive(
-    fmu: Path | str, time: np.ndarray, torque: np.ndarray, settings: Mapping[str, str]
+    fmu: Path | str,
+    time: np.ndarray,
+    torque: np.ndarray,
+    settings: Mapping[str, object],
+    columns: list[str],
+    tolerance: float | None = None,
 ) -> Signals:
-    """Return omega and slosh_angle at the times (s), under a torque (N·m) held to the next time."""
+    """Return ``columns`` at the times (s), under a torque (N·m) that is held to the next time.
+
+    ``tolerance`` is that of the FMU's solver, by default its own choice.
+    """
+    start, stop = float(time[0]), float(time[-1])
     with Plant(
-        fmu, settings, tolerance=1e-12, start=time[0], stop=time[-1], torque=torque[0]
+        fmu, settings, tolerance=tolerance, start=start, stop=stop, torque=float(torque[0])
     ) as plant:
-        return plant.run(time, {TORQUE: torque}, None, SIGNALS)
+        return plant.run(time, {TORQUE: torque}, None, columns)
 
 
 def compare(here: Signals, there: Signals, allowed: float | None = None) -> None:
@@ -79,7 +88,7 @@ def main() -> None:
         found = {name: table[args.prefix + name][::-1][last] for name in names}
         torque = found.pop(TORQUE, np.zeros(len(time)))
         settings = dict(text.split("=", 1) for text in args.settings)
-        there = drive(args.fmu, time, torque, settings)
+        there = drive(args.fmu, time, torque, settings, SIGNALS, tolerance=1e-12)
     except (FmuError, KeyError, OSError, ValueError) as error:
         sys.exit(f"error: {error}")
     compare(found, there)

@@ -67,7 +67,7 @@ def main() -> None:
             archive.extractall(folder)
         here = libcosim(folder, time, torque)
     settings = {parameter.name: parameter.value for parameter in release.parameters}
-    there = drive(fmu, time, torque, settings)
+    there = drive(fmu, time, torque, settings, SIGNALS)
     # libcosim's observer sees the ends of steps.
     compare(here, {signal: values[1:] for signal, values in there.items()}, allowed=1e-9)
 

@@ -42,5 +42,5 @@ with EcosSimulationStructure() as structure:
         simulation.terminate()
 
 here = dict(zip(SIGNALS, np.array(rows).T, strict=True))
-there = drive(fmu, time, torque, PARAMETERS)
+there = drive(fmu, time, torque, PARAMETERS, SIGNALS)
 compare(here, there, allowed=1e-9)
