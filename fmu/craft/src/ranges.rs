@@ -46,9 +46,10 @@ const ROTARY: f64 = 0.8;
 /// fill table. It exceeds 1 because a host integrates the mass with rounding errors.
 const EMPTY: f64 = 1.0 + 1e-9;
 
-/// Bounds of a tank's ranges. For a draining tank they belong to its initial contents, except `over_fill`.
-/// `radius` is R, m, 0 if no wave is given; `lowest` is the lower bound of x per mode, below which the liquid
-/// leaves the bottom; `g_floor` is the smallest x in w^2, m/s2.
+/// Limits within which the pendulums of a tank represent its liquid. For a draining tank they
+/// belong to its initial contents, except `over_fill`. `radius` is R, m, 0 if no wave is given;
+/// `lowest` is the lower bound of x per mode, below which the liquid leaves the bottom; `g_floor`
+/// is the smallest x in w^2, m/s2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,

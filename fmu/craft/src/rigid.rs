@@ -284,8 +284,8 @@ impl Factors {
     }
 }
 
-/// Returns the largest eigenvalue of M^-1 A, both symmetric, M given by its factors: Jacobi rotations of the
-/// similar symmetric matrix.
+/// Returns the largest eigenvalue of M^-1 A for symmetric matrices M and A, with M given by its
+/// factors `m`. Jacobi rotations diagonalise a symmetric matrix with the same eigenvalues.
 pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
     let rows = a.map(|row| m.half_solve(&row));
     let mut b: Mat6 = core::array::from_fn(|i| m.half_solve(&rows.map(|row| row[i])));

@@ -178,8 +178,9 @@ mod tests {
         }
     }
 
-    /// The same sums are evaluated without a closed form, by Simpson's rule from the expansion of K and M,
-    /// whose error is (b/2000)^4/180.
+    /// The coefficients equal sums that are evaluated without a closed form: by Simpson's rule from
+    /// the expansion of the matrices K and M, with the error (b/2000)^4/180 for the zero b of J_0'
+    /// or J_2'.
     #[test]
     fn coefficients_of_a_tilted_cylinder_equal_the_perturbation_integrals_by_quadrature() {
         const N: usize = 2000;

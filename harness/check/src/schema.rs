@@ -262,7 +262,8 @@ pub fn structure(d: &Description, findings: &mut Findings) {
     elements(kinds(d), "", &d.root, findings);
 }
 
-/// Elements on which the schema of FMI 3.0 allows attributes of other namespaces and vendors.
+/// Elements in which the schema of FMI 3.0 allows any attribute, of other namespaces and of
+/// vendors.
 const ANY_ATTRIBUTE: [&str; 3] = ["ModelExchange", "CoSimulation", "ScheduledExecution"];
 
 fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {

@@ -286,7 +286,7 @@ impl Run {
         Ok(Inputs::new(description, &names, self.hold)?.with_tolerance(self.tolerance))
     }
 
-    /// Checks stop time, step, tolerance and inputs.
+    /// Checks the run's stop time, step, tolerance and inputs.
     ///
     /// # Errors
     /// If a value is not allowed; the message is one sentence about it.

@@ -68,9 +68,10 @@ impl Fill {
         p
     }
 
-    /// Returns the communication step, and the torque at its points. The pulse and the releases are exact. A
-    /// sine passed as chords loses (w H)^2/12 of its size; knots raised by 1/sinc^2(f H) give the chords the
-    /// fundamental of the sine itself.
+    /// Returns the communication step, s, and the torque at the communication points. A pulse and a
+    /// release are exact. A sine that is passed as straight lines would lose (w H)^2/12 of its
+    /// amplitude; values multiplied by 1/sinc^2(f H) give the lines the fundamental of the sine
+    /// itself.
     fn input<'a>(&'a self, run: &'a Run) -> (f64, impl Fn(f64) -> f64 + 'a) {
         let step = match run.input.as_str() {
             // Stick and slip begin when the torque itself, not its fundamental,

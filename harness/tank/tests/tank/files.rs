@@ -563,7 +563,8 @@ fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     }
 }
 
-/// The tank is a box of 0.8 m by 0.5 m with both axes; each number stands below its heading.
+/// The printed table of a box of 0.8 m by 0.5 m, which has modes along both lengths, is tested:
+/// each number stands below its heading.
 #[test]
 fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
