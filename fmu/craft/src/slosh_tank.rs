@@ -47,7 +47,7 @@
 //! |a_P + w' x (rho - P)|^2 <= 2 |a_P|^2 + 2 r^2 |w'|^2.
 //!
 //! Outputs and derivatives of a tank that drains, has planar modes or has bobs on other surfaces than spheres are computed by
-//! `contents.rs`. A tank that drains is integrated by extrapolation instead of power series, as in a craft. A jump of its flow
+//! `contents.rs`. A tank that drains is integrated by Runge-Kutta methods instead of power series, as in a craft. A jump of its flow
 //! would be an impulse on the host, which a force cannot represent. The model therefore leaves this impulse out, for the host and
 //! for the bobs.
 //!

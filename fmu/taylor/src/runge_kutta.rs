@@ -213,8 +213,11 @@ const LONG: Method<12> = Method {
     order: 8.0,
 };
 
-/// Time, s, in which slosh changes so much that a step of [`SHORT`] of this length would err by about the whole motion.
-const TIME: f64 = 1.0;
+/// Returns true if a step of `h` seconds is likely to err by less than `error` with [`SHORT`], relative to the motion. The error of
+/// a step is about (h/1 s)^5 for slosh at 2 m/s2.
+fn is_short(h: f64, error: f64) -> bool {
+    h < 1.0 && h * h * h * h * h < error
+}
 
 /// Copies the ranges `moving` of an array one after the other to the start of `packed`; returns their length.
 fn pack<const D: usize>(moving: &[Range<usize>], x: &[f64; D], packed: &mut [f64; D]) -> usize {
@@ -338,9 +341,7 @@ pub fn advance<const D: usize>(
             pace.steps.add_steps(1, t)?;
             let is_last = t + pace.h >= end;
             let h = if is_last { end - t } else { pace.h };
-            let share = h / TIME;
-            let is_short =
-                !pace.is_fast && share * share * share * share * share < STEP_SHARE * tolerance;
+            let is_short = !pace.is_fast && is_short(h, STEP_SHARE * tolerance);
             let start = Start { x, packed: &packed[..n], first: &first, allowed: &allowed[..n] };
             let (trial, order) = if is_short {
                 (try_step(system, &SHORT, &start, (t, h)), SHORT.order)
