@@ -342,12 +342,13 @@ impl Draining {
             return Factors::definite_or_zero(matrix).solve([force, torque]);
         }
         let a = self.held_acceleration(axes);
-        let rest = [0, 1, 2].map(|i| {
+        let mut w_d = [0, 1, 2].map(|i| {
             let row = matrix[3 + i];
             torque[i] - (a[0] * row[0] + a[1] * row[1] + a[2] * row[2])
         });
         let inertia = [0, 1, 2].map(|i| [0, 1, 2].map(|k| matrix[3 + i][3 + k]));
-        [a, Factors::definite_or_zero(&inertia).solve_array(rest)]
+        Factors::definite_or_zero(&inertia).solve_in_place(&mut w_d);
+        [a, w_d]
     }
 
     fn at_rest<T: Number>(
@@ -396,8 +397,8 @@ impl Draining {
                 inertia[i][k] = inertia[i][k] + c[i] * whole.moment[k];
             }
         }
-        let about_c = sub(torque, cross(c, force));
-        let w_d = Factors::definite_or_zero(&inertia).solve_array(about_c);
+        let mut w_d = sub(torque, cross(c, force));
+        Factors::definite_or_zero(&inertia).solve_in_place(&mut w_d);
         [sub(scale(inverse, force), cross(w_d, c)), w_d]
     }
 

@@ -229,15 +229,16 @@ impl<M: Copy> Factors<M> {
     /// although `b` has derivatives.
     #[inline(always)]
     pub fn solve<T: Number + Mul<M, Output = T>>(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
-        let x = self.solve_array([b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]]);
+        let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];
+        self.solve_in_place(&mut x);
         [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]
     }
 }
 
 impl<M: Copy, const N: usize> Factors<M, N> {
-    /// Solves the linear system for the right-hand side x; see [`Factors::solve`].
+    /// Replaces the right-hand side x by the solution; see [`Factors::solve`].
     #[inline(always)]
-    pub fn solve_array<T: Number + Mul<M, Output = T>>(&self, mut x: [T; N]) -> [T; N] {
+    pub fn solve_in_place<T: Number + Mul<M, Output = T>>(&self, x: &mut [T; N]) {
         let l = &self.l;
         for i in 1..N {
             for j in 0..i {
@@ -252,7 +253,6 @@ impl<M: Copy, const N: usize> Factors<M, N> {
                 x[i] = x[i] - x[j] * l[j][i];
             }
         }
-        x
     }
 }
 

@@ -147,7 +147,7 @@ fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
 /// Numbers of internal steps of a tank that keeps its liquid and one that drains, at the tolerances 1e-5 and
 /// 1e-10: alone and on a craft. More would be slower, fewer less exact.
 const STEPS: [[[usize; 2]; 4]; 2] =
-    [[[16, 8], [31, 12], [19, 10], [27, 13]], [[8, 10], [16, 13], [18, 8], [23, 15]]];
+    [[[16, 8], [31, 12], [48, 26], [150, 86]], [[8, 10], [16, 13], [40, 29], [146, 98]]];
 
 /// The number of internal steps of random tanks, alone and on a craft, is compared with the expected number, so that
 /// a change that makes the integrator slower is noticed.
