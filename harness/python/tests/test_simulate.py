@@ -1,6 +1,7 @@
 """A simulation in one call: what fmpy finds, however it is called, and its errors."""
 
 import _thread
+import re
 import signal
 import subprocess
 import threading
@@ -53,6 +54,16 @@ def test_a_run_out_of_range_has_the_message_of_the_command(
     assert list(kept) == ["time", "limited_by_kind"] and kept.out_of_range == [sentence]
     loop = hubslosh.Loop([[4.0, 2.0]], 0.1, model=fmu)
     assert len(loop.simulate(1, started, outputs=[]).out_of_range) == 1
+
+
+def test_a_long_run_samples_the_range_of_its_tanks(fmu: Path) -> None:
+    """The share of the time agrees to 0.5 % with the share in a run that reads every row."""
+    started = {"init.slosh_angle": 0.5}
+    shares = []
+    for outputs in ("omega", ["omega", "limited_by_kind"]):
+        (sentence,) = simulate(fmu, started, stop=60, step=0.02, outputs=outputs).out_of_range
+        shares.append(float(re.findall(r"\(([\d.]+) %, first at 0 s\)", sentence)[0]))
+    assert shares[0] == pytest.approx(shares[1], abs=0.5) and 0 < shares[1] < 100
 
 
 def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
