@@ -293,7 +293,7 @@ def test_all_faults_of_an_uncertain_model_are_reported_at_once(spacecraft: Path)
                  "tank[1].zeta[1] = -0.", "theta is not among the outputs"):  # fmt: skip
         assert text in str(told.value)
     for change, text in {
-        "mount": ("pivot", "on a pivot"), "init.omega[1]": (0.1, "at rest"),
+        "mount": ("pivot", "on a pivot"), "init.q[2]": (0.1, "attitude must be"),
         "tank[1].r_0[1]": (0.1, "axially symmetric"), "force[3]": (-100.0, "does not hold"),
     }.items():  # fmt: skip
         with pytest.raises(FmuError, match=text[1]):
