@@ -25,6 +25,9 @@ use crate::contour_waves::{Fields, Liquid};
 use crate::curve::{Curve, Segment};
 use crate::gauss::Gauss;
 
+#[cfg(feature = "studies")]
+pub mod forced;
+
 /// A periodic wave: `angle` is the slosh angle, rad, whose sine is m_liq x_cm/(m_1 l) with the largest distance
 /// x_cm of the liquid's centre of mass from the axis; `frequency` is relative to small waves; `rise` is the
 /// height of the centre of mass at the phase 0 above its height at rest, m_liq z_cm/(m_1 l). Planar motion rests then.
@@ -39,6 +42,8 @@ struct LargeWave {
 enum Motion {
     Planar,
     Circular,
+    #[cfg(feature = "studies")]
+    Forced(forced::Function),
 }
 
 /// Numbers of the approximation: degree of the solid harmonics, number of polynomials of the elevation for each
@@ -200,11 +205,17 @@ impl Term {
                 .flat_map(|m| (0..=order).map(move |k| Term { m, k, motion }))
                 .filter(|term| (term.m + term.k) % 2 == 0)
                 .collect(),
+            #[cfg(feature = "studies")]
+            Motion::Forced(function) => function.terms(order),
         }
     }
 
     fn has_potential(self) -> bool {
-        self.k > 0
+        match self.motion {
+            Motion::Planar | Motion::Circular => self.k > 0,
+            #[cfg(feature = "studies")]
+            Motion::Forced(_) => self.m + self.k > 0,
+        }
     }
 
     fn at(self, theta: f64, tau: f64) -> [f64; 4] {
@@ -218,6 +229,8 @@ impl Term {
                 let (sin, cos) = (m * (tau - theta)).sin_cos();
                 [cos, -m * sin, sin, -m * cos]
             }
+            #[cfg(feature = "studies")]
+            Motion::Forced(function) => function.at(self, [theta, tau]),
         }
     }
 
@@ -225,6 +238,8 @@ impl Term {
     fn norm(self) -> f64 {
         match self.motion {
             Motion::Planar if self.m > 0 => 0.25,
+            #[cfg(feature = "studies")]
+            Motion::Forced(function) => function.norm(self),
             _ => 0.5,
         }
     }
@@ -318,6 +333,8 @@ impl<'a> Solver<'a> {
                 (0..count / 2).flat_map(|i| (0..count).map(move |j| [half(i), half(j)])).collect()
             }
             Motion::Circular => (0..count).map(|i| [-half(i), 0.0]).collect(),
+            #[cfg(feature = "studies")]
+            Motion::Forced(function) => function.grid(count),
         };
         let points = Points::new(&rule, &grid);
         let mut solver = Solver {

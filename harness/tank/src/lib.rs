@@ -43,6 +43,8 @@ pub mod tank;
 pub mod third_order;
 
 pub use contour::Problems;
+#[cfg(feature = "studies")]
+pub use large_waves::forced;
 pub use modal::{ModalData, Mode, Rest};
 pub use table::table;
 pub use tank::{Fill, Tank};
