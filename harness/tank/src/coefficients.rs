@@ -109,19 +109,19 @@ impl EnergySource {
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
     PotentialFlow,
-    /// The limit follows from a comparison of the slosh mass's frequency with free waves of fully
-    /// nonlinear potential flow, in this tank or, for spheres, in a sphere.
+    /// The difference of the frequency from free waves of fully nonlinear potential flow in this tank.
     FreeWaves,
-    /// The limit is estimated without such a comparison: it is a share of the angle at which the
-    /// second-order wave is half of the first-order wave. The share is the smallest that upright
-    /// cylinders have, and the limit is at most the largest angle of an upright cylinder.
+    /// A share of the angle at which the second-order wave is half of the first-order wave: the smallest
+    /// share that upright cylinders and spheres have; at most the largest angle of an upright cylinder.
     Estimate,
 }
 
 impl LimitSource {
     pub fn words(self) -> &'static str {
         match self {
-            LimitSource::PotentialFlow => "fully nonlinear potential flow in upright cylinders",
+            LimitSource::PotentialFlow => {
+                "fully nonlinear potential flow in this shape, free and forced"
+            }
             LimitSource::FreeWaves => {
                 "free waves of fully nonlinear potential flow in this shape; forced waves were not compared"
             }

@@ -14,6 +14,7 @@ mod draining;
 mod equations;
 mod events;
 mod exchange;
+mod forced_waves;
 mod impulses;
 mod independent;
 mod invariances;

@@ -88,8 +88,10 @@ fn coefficients_depend_only_on_the_shape() {
         assert!((sphere.nonlinear_inertia - other.nonlinear_inertia).abs() < 1e-6, "{other:?}");
         assert!((sphere.nonlinear_stiffness - other.nonlinear_stiffness).abs() < 1e-6, "{other:?}");
         assert!((scale * sphere.wave_second - other.wave_second).abs() < 1e-6 * scale);
-        assert!((sphere.angle_limit - other.angle_limit).abs() < 1e-6, "{other:?}");
     }
+    assert!((sphere.angle_limit - small.angle_limit).abs() < 1e-6, "{small:?}");
+    // Large waves in the capsule leave its sphere, so that its limit is an estimate.
+    assert!(capsule.angle_limit < sphere.angle_limit, "{capsule:?}");
 }
 
 /// Refuses a ring with inclined walls, a nearly full sphere (in which the error is large), and depths with secondary
@@ -136,24 +138,54 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
 }
 
-/// In a sphere the third order ends where its frequency leaves that of free waves of potential flow, also near h/R = 1, where
-/// the second-order wave at the wall vanishes and says nothing about the end of the series.
+/// In a sphere both models end where forced waves of potential flow were found to differ by 3 %. Beyond the table the limit is
+/// an estimate, at h/R = 1.5 smaller than the 2.6 degrees at which a forced wave of the third order differs by 3 %.
 #[test]
-fn limits_of_a_sphere_follow_from_its_large_waves() {
+fn limits_of_a_sphere_follow_from_its_forced_waves() {
+    let at = |fill: f64| known("shape = { sphere = { radius = 1.0 } }", fill);
     for i in 0..=19 {
         let fill = 0.1 + 0.05 * f64::from(i);
-        let mode = known("shape = { sphere = { radius = 1.0 } }", fill);
+        let mode = at(fill);
         let [limit, frequency] =
             [mode.angle_limit, mode.frequency_limit.unwrap()].map(f64::to_degrees);
-        assert!(limit < frequency && (4.0..11.0).contains(&limit), "{fill} {limit} {frequency}");
+        assert!(limit < frequency && (7.0..10.3).contains(&limit), "{fill} {limit} {frequency}");
         let energy = mode.energy.unwrap();
         assert!(energy.angle_limit <= energy.frequency_limit, "{fill}");
-        assert!(energy.angle_limit.to_degrees() <= 15.01, "{fill}");
-        println!("{fill:.2} {limit:.1} {frequency:.1} {:.1}", energy.angle_limit.to_degrees());
+        assert!((7.5..9.1).contains(&energy.angle_limit.to_degrees()), "{fill}");
+        assert_eq!(mode.angle_limit_from, LimitSource::PotentialFlow);
     }
-    let half = known("shape = { sphere = { radius = 1.0 } }", 1.0);
-    assert!((half.angle_limit.to_degrees() - 8.9).abs() < 0.3, "{half:?}");
-    assert_eq!(half.angle_limit_from, LimitSource::FreeWaves);
+    let deep = at(1.5);
+    assert_eq!(deep.angle_limit_from, LimitSource::Estimate);
+    assert!(deep.angle_limit.to_degrees() < 2.62, "{deep:?}");
+}
+
+/// The test of the FMU with forced waves has the coefficients and limits of each tank as `hubslosh tank` writes them.
+#[test]
+fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
+    let rows = include_str!("../../../../fmu/craft/tests/craft/forced_waves.csv").lines().skip(1);
+    let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
+    let mut compared = Vec::new();
+    for row in &rows {
+        let number = |i: usize| row[i].parse::<f64>().unwrap();
+        if compared.contains(&(row[0], row[1])) {
+            continue;
+        }
+        compared.push((row[0], row[1]));
+        let text = match row[0] {
+            "sphere" => "shape = { sphere = { radius = 1.0 } }",
+            _ => "shape = { cylinder = { radius = 1.0, height = 4.0 } }",
+        };
+        let mode = known(text, number(1));
+        let ([s, kappa], limit) = match mode.energy {
+            Some(of) => ([of.nonlinear_inertia, of.nonlinear_stiffness], of.angle_limit),
+            None => ([mode.nonlinear_inertia, mode.nonlinear_stiffness], mode.angle_limit),
+        };
+        for (x, i) in [(s, 9), (kappa, 10)] {
+            assert!((x / number(i) - 1.0).abs() < 1e-5, "{row:?} {x}");
+        }
+        assert!((limit.to_degrees() - number(15)).abs() < 0.02, "{row:?} {}", limit.to_degrees());
+    }
+    assert_eq!(compared.len(), 18);
 }
 
 #[test]
@@ -171,8 +203,8 @@ fn files_for_the_fmus_have_the_limits() {
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
     for (target, prefix, expected) in [
         (Target::HubSlosh, "slosh.table", 6.5),
-        (Target::SloshTank, "tank", 11.8),
-        (Target::Spacecraft { tank: 2 }, "tank[2]", 11.8),
+        (Target::SloshTank, "tank", 7.5),
+        (Target::Spacecraft { tank: 2 }, "tank[2]", 7.5),
     ] {
         let angle = limit(cylinder, 0.05, target, &format!("{prefix}.angle_limit[1]")).unwrap();
         assert!((angle.to_degrees() - expected).abs() < 0.01, "{angle}");
@@ -217,7 +249,7 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
             let share = 0.05 * f64::from(i);
             let (limit, has_coefficients) = angle_limit(text, share, WATER);
             println!("{text} {share:.2}: {limit:.2} {has_coefficients}");
-            assert!(limit > 0.0 && limit < 15.01, "{text} {share}: {limit}");
+            assert!(limit > 0.0 && limit < 10.21, "{text} {share}: {limit}");
             // The largest limit of a pendulum in any cylinder is 6.3 degrees.
             assert!(has_coefficients || limit < 6.3, "{text} {share}: {limit}");
             pendulums += usize::from(!has_coefficients);
@@ -317,7 +349,6 @@ fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
         assert!((planar - known.planar).abs() < 0.03, "{fill}: {planar} {}", known.planar);
         let third = known.circular.unwrap();
         assert!((circular - third).abs() < 0.05, "{fill}: {circular} {third}");
-        assert!(energy.angle_limit <= 1.2 * known.angle_limit, "{fill}");
         assert!(energy.frequency_limit >= energy.angle_limit, "{fill}");
     }
     assert!([0.09, 1.08].iter().all(|fill| at(*fill).energy.is_none()));
@@ -428,7 +459,7 @@ fn the_printed_table_of_a_tank_has_large_wave_coefficients_wave_heights_and_warn
     let cylinder = text("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", 0.1);
     for line in [
         "s = 1.4076, kappa = 0.7341, error 1e-5 of the series",
-        "in range: frequency within 0.3 % up to 21.2 degrees, a forced response within 3 % up to 9.3 degrees, rotary motion up \
+        "in range: frequency within 0.3 % up to 21.2 degrees, a forced response within 3 % up to 5.9 degrees, rotary motion up \
          to 9.4 degrees (fully nonlinear potential flow",
         "planar motion, circular +0.3671 A^2",
         "crest 0.068202 A +0.056965 A^2, trough 0.068202 A -0.056965 A^2",
