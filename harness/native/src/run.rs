@@ -72,7 +72,11 @@ impl<'fmu> Columns<'fmu> {
         for (place, real) in self.places.iter().zip(&self.reals) {
             self.row[*place] = *real;
         }
-        let end = if self.readings % self.every == 0 { self.row.len() } else { self.sampled_from };
+        let end = if self.readings.is_multiple_of(self.every) {
+            self.row.len()
+        } else {
+            self.sampled_from
+        };
         for (variable, place) in self.others.iter().filter(|(_, place)| *place < end) {
             self.row[*place] = from.value(variable)?.number();
         }

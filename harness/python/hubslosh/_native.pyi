@@ -66,8 +66,7 @@ class Instance:
         rows: tuple[Floats, bytes | None],
         inputs: Table,
         slopes: Floats | None,
-        outputs: Table,
-        sampled: int,
+        outputs: tuple[Table, int],
         feedback: Feedback | None,
     ) -> tuple[int, int, str] | None: ...
     def save(self) -> bytes: ...

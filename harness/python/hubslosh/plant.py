@@ -386,8 +386,7 @@ class Plant(Instance):
             (time, None if wanted is None else wanted.tobytes()),
             (names, table(inputs)),
             None if slopes is None else table(slopes),
-            (list(columns), recorded),
-            sampled,
+            ((list(columns), recorded), sampled),
             feedback,
         )
         kinds = [_DTYPES[self.fmu.kind(name)] for name in columns]

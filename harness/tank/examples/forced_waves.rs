@@ -83,7 +83,8 @@ impl Bob {
             x = core::array::from_fn(|i| {
                 x[i] + h / 6.0 * (k_1[i] + 2.0 * k_2[i] + 2.0 * k_3[i] + k_4[i])
             });
-            if !(x[0] * x[0] + x[1] * x[1] < 0.6) {
+            let r2 = x[0] * x[0] + x[1] * x[1];
+            if r2.is_nan() || r2 >= 0.6 {
                 return None;
             }
         }

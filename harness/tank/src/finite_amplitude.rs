@@ -318,7 +318,7 @@ impl Found {
 
 /// Coefficients of a mode; `Err` if their error is too large for a slosh mass. They then tell only how far a pendulum is from
 /// the liquid.
-type Judged = Result<Coefficients, Coefficients>;
+type Judged = Result<Coefficients, Box<Coefficients>>;
 
 /// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend
 /// on the specific force; they hold without surface tension.
@@ -374,10 +374,11 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
         }
         Some(known)
     };
+    let limit = |mode: &Judged| mode.as_ref().unwrap_or_else(|refused| refused).pendulum_limit();
+    let [pendulum_limit, pendulum_limit_y] = modes.each_ref().map(|mode| mode.as_ref().map(limit));
     let [mode, mode_y] = modes.map(&mut judge);
     warnings.dedup();
-    let limit = |mode: Judged| mode.unwrap_or_else(|refused| refused).pendulum_limit();
-    let [pendulum_limit, pendulum_limit_y] = modes.map(|mode| mode.map(limit));
+
     FiniteAmplitude { mode, mode_y, pendulum_limit, pendulum_limit_y, warnings }
 }
 
@@ -461,7 +462,7 @@ impl Coefficients {
         self.error = self.error.max(share);
         if share > WORST {
             warnings.push(format!("{near}, so they are left out; {ASSUMED}"));
-            return Err(self);
+            return Err(Box::new(self));
         }
         warnings.push(format!("{near}; here it changes them by at most {share:.0e} of 1 + |s|"));
         Ok(self)
@@ -499,7 +500,7 @@ fn box_coefficients(
                 shifts[0], shifts[1]
             ));
         }
-        return [known; 2];
+        return [known.clone(), known];
     }
     let known = [(length_x, waves[0]), (length_y, waves[1])].map(|(length, wave)| {
         let overlaps = Overlaps::rectangle(length);
@@ -531,7 +532,7 @@ fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<
         let k = Overlaps::round(radii[0], radii[1], COUNTS[0]).k;
         let depth = (lambda / k).min(DEEP).atanh() / k;
         return Err(upright_coefficients(radii, depth, wave, &mut Vec::new())
-            .unwrap_or_else(|refused| refused));
+            .map_or_else(|refused| refused, Box::new));
     };
     let radius = wall.r_outer;
     let equivalent = |[planar, circular]: [f64; 2]| [1.5 * circular - 2.0 * planar, 2.0 * circular];
