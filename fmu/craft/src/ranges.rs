@@ -33,7 +33,7 @@ use crate::spin::SpinScale;
 use crate::state::{BallState, Ranges};
 use formulas::cylinder::XI;
 use formulas::limits::{
-    FORCED, LimitedBy, SpinLimit, cylinder, cylinder_with_energy, shifted, swirl_fold,
+    FORCED, LimitedBy, SpinLimit, cylinder, cylinder_with_energy, shifted, swirl,
 };
 use formulas::regime::Regime;
 use formulas::third_order;
@@ -246,15 +246,15 @@ impl Tank {
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let [planar, circular] = third_order::shifts(s, kappa);
         let shifts = [planar, circular - 2.0 * self.rotary_inertia[n]].map(Some);
-        let own =
-            match cylinder_with_energy(fill).filter(|_| self.higher(n).is_beyond_third_order()) {
-                Some(limit) => {
-                    let (s, kappa) = third_order::coefficients(fill);
-                    shifted(limit.forced, FORCED, shifts, third_order::shifts(s, kappa))
-                }
-                None => cylinder(fill, shifts).forced,
-            };
-        let own = [own, swirl_fold(fill).unwrap_or(0.0)];
+        let has_energy = self.higher(n).is_beyond_third_order();
+        let own = match cylinder_with_energy(fill).filter(|_| has_energy) {
+            Some(limit) => {
+                let (s, kappa) = third_order::coefficients(fill);
+                shifted(limit.forced, FORCED, shifts, third_order::shifts(s, kappa))
+            }
+            None => cylinder(fill, shifts).forced,
+        };
+        let own = [own, swirl(fill, has_energy).unwrap_or(0.0)];
         [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
     }
 }

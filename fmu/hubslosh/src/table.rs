@@ -427,7 +427,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Slosh angle above which a slosh mode is out of range (limited_by = third_order), source table: the smaller of the angles at which the frequency of slosh.model = liquid errs by 0.3 % and a forced response by 3 %. Other models end at smaller angles, which follow from nonlinear_inertia and nonlinear_stiffness. 0: not known")
         .shape(TABLE_OF_MODES).display_unit("deg").range(0.0, 1.6),
     V::parameter("slosh.table.swirl_limit", |p, n| &mut p.slosh.table.swirl_limit[n], "rad",
-        "Slosh angle above which rotary motion of a slosh mode is out of range (limited_by = secondary_resonance), source table: there its branch folds by a secondary resonance. 0: not known")
+        "Slosh angle above which rotary motion of a slosh mode is out of range (limited_by = secondary_resonance), source table: there a forced response errs by 3 %, or its branch folds by a secondary resonance. 0: not known")
         .shape(TABLE_OF_MODES).display_unit("deg").range(0.0, 1.6),
     V::parameter("slosh.table.direction", |p, n| &mut p.slosh.table.direction[n], "rad",
         "Direction in which a slosh mode moves its mass, source table: angle from the tangent, positive outwards (0 tangential, 90 deg radial). For slosh.model = linear and planar. List modes of the same direction in the order of their frequencies")

@@ -53,7 +53,7 @@ impl Limits {
             match slosh.source {
                 SloshSource::Geometry if n == 0 => {
                     mode.angle = limits::cylinder(fill, shifts).forced;
-                    mode.swirl = limits::swirl_fold(fill).unwrap_or(0.0);
+                    mode.swirl = limits::swirl(fill, false).unwrap_or(0.0);
                 }
                 SloshSource::Geometry => {}
                 SloshSource::Table => {

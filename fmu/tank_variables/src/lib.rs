@@ -236,7 +236,7 @@ macro_rules! tank_parameters {
                 .shape(PER_MODE).range(-1e3, 1e3),
             V::parameter(concat!($tank, ".angle_limit"), |p, n| &mut M::tank_mut(p, n / MODES).angle_limit[n % MODES], "rad", "Slosh angle above which a mode is out of range (limited_by = third_order): the smaller of the angles at which its frequency errs by 0.3 % and a forced response by 3 %. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
                 .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
-            V::parameter(concat!($tank, ".swirl_limit"), |p, n| &mut M::tank_mut(p, n / MODES).swirl_limit[n % MODES], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
+            V::parameter(concat!($tank, ".swirl_limit"), |p, n| &mut M::tank_mut(p, n / MODES).swirl_limit[n % MODES], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because a forced response errs by 3 % or its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
                 .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
             V::parameter(concat!($tank, ".g_bond"), |p, n| &mut M::tank_mut(p, n).g_bond, "m/s2", "Specific force along the tank's axis below which surface tension matters that the parameters do not include (limited_by = bond_number); 0: not known")
                 .shape(PER_TANK).range(0.0, 1e6),

@@ -41,8 +41,8 @@ pub struct Coefficients {
     pub angle_limit: f64,
     pub angle_limit_from: LimitSource,
     pub frequency_limit: Option<f64>,
-    /// Angle above which rotary motion is out of range, rad, because its branch folds by a secondary
-    /// resonance; `None` if no fold is known.
+    /// Slosh angle, rad, above which rotary motion is out of range, because a forced response errs by 3 % or its branch
+    /// folds by a secondary resonance; `None` if `angle_limit` is smaller or no rotary motion was compared.
     pub swirl_limit: Option<f64>,
     /// Angle at which the second-order wave is half of the first-order wave, rad, at most 30 degrees. The
     /// series is not valid above it, whereas below it the error is not known.
@@ -54,7 +54,7 @@ pub struct Coefficients {
 
 /// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of the coefficients of the third
 /// order: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. `angle_limit` is the angle above which the mode is
-/// out of range, rad, and `frequency_limit` the angle up to which the slosh mass was compared with potential flow: there
+/// out of range, rad, `swirl_limit` the same for rotary motion, if it is smaller, and `frequency_limit` the angle up to which the slosh mass was compared with potential flow: there
 /// its frequency, planar and rotary, and its energy in planar motion have at most these relative errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Energy {
@@ -65,6 +65,7 @@ pub struct Energy {
     pub rotary_inertia: f64,
     pub rotary_inertia_2: f64,
     pub angle_limit: f64,
+    pub swirl_limit: Option<f64>,
     pub frequency_limit: f64,
     pub frequency_error: f64,
     pub energy_error: f64,

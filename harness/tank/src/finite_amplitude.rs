@@ -121,7 +121,7 @@ impl Coefficients {
             angle_limit: limit.forced,
             angle_limit_from: LimitSource::PotentialFlow,
             frequency_limit: Some(limit.frequency),
-            swirl_limit: limits::swirl_fold(fill),
+            swirl_limit: limits::swirl(fill, false),
             energy: cylinder_energy(fill),
             ..known
         }
@@ -130,14 +130,17 @@ impl Coefficients {
     /// Returns the coefficients of a sphere filled to h/R = `fill`, with its table of large waves and limits.
     fn sphere_coefficients(self, fill: f64) -> Coefficients {
         let tables = (sphere_waves::energy_terms(fill), sphere_waves::forced_limits(fill));
-        let (Some(terms), Some([third, with_energy])) = tables else { return self };
+        let (Some(terms), Some([third, planar, rotary])) = tables else { return self };
         let pair = [self.nonlinear_inertia, self.nonlinear_stiffness];
         let errors = sphere_waves::ERRORS;
         Coefficients {
             angle_limit: third,
             angle_limit_from: LimitSource::PotentialFlow,
             frequency_limit: Some(large_waves::third_order_limit(&terms, pair).frequency),
-            energy: Some(Energy::new(&terms, errors, with_energy, EnergySource::SphereTable)),
+            energy: Some(Energy {
+                swirl_limit: Some(rotary),
+                ..Energy::new(&terms, errors, planar, EnergySource::SphereTable)
+            }),
             ..self
         }
     }
@@ -199,6 +202,7 @@ impl Energy {
             rotary_inertia: t,
             rotary_inertia_2: t_2,
             angle_limit: angle_limit.min(known.compared),
+            swirl_limit: None,
             frequency_limit: known.compared,
             frequency_error,
             energy_error,
@@ -210,7 +214,11 @@ impl Energy {
 fn cylinder_energy(fill: f64) -> Option<Energy> {
     let (known, limit) = (energy_terms(fill)?, limits::cylinder_with_energy(fill)?);
     let errors = [1.1e-3, if fill < 0.35 { 1.1e-2 } else { 1e-3 }];
-    Some(Energy::new(&known, errors, limit.forced, EnergySource::CylinderTable))
+    let swirl_limit = limits::swirl(fill, true);
+    Some(Energy {
+        swirl_limit,
+        ..Energy::new(&known, errors, limit.forced, EnergySource::CylinderTable)
+    })
 }
 
 fn sphere_radius(contour: &Contour, wall: &Wall, depth: f64) -> Option<f64> {
@@ -429,7 +437,7 @@ fn cylinder_coefficients(
             BRIDGED[1]
         ));
     }
-    if let Some(limit) = known.swirl_limit {
+    if let Some(limit) = limits::swirl_fold(depth / radius) {
         warnings.push(format!(
             "finite amplitude: rotary motion folds at {:.1} degrees by a secondary resonance; beyond, another branch takes over",
             limit.to_degrees()

@@ -446,7 +446,9 @@ impl ParameterSet {
                     angle.to_degrees()
                 ));
             }
-            let swirl = known.and_then(|known| known.swirl_limit);
+            let swirl = known.and_then(|known| {
+                energy(&known).map_or(known.swirl_limit, |with_energy| with_energy.swirl_limit)
+            });
             limits.push((n, [("angle_limit", angle), ("swirl_limit", swirl)]));
             third_order.extend(written.map(|known| (n, known)));
         }

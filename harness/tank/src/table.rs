@@ -140,9 +140,12 @@ impl Text {
                     "frequency within 0.3 % up to {limit:.1} degrees, a forced response within 3 % "
                 )
             });
-            let swirl = known.swirl_limit.map_or(String::new(), |limit| {
-                format!(", rotary motion up to {:.1} degrees", limit.to_degrees())
-            });
+            let rotary = |limit: Option<f64>| {
+                limit.map_or(String::new(), |limit| {
+                    format!(", rotary motion up to {:.1} degrees", limit.to_degrees())
+                })
+            };
+            let swirl = rotary(known.swirl_limit);
             let (limit, from) = (known.angle_limit.to_degrees(), known.angle_limit_from.words());
             self.line(format!("  in range: {frequency}up to {limit:.1} degrees{swirl} ({from})"));
             if let Some(energy) = &known.energy {
@@ -150,7 +153,8 @@ impl Text {
                 let limit = energy.angle_limit.to_degrees();
                 self.line(format!(
                     "  with the wave's energy, for SloshTank and Spacecraft: s = {s:.4}, kappa = {kappa:.4}, s_2 = {s_2:.4}, \
-                     kappa_2 = {kappa_2:.4}, t = {t:.4}, t_2 = {t_2:.4}, in range up to {limit:.1} degrees"
+                     kappa_2 = {kappa_2:.4}, t = {t:.4}, t_2 = {t_2:.4}, in range up to {limit:.1} degrees{}",
+                    rotary(energy.swirl_limit)
                 ));
             }
             let circular =

@@ -3,7 +3,7 @@
 //! forced_waves.csv was computed by `harness/tank/examples/forced_waves.rs`, with a damping ratio of 0.01 on every mode of the
 //! liquid. Each row has the motion of the tank (on a line or on a circle), its frequency over that of small waves and its
 //! acceleration over g; angle, phase (both in degrees) and force over the weight of the slosh mass of the wave; and the slosh
-//! mass over the mass of the liquid, coefficients and limit (degrees) that `hubslosh tank` writes for this tank.
+//! mass over the mass of the liquid, coefficients and limit of this motion (degrees) that `hubslosh tank` writes for this tank.
 
 use std::f64::consts::TAU;
 
@@ -37,8 +37,9 @@ fn rows() -> Vec<(String, Row)> {
         (tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]) = (x(9), x(10));
         (tank.nonlinear_inertia_2[0], tank.nonlinear_stiffness_2[0]) = (x(11), x(12));
         (tank.rotary_inertia[0], tank.rotary_inertia_2[0]) = (x(13), x(14));
-        tank.angle_limit[0] = x(15).to_radians();
         let is_circle = cells[2] == "circle";
+        let limit = if is_circle { &mut tank.swirl_limit } else { &mut tank.angle_limit };
+        limit[0] = x(15).to_radians();
         Row { is_circle, motion: [x(3), x(4)], wave: [x(5), x(6), x(7)], tank }
     };
     let lines = include_str!("forced_waves.csv").lines().skip(1);
