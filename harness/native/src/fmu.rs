@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ::files::input;
 use host::archive::{Archive, DESCRIPTION};
-use host::description::{self, BaseUnit, ModelDescription, Value};
+use host::description::{self, BaseUnit, ModelDescription, Type, Value};
 use host::fmu::Interface;
 use host::parameter_set::{Parameter, Unit};
 use host::part::{self, Limit, START_VALUES};
@@ -14,8 +14,6 @@ use pyo3::IntoPyObjectExt;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
-
-use crate::instance::Given;
 
 /// Definition of a unit: exponents of the SI base units, factor and offset.
 pub type Base = ([i32; 8], f64, f64);
@@ -66,6 +64,33 @@ pub fn object(py: Python, value: Value) -> PyResult<Py<PyAny>> {
         Value::Integer(value) => value.into_py_any(py),
         Value::Boolean(value) => value.into_py_any(py),
         Value::String(value) => value.into_py_any(py),
+    }
+}
+
+/// A value from Python.
+#[derive(FromPyObject)]
+pub enum Given {
+    Boolean(bool),
+    Integer(i64),
+    Real(f64),
+    String(String),
+}
+
+impl Given {
+    /// Returns the value in a form that the type of a variable accepts if any does; for example, 2.0 is 2 for an Integer.
+    pub fn for_type(self, kind: Type) -> Value {
+        match self {
+            Given::Boolean(is) if kind == Type::Real => Value::Real(is.into()),
+            Given::Boolean(is) if kind != Type::Boolean => Value::Integer(is.into()),
+            Given::Boolean(is) => Value::Boolean(is),
+            Given::Integer(n) if kind == Type::Real => Value::Real(n as f64),
+            Given::Integer(n) => Value::Integer(n),
+            Given::Real(x) if kind != Type::Real && x.fract() == 0.0 && x.abs() < 1e15 => {
+                Value::Integer(x as i64)
+            }
+            Given::Real(x) => Value::Real(x),
+            Given::String(text) => Value::String(text),
+        }
     }
 }
 

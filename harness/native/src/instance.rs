@@ -13,7 +13,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::fmu::{Fmu, FmuError, FmuWarning, error};
+use crate::fmu::{Fmu, FmuError, FmuWarning, Given, error};
 use crate::run::{Run, Stop, Table};
 use crate::schedule::bytes;
 
@@ -52,33 +52,6 @@ pub struct Instance {
 fn this_thread() -> usize {
     thread_local!(static PLACE: u8 = const { 0 });
     PLACE.with(|place| std::ptr::from_ref(place).addr())
-}
-
-/// A value from Python.
-#[derive(FromPyObject)]
-pub enum Given {
-    Boolean(bool),
-    Integer(i64),
-    Real(f64),
-    String(String),
-}
-
-impl Given {
-    /// Returns the value in a form that the type of a variable accepts if any does; for example, 2.0 is 2 for an Integer.
-    pub fn for_type(self, kind: Type) -> Value {
-        match self {
-            Given::Boolean(is) if kind == Type::Real => Value::Real(is.into()),
-            Given::Boolean(is) if kind != Type::Boolean => Value::Integer(is.into()),
-            Given::Boolean(is) => Value::Boolean(is),
-            Given::Integer(n) if kind == Type::Real => Value::Real(n as f64),
-            Given::Integer(n) => Value::Integer(n),
-            Given::Real(x) if kind != Type::Real && x.fract() == 0.0 && x.abs() < 1e15 => {
-                Value::Integer(x as i64)
-            }
-            Given::Real(x) => Value::Real(x),
-            Given::String(text) => Value::String(text),
-        }
-    }
 }
 
 impl Instance {

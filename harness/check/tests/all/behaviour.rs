@@ -208,7 +208,7 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
     assert_eq!((rule.id, finding.severity), ("steps.size", Severity::Error));
     assert!(finding.place.contains("communicationStepSize = 0.0"), "{}", finding.place);
-    assert!(finding.text.contains("no end after 4 s"), "{}", finding.text);
+    assert!(finding.text.contains("have not ended after 4 s"), "{}", finding.text);
 }
 
 /// Changes of modelDescription.xml: name | the text after which | the text that | is replaced by | the rule

@@ -353,7 +353,7 @@ fn ends_its_own_process(when: &str) {
         let output = sandbox.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();
         assert_eq!(output.status.code(), Some(1), "{what}: {report}");
-        let told = ["the process ended", "no end after 1 s", "it prints"];
+        let told = ["the process ended", "have not ended after 1 s", "the FMU prints"];
         assert!(told.iter().any(|words| report.contains(words)), "{what}: {report}");
     }
     memory_was_enough();
@@ -387,7 +387,10 @@ fn forged_messages_of_an_fmu_are_refused() {
         let output = sandbox.hubslosh(&["check", "a.fmu", "--only", only]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();
         assert_eq!(output.status.code(), Some(1), "{when}: {report}");
-        assert!(report.contains("it writes to a connection of the host"), "{when}: {report}");
+        assert!(
+            report.contains("the FMU writes to a file or connection of the host"),
+            "{when}: {report}"
+        );
     }
 }
 
@@ -414,7 +417,7 @@ fn changes_of_the_process_by_loading_an_fmu_are_reported() {
     std::fs::write(sandbox.path("a.fmu"), harmful(FLUSH, "AT_LOAD")).unwrap();
     let output = sandbox.hubslosh(&["check", "a.fmu", "--only", "host.untouched"]);
     let report = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(report.contains("it changes the floating-point control"), "{report}");
+    assert!(report.contains("the FMU changes the floating-point control"), "{report}");
     let run = ["run", "--profile", "zero", "--stop", "0.1", "--fmu", "a.fmu", "--out", "a.csv"];
     let said = sandbox.hubslosh(&run).stderr;
     let said = String::from_utf8_lossy(&said);

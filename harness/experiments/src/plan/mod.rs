@@ -690,7 +690,7 @@ mod tests {
             ("frequency = [2.3, 2.5]", "[onset] has no amplitude"),
             (
                 "frequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n[vary]\nprofile.amplitude = [1]",
-                "profile.amplitude stands in [vary] and in [onset]",
+                "profile.amplitude is given in [vary] and in [onset]",
             ),
         ];
         for (table, words) in wrong {
@@ -760,7 +760,7 @@ mod tests {
         assert_eq!(direct[0].name, "linear_50mm_12.5");
         assert_eq!(format!("{direct:?}"), format!("{written:?}"));
         let error = sweeps(&[("tank.h", "0.1")]).unwrap_err().to_string();
-        assert_eq!(error, "tank.h stands in [set] and in [vary]");
+        assert_eq!(error, "tank.h is given in [set] and in [vary] (allowed: in one of the two)");
     }
 
     #[test]
@@ -894,14 +894,17 @@ mod tests {
             "no variable \"tank.hh\"; did you mean \"tank.h\"",
             "line 5: omega cannot be set",
             "line 6: slosh.model expects one of frozen (1)",
-            "line 7: tau_cmd comes from the profile",
+            "line 7: tau_cmd cannot be set, because the torque profile drives it",
             "lines 1 and 9: profile sine: there is no parameter \"amplitde\"",
         ] {
             assert_eq!(error.matches(words).count(), 1, "{words}:\n{error}");
         }
         let twice = "profile = \"sine\"\n[set]\ntank.h = 1\n[vary]\ntank.h = [1]\n";
         let error = Plan::parse(twice).unwrap_err().to_string();
-        assert_eq!(error, "lines 3 and 5: tank.h stands in [set] and in [vary]");
+        assert_eq!(
+            error,
+            "lines 3 and 5: tank.h is given in [set] and in [vary] (allowed: in one of the two)"
+        );
         let many =
             format!("profile = \"sine\"\n[vary]\ntank.h = {0:?}\ntank.d = {0:?}", [0.1; 400]);
         let error = Plan::parse(&many).unwrap().cases(&description()).unwrap_err().to_string();
