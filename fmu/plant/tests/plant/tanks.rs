@@ -120,7 +120,7 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
             p.slosh.table.length[0] = 0.0;
             (p.slosh.table.frequency[0], p.slosh.table.k[0]) = (0.1, 1e3);
         },
-        "above the frequency that slosh.table.k[1]",
+        "above the frequency that the stiffness slosh.table.k[1]",
     );
 }
 

@@ -139,7 +139,7 @@ fn known_values_count_with_their_tolerances() {
     let e = &found.measurement["scale(tau_cmd)"];
     assert!((e.value - (1.0 / 0.98 - 1.0)).abs() < 4.0 * e.std && e.std < 2e-3, "{e:?}");
     for (tolerance, free, says) in [
-        ("hub.I=1%", &FREE[..], "it is estimated"),
+        ("hub.I=1%", &FREE[..], "--free names this value as an unknown"),
         ("tau_cmd=1%", &FREE, "allowed: scale(tau_cmd)"),
         ("scale(theta)=1%", &FREE, "allowed: tau_cmd, omega, time"),
         (
