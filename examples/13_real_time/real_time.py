@@ -45,7 +45,7 @@ def controller(port: int) -> None:
 
 
 def wait(until: float) -> None:
-    """Wait until a time: sleep most of it, then read the clock, as a sleep may end late."""
+    """Sleep until shortly before a time, then read the clock, because a sleep may end late."""
     rest = until - time.perf_counter() - 2e-4
     if rest > 0:
         time.sleep(rest)

@@ -101,8 +101,7 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
-    /// The states at the start are those of the expansion in `state.kept`, which this step
-    /// continues.
+    /// In `state.kept`, whose expansion the step continues.
     Kept,
     /// At the start of the step, in `before`, because the expansion starts with the step.
     Step,

@@ -203,7 +203,7 @@ mod tests {
         assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
     }
 
-    /// A thin film has no height, so its inertia per mass is that of a disk, R^2/4; the integral
+    /// A thin film has no height and the inertia per mass of a disk, R^2/4; the integral
     /// that replaces the last zeros of the sum is then too small by 8/(12 pi end^3), end = 400 pi +
     /// 1.6. In a long column the inertia per mass tends to h^2/12 - 3 R^2/4.
     #[test]

@@ -154,8 +154,8 @@ pub struct Part {
 }
 
 /// Share of the wetted wall from which on a measured shape counts in the interval of an estimate.
-/// From this share on the interval contains the shape's correlation entirely. If other shapes have
-/// at least this share, the estimate has the interval of a wall of several shapes.
+/// The interval then contains the shape's correlation entirely. If other shapes have at least this
+/// share, the estimate has the interval of a wall of several shapes.
 const COUNTS: f64 = 0.05;
 
 /// Damping by a correlation over the damping of the laminar layer below which the correlation is

@@ -230,8 +230,8 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// From the impulse, I_w (W_0 - W) = a t + b t^2/2 with the torque a + b t: the rotor meets its
-    /// speed limit at the right time, on a ramp and with a constant torque.
+    /// The rotor reaches its speed limit at the time t that follows from the impulse,
+    /// I_w (W_0 - W) = a t + b t^2/2, with a constant torque a and on a ramp a + b t.
     #[test]
     fn the_rotor_reaches_its_speed_limit_at_the_time_that_the_impulse_of_the_torque_gives() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };

@@ -192,10 +192,8 @@ impl Instance {
     /// Simulate a run with a communication point at each time in `rows`, and record `outputs` at each of them.
     ///
     /// `rows` has the times (s), and None or a byte for each row, which is 0 if the row only repeats the outputs of the row before.
-    /// `inputs` is a pair of a list of names and a table of floats with one column for each name, also for Booleans and
-    /// enumerations. `slopes` has the derivatives of the inputs after each row, or is None. The first item of `outputs` is such a
-    /// pair, too; the second is the number of its last columns that, unless they are Reals, are read in at least 1000 rows only
-    /// and repeated in between.
+    /// `inputs` and `outputs` are pairs of a list of names and a table of floats with one column for each name, also for Booleans
+    /// and enumerations. `slopes` has the derivatives of the inputs after each row, or is None.
     ///
     /// Return None if the run reached its end. Otherwise return where and why the FMU stopped: the row, the number of rows that
     /// were recorded, and a sentence.
@@ -205,13 +203,12 @@ impl Instance {
         rows: (PyBuffer<f64>, Option<Vec<u8>>),
         inputs: Table,
         slopes: Option<&Bound<PyAny>>,
-        outputs: (Table, usize),
+        outputs: Table,
         feedback: Option<&Bound<PyAny>>,
     ) -> PyResult<Option<Stop>> {
         let fmu = self.fmu.get();
         let rows = (rows.0.to_vec(py)?, rows.1);
-        let (outputs, sampled) = outputs;
-        let mut run = Run::new(fmu, rows, &inputs, slopes, &outputs, sampled, feedback)?;
+        let mut run = Run::new(fmu, rows, &inputs, slopes, &outputs, feedback)?;
         self.with(py, |held| run.make(&mut held.instance))
     }
 

@@ -18,9 +18,6 @@ const ROWS: usize = 1024;
 /// longer.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// Largest number of rows in which columns that need not be read in every row are read, unless the run has less than twice as many.
-const SAMPLES: usize = 1000;
-
 /// Variables that form the columns of a table. Reals are read or set with one call of the FMU, variables of other types with one
 /// call each.
 struct Columns<'fmu> {
@@ -30,10 +27,6 @@ struct Columns<'fmu> {
     reals: Vec<f64>,
     /// Variables of other types, each with the column to which it belongs.
     others: Vec<(&'fmu Variable, usize)>,
-    /// First column whose variable, if it is no Real, is read in every `every`-th reading only.
-    sampled_from: usize,
-    every: usize,
-    readings: usize,
     row: Vec<f64>,
 }
 
@@ -48,18 +41,8 @@ impl<'fmu> Columns<'fmu> {
             places: reals.iter().map(|(_, place)| *place).collect(),
             reals: vec![0.0; reals.len()],
             others,
-            sampled_from: names.len(),
-            every: 1,
-            readings: 0,
             row: vec![0.0; names.len()],
         })
-    }
-
-    /// Reads the last `count` columns, if they are no Reals, only in some of `rows` readings. To read them, the FMU may have to
-    /// compute all its outputs, which takes as long as a step.
-    fn sample(&mut self, count: usize, rows: usize) {
-        self.sampled_from = self.row.len().saturating_sub(count);
-        self.every = (rows / SAMPLES).max(1);
     }
 
     fn get(&mut self, from: &mut Instance) -> Called<&[f64]> {
@@ -72,15 +55,9 @@ impl<'fmu> Columns<'fmu> {
         for (place, real) in self.places.iter().zip(&self.reals) {
             self.row[*place] = *real;
         }
-        let end = if self.readings.is_multiple_of(self.every) {
-            self.row.len()
-        } else {
-            self.sampled_from
-        };
-        for (variable, place) in self.others.iter().filter(|(_, place)| *place < end) {
+        for (variable, place) in &self.others {
             self.row[*place] = from.value(variable)?.number();
         }
-        self.readings += 1;
         Ok(self.last())
     }
 
@@ -136,7 +113,7 @@ pub struct Run<'fmu> {
 
 impl<'fmu> Run<'fmu> {
     /// Prepares a run. `time` has the communication points, s, and 0 for each row whose outputs are not read, if there are such
-    /// rows; `slopes` has the same columns as `inputs`. The last `sampled` columns of the outputs need not be read in every row.
+    /// rows; `slopes` has the same columns as `inputs`.
     ///
     /// # Errors
     ///
@@ -147,7 +124,6 @@ impl<'fmu> Run<'fmu> {
         (inputs, values): &Table,
         slopes: Option<&Bound<PyAny>>,
         (outputs, recorded): &Table,
-        sampled: usize,
         feedback: Option<&Bound<PyAny>>,
     ) -> PyResult<Run<'fmu>> {
         let (rows, width) = (time.len(), inputs.len());
@@ -155,16 +131,15 @@ impl<'fmu> Run<'fmu> {
             expect("rows of the run", wanted.len(), rows)?;
         }
         let columns = Columns::find(fmu, inputs)?;
-        let mut read = Columns::find(fmu, outputs)?;
-        let read_rows =
-            wanted.as_ref().map_or(rows, |of| of.iter().filter(|byte| **byte != 0).count());
-        read.sample(sampled, read_rows);
         let slopes = slopes.map(|of| Numbers::borrow(of, rows, width, false)).transpose()?;
         Ok(Run {
             slopes,
             lines: Lines::default(),
             inputs: (columns, Numbers::borrow(values, rows, width, false)?),
-            outputs: (read, Numbers::borrow(recorded, rows, outputs.len(), true)?),
+            outputs: (
+                Columns::find(fmu, outputs)?,
+                Numbers::borrow(recorded, rows, outputs.len(), true)?,
+            ),
             feedback: feedback.map(|of| Feedback::read(of, fmu, rows)).transpose()?,
             wanted: wanted.map(|of| of.iter().map(|byte| *byte != 0).collect()),
             time,

@@ -5,6 +5,10 @@ from . import plot as plot
 from .appendages import Appendage as Appendage
 from .certificate import Certificate as Certificate
 from .certificate import WorstCase as WorstCase
+from .checking import Checked as Checked
+from .checking import CheckedRule as CheckedRule
+from .checking import Finding as Finding
+from .checking import check as check
 from .comparison import compare as compare
 from .craft import Craft as Craft
 from .craft import MassProperties as MassProperties
@@ -35,14 +39,10 @@ from .operating_point import OperatingPoint as OperatingPoint
 from .plant import Plant as Plant
 from .plant import RunError as RunError
 from .plant import TORQUE as TORQUE
-from .program import Checked as Checked
-from .program import CheckedRule as CheckedRule
 from .program import Estimated as Estimated
-from .program import Finding as Finding
 from .program import Identification as Identification
 from .program import analyse as analyse
 from .program import campaign as campaign
-from .program import check as check
 from .program import identify as identify
 from .program import posterior as posterior
 from .project import Project as Project

@@ -66,7 +66,7 @@ class Instance:
         rows: tuple[Floats, bytes | None],
         inputs: Table,
         slopes: Floats | None,
-        outputs: tuple[Table, int],
+        outputs: Table,
         feedback: Feedback | None,
     ) -> tuple[int, int, str] | None: ...
     def save(self) -> bytes: ...

@@ -323,7 +323,6 @@ class Plant(Instance):
         columns: Sequence[str],
         feedback: Feedback | None = None,
         wanted: np.ndarray | None = None,
-        sampled: int = 0,
     ) -> dict[str, np.ndarray]:
         """Step from row to row in one call, and record variables at every row.
 
@@ -346,10 +345,6 @@ class Plant(Instance):
         wanted : ndarray of bool, shape (n,), optional
             Rows to record, by default all. The other rows repeat the row before them, which saves
             the time to compute their outputs.
-        sampled : int
-            Number of the last columns that, if they are no Reals, are read in every n-th row only,
-            with n = 1 up to 2000 rows and at least 1000 readings beyond; the rows in between repeat
-            their values.
 
         Returns
         -------
@@ -386,7 +381,7 @@ class Plant(Instance):
             (time, None if wanted is None else wanted.tobytes()),
             (names, table(inputs)),
             None if slopes is None else table(slopes),
-            ((list(columns), recorded), sampled),
+            (list(columns), recorded),
             feedback,
         )
         kinds = [_DTYPES[self.fmu.kind(name)] for name in columns]

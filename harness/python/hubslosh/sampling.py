@@ -39,6 +39,10 @@ Range = Any
 
 FAILED = "refused"  # Column that says what the FMU refused
 
+# Runs that a Dask cluster has at a time. More would keep no more workers busy, and each result is
+# found by a search through all of them.
+ON_DASK = 1000
+
 
 def draw(
     ranges: Mapping[str, Range],
@@ -239,7 +243,7 @@ def monte_carlo(
         jobs = ((run, draws[run]) for run in missing)
         count = workers or cores()
         pool = client.get_executor(pure=False) if client else ThreadPoolExecutor(count)
-        made = _results(pool, np.inf if client else 2 * count, outcome, jobs)
+        made = _results(pool, ON_DASK if client else 2 * count, outcome, jobs)
         try:
             for done, (run, found) in enumerate(made, 1):
                 rows[run] = {"run": run} | draws[run] | found
@@ -299,7 +303,7 @@ def _checked(found: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _results(
-    pool: Executor, most: float, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
+    pool: Executor, most: int, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield each run with its results when it is done, with ``most`` runs under way."""
     with pool:

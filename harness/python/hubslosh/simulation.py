@@ -242,14 +242,12 @@ def record_run(
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
     known = given.keys() | constants.keys()
-    # Whether tanks are in range need not be read in every row of a long run.
-    sampled = [name for name in limits if name not in columns]
-    asked = [*(name for name in dict.fromkeys(columns) if name not in known), *sampled]
+    asked = [name for name in dict.fromkeys([*columns, *limits]) if name not in known]
     inputs = dict(constants) | {name: value[0] for name, value in given.items()}
     with Plant(
         model, parameters, tolerance=tolerance, start=start, stop=stop, inputs=inputs
     ) as plant:
-        found = plant.run(points, given, slopes, asked, feedback, wanted, len(sampled))
+        found = plant.run(points, given, slopes, asked, feedback, wanted)
     every = {"time": points} | computed() | given | found
     rows = slice(None) if wanted is None else wanted
     read = {

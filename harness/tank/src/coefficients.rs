@@ -54,8 +54,8 @@ pub struct Coefficients {
 
 /// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of the coefficients of the third
 /// order: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. `angle_limit` is the angle above which the mode is
-/// out of range, rad, `swirl_limit` the same for rotary motion, if it is smaller, and `frequency_limit` the angle up to which the slosh mass was compared with potential flow: there
-/// its frequency, planar and rotary, and its energy in planar motion have at most these relative errors.
+/// out of range, rad, `swirl_limit` the angle for rotary motion, if it is smaller, and `frequency_limit` the angle up to
+/// which the slosh mass was compared with potential flow: there its frequency, planar and rotary, and its energy in planar motion have at most these relative errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Energy {
     pub nonlinear_inertia: f64,

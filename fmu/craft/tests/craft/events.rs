@@ -433,7 +433,7 @@ fn default_case() -> Case {
     Case { p, u, end: 10.0 }
 }
 
-/// Impacts equal those of an independent simulator for all communication steps. Before 0.6.0 an
+/// Impacts occur at the times at which an independent simulator has them, for all communication steps. Before 0.6.0 an
 /// impact of case 12 in mid-air made an error of 0.01 with steps of 0.5 s.
 #[test]
 fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
