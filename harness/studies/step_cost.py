@@ -120,7 +120,10 @@ def print_table(fmu: str, steps: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = unpack(fmu, Path(name, "fmu"))
         program = build_host(Path(name))
-        print("| `slosh.model` | modes | `friction.model` | communication step | median of the instructions | largest number of instructions |")
+        print(
+            "| `slosh.model` | modes | `friction.model` | communication step "
+            "| median of the instructions | largest number of instructions |"
+        )
         print("| --- | --- | --- | --- | --- | --- |")
         for slosh, modes, friction, step in CASES:
             values = {"slosh.model": slosh, "slosh.modes": modes, "friction.model": friction}
