@@ -33,16 +33,16 @@ STEP = 0.02  # s
 STEPS = (100, 1100)  # between which instructions are counted
 HELD_MASS = 1e9  # kg
 
-# case, tolerance, what
+# case, tolerance, row of the table
 ROWS = [
     ("hub", 1e-6, "HubSlosh's bench, spherical model, no friction (2.3 Hz)"),
-    ("held", 1e-6, "the same liquid in a craft held to one axis"),
+    ("held", 1e-6, "the liquid of this bench in a Spacecraft that is held to one axis"),
     ("one", 1e-6, "1180 kg, one tank, one mode (0.4 Hz)"),
-    ("two", 1e-6, "the same with two tanks of one mode"),
-    ("four", 1e-6, "the same with four tanks of three modes"),
-    ("two", 1e-8, "two tanks at a tolerance of 1e-8"),
-    ("planar", 1e-6, "one tank, one planar mode"),
-    ("curved", 1e-6, "one tank, one mode with s and κ"),
+    ("two", 1e-6, "1180 kg, two tanks of one mode"),
+    ("four", 1e-6, "1180 kg, four tanks of three modes"),
+    ("two", 1e-8, "1180 kg, two tanks of one mode, at a tolerance of 1e-8"),
+    ("planar", 1e-6, "1180 kg, one tank, one planar mode"),
+    ("curved", 1e-6, "1180 kg, one tank, one mode with s and κ"),
 ]
 
 
@@ -119,7 +119,7 @@ def main() -> None:
     if len(sys.argv) != 3 + short:
         sys.exit(__doc__)
     page = PAGE.read_text(encoding="utf-8")
-    print("| what | instructions | over HubSlosh |")
+    print("| model, motion | instructions of a step | divided by the instructions of HubSlosh |")
     print("| --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:
         program = step_cost.build_host(Path(folder))
