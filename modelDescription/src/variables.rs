@@ -14,26 +14,26 @@ const CHAPTERS: [(Causality, &str, &str); 5] = [
     (
         Causality::Input,
         "Inputs",
-        "The host sets them at any time, also before the first step. They are held over a step, \
-         or run along the slope that the host sets.",
+        "The host may set inputs at any time, also before the first step. An input is held over a step, \
+         or is linear over the step if the host sets its derivative.",
     ),
-    (Causality::Output, "Outputs", "Results to connect and plot."),
+    (Causality::Output, "Outputs", "Results that a host connects to other models, or plots."),
     (
         Causality::Parameter,
         "Parameters",
-        "The host sets them before the simulation starts; those marked *tunable* between steps \
-         as well. The FMU refuses a value outside its range, with its name and the allowed range. \
-         It reports all contradictions between parameters in one message at the end of initialization mode.",
+        "The host sets parameters before the simulation starts, and parameters that are marked *tunable* also between \
+         steps. The FMU refuses a value outside the range of its parameter; the message states the name and the range. \
+         One message at the end of initialization mode lists all contradictions between parameters.",
     ),
     (
         Causality::CalculatedParameter,
         "Calculated parameters",
-        "Values that follow from the parameters; known when initialization mode begins.",
+        "Values that follow from the parameters. They can be read from the beginning of initialization mode on.",
     ),
     (
         Causality::Local,
         "Local variables",
-        "Internal values: balances, events, the continuous states and their derivatives.",
+        "Internal values: energy balance, events, the continuous states and their derivatives.",
     ),
 ];
 
@@ -41,9 +41,9 @@ pub fn page<M: Model>() -> String {
     let mut page = String::from(
         "<!-- Written by `cargo run --release -p model-description`; do not edit. -->\n\
          # All variables\n\n\
-         Which variables has the FMU, in which units and ranges?\n\n\
-         Values cross the interface in the first unit; the unit in brackets is for display. The FMU refuses values outside \
-         the ranges.",
+         Which variables does the FMU have, in which units and ranges?\n\n\
+         Host and FMU exchange values in the first unit of the column \"unit\"; the unit in brackets is for display. The \
+         FMU refuses values outside the ranges.",
     );
     if let Some(array) = M::table().variables.iter().find(|v| !v.shape.is_empty()) {
         let _ = write!(
@@ -54,8 +54,8 @@ pub fn page<M: Model>() -> String {
         );
     }
     page.push_str(
-        " A list of start values has a value for each element, rows of the last index separated by semicolons. If the list \
-         is shorter than the array, it is the same for each value of the first index.\n",
+        " A list of start values has a value for each element of an array; semicolons separate the rows of the last index. If \
+         the list is shorter than the array, it is valid for each value of the first index.\n",
     );
     for (causality, title, introduction) in CHAPTERS {
         let _ = write!(page, "\n## {title}\n\n{introduction}\n\n");
