@@ -1,21 +1,22 @@
-//! Effects that a misfit asks for: a score test (Lagrange multiplier; Rao 1948, Engle 1984) of each candidate, then fits of the best.
+//! Effects that may explain a misfit: a score test (Lagrange multiplier; Rao 1948, Engle 1984) of each candidate, then fits
+//! of the best ones.
 //!
-//! Under a small effect of size x the residuals e move by x v. The unknowns and the tolerances can cancel the part of v that lies
-//! in the span of their derivatives J. The rest v' of it gives the size that explains the residual best, and its standard
-//! deviation:
+//! A small effect of size x shifts the residuals e by x v. The unknowns and the tolerances can cancel the part of v
+//! that lies in the span of their derivatives J. The remaining part v' gives the size that explains the residual best,
+//! and its standard deviation:
 //!
 //! ```text
 //! x = −v'·e/|v'|²,   σ_x = 1/|v'|
 //! ```
 //!
-//! x/σ_x is normal if the effect is absent. A general test spreads over hundreds of rows or bands what this test gathers in one
-//! number: an estimate can be off by ten standard deviations without a sign in a general test. The candidates with the largest
-//! scores are fitted with all unknowns, from the recordings' own noise, because the noise that is estimated from a misfit
-//! contains the misfit and would hide it.
+//! If the effect is absent, x/σ_x has a standard normal distribution. A score test gathers in one number the evidence that a
+//! general test of whiteness spreads over hundreds of lags or bands: an estimate can be off by ten standard deviations while all
+//! general tests pass. The candidates with the largest scores are fitted together with all unknowns. These fits begin with the
+//! noise between neighbouring rows, because the noise that was estimated from a misfit contains the misfit and would hide it.
 //!
 //! An effect may imitate another one that is not among the candidates. For example, a lag with a negative delay changes the gain
-//! over the frequency as a wrong inertia does. Therefore a fitted effect is no cause if an output then precedes its input, if it
-//! drives a further unknown to a bound, or if the residual has a score beyond chance of another candidate.
+//! over the frequency as a wrong inertia does. Therefore a fitted effect is not accepted as the cause if an output then precedes
+//! its input, if another unknown then lies at a bound, or if another candidate still has a score that chance does not explain.
 
 use analysis::innovations::LIMIT;
 use anyhow::Result;
@@ -27,16 +28,16 @@ use super::problem::Part;
 use super::{ALIKE, DECIDES, ENDS, Fit, SEEN, Solution, Unknown, Z};
 use crate::news::News;
 
-/// Largest number of candidates that are fitted, those with the largest scores.
+/// Largest number of candidates that are fitted. They are the candidates with the largest scores.
 const FITTED: usize = 3;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
     pub unknown: usize,
     pub size: (f64, f64),
-    /// Decrease of −2 ln L by the effect.
+    /// Decrease of −2 ln L when the effect is fitted.
     pub gain: f64,
-    /// True if the residual is noise once the effect is fitted, and if nothing tells that the effect imitates another one.
+    /// True if the residual is noise once the effect is fitted, and if no sign indicates that the effect imitates another one.
     pub fits: bool,
 }
 
@@ -46,8 +47,8 @@ struct Score {
     score: f64,
 }
 
-/// Returns the score of each candidate about a minimum, the largest first. A candidate that the unknowns cancel, or that the
-/// system refuses, has none.
+/// Returns the score of each candidate at a minimum, the largest first. A candidate has no score if the unknowns cancel its
+/// effect, or if the system refuses it.
 ///
 /// # Errors
 /// If the system refuses the minimum.
@@ -61,14 +62,14 @@ fn scores(fit: &mut Fit, minimum: &Minimum, candidates: &[usize]) -> Result<Vec<
     let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
     let one = |&unknown: &usize| -> Option<Score> {
         let mut z = base.z.clone();
-        // a plausible size: the first order of a lag is a delay, that of a limit is nothing
+        // a plausible size of the effect, because an infinitesimal lag acts like a delay, and an infinitesimal limit not at all
         let step = unknowns[unknown].reach;
         z[unknown] += step;
         let there = fit.at(&z).ok()?;
         let change = (there.e - &base.e) / step;
         let seen = rest(&change);
         let norm = seen.norm();
-        // the rest the unknowns cancel
+        // the remainder that the unknowns cannot cancel
         if !(norm.is_finite() && norm > SEEN * change.norm()) {
             return None;
         }
@@ -80,11 +81,11 @@ fn scores(fit: &mut Fit, minimum: &Minimum, candidates: &[usize]) -> Result<Vec<
     Ok(scores)
 }
 
-/// Returns the effects that explain a part of a solution's residual, the largest gain first. Only candidates with a score beyond
-/// chance are fitted.
+/// Returns the effects that explain a part of a solution's residual, the largest decrease of −2 ln L first. Only candidates whose
+/// score is beyond chance are fitted; a candidate that the system refuses is left out.
 ///
 /// # Errors
-/// If the system refuses the minimum. A candidate that it refuses is left out.
+/// If the system refuses the minimum.
 pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<Effect>> {
     let problem = solution.fit.problem;
     let name = |j: usize| &problem.unknowns[j].name;
@@ -126,7 +127,7 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         let mut z = base.point.z.clone();
         let reach = problem.unknowns[j].reach;
         let mut size = score.size.abs().max(0.3 * reach);
-        // far from its minimum an effect that has one sign may seem to have the other
+        // far from its minimum an effect that can have only one sign may seem to have the opposite sign
         if fit.ends[j].0 < 0.0 {
             size = size.copysign(score.size);
         }
@@ -177,8 +178,8 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
     Ok(found)
 }
 
-/// Returns the effect that is the cause: it leaves noise as residual, no effect explains the recordings clearly better, and no
-/// other effect that leaves noise explains them about as well.
+/// Returns the effect that is the cause: with it the residual is noise, no other effect explains the recordings clearly better,
+/// and no other effect with which the residual is noise explains them about as well.
 pub fn cause(effects: &[Effect]) -> Option<&Effect> {
     let best = effects.first()?.gain;
     let mut fitting = effects.iter().filter(|effect| effect.fits);

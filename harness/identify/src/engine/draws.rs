@@ -1,9 +1,10 @@
-//! Intervals as quantiles of draws.
+//! Intervals as quantiles of random draws.
 //!
-//! A point of the profile is drawn with the weight exp(−Δ/2) of its deviance Δ. There the other unknowns are drawn from a normal
-//! distribution about their minimum; known values with tolerances are among them, by their priors and one derivative each. Draws
-//! outside the bounds, and draws whose values no system has, are refused. The quantities that users ask for are derived from each
-//! draw. Therefore a bent valley of the likelihood does no harm, and no interval includes impossible values.
+//! A point of the profile is drawn with the weight exp(−Δ/2), where Δ is the rise of −2 ln L at this point. The other unknowns
+//! are drawn from the normal distribution about their minimum at this point, together with the known values that have tolerances:
+//! their priors and one derivative each give their part. Draws outside the bounds are rejected, and draws with impossible values,
+//! too. The quantities that users ask for are computed from each draw. Therefore the intervals are valid in a bent valley of the
+//! likelihood, and no interval contains impossible values.
 
 use analysis::random::Random;
 use anyhow::Result;
@@ -14,23 +15,24 @@ use super::problem::{Part, Role};
 use super::profile::{Curve, OPEN, Point};
 use super::{Fit, Solution};
 
-/// Number of draws: with so many the error of a quantile is a fiftieth of a standard deviation.
+/// Number of draws. With this number the error of a quantile is a fiftieth of a standard deviation.
 const DRAWS: usize = 20_000;
-/// Fewest draws from which quantiles are computed.
+/// Smallest number of accepted draws from which quantiles are computed.
 const FEWEST: usize = 400;
-/// Places of the profile's coordinate between which draws are spread evenly.
+/// Number of grid points of the profile's coordinate; draws are uniform between two of them.
 const PLACES: usize = 400;
 
-/// Quantities that are derived from the unknowns: their names, units and values at the minimum, and draws of each in `columns`.
+/// Quantities that are computed from the unknowns: their names, units and values at the minimum, and in `columns`
+/// the draws of each.
 #[derive(Clone, Debug, Default)]
 pub struct Derived {
     pub names: Vec<String>,
     pub units: Vec<String>,
     pub values: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
-    /// Draws of the coordinates of known values, over their standard deviations, with the names of these values.
+    /// Draws of known values, by name: deviations in their coordinates, divided by their standard deviations.
     pub tolerances: Vec<(String, Vec<f64>)>,
-    /// True for the ends that the profile's range left open, of the quantity with that name.
+    /// For the quantity with this name: true for each end of its interval that the range of the profile left open.
     pub open: Option<(String, [bool; 2])>,
 }
 
@@ -43,7 +45,7 @@ struct Place {
 }
 
 impl Solution<'_> {
-    /// Draws the derived quantities, with or without the tolerances of known values.
+    /// Draws the derived quantities, with the tolerances of known values if `with_tolerances` is true.
     ///
     /// # Errors
     /// If the system refuses a derivative.
@@ -64,7 +66,7 @@ impl Solution<'_> {
             if places_of.last().is_some_and(|last| point.at - last.at < 1e-9) {
                 continue;
             }
-            // near a point whose derivatives were not found those of the minimum serve
+            // a point without derivatives uses the derivatives at the minimum
             let found = point.minimum.derivatives.as_ref().or(self.minimum.derivatives.as_ref());
             let Some(mut jacobian) = found.map(|found| found.matrix.clone()) else { continue };
             let mut which = point.minimum.free.clone();
@@ -99,7 +101,7 @@ impl Solution<'_> {
         let mut random = Random::new(1, 61);
         let x: Vec<f64> = all.iter().map(|p| p.at).collect();
         let curve = |y: Vec<f64>| Curve::new(&x, &y);
-        // roots of the rises are nearly lines
+        // interpolated as square roots, because the square root of the rise is nearly a straight line
         let lowest = all.iter().enumerate().min_by(|a, b| a.1.rise.total_cmp(&b.1.rise));
         let lowest = lowest.map_or(0, |(k, _)| k);
         let root =
@@ -132,13 +134,13 @@ impl Solution<'_> {
                 .collect(),
             ..Derived::default()
         };
-        // of a recording a gyro's bias is the mean of its drift too
+        // the bias of a gyro over a recording includes the mean of its drift
         let biases: Vec<(usize, usize)> = (0..n)
             .filter_map(|j| {
                 let Role::Bias(output, Some(recording)) = unknowns[j].role else { return None };
                 let of = |s: &super::Signal| (s.output, s.recording) == (output, recording);
                 let s = problem.signals.iter().position(of)?;
-                // if the noise is white without a drift, the bias is estimated like every other unknown
+                // with white noise and no drift, the bias is estimated like every other unknown
                 (fit.noise[s].drift > 0.0).then_some((j, s))
             })
             .collect();
@@ -208,7 +210,7 @@ impl Solution<'_> {
             None => found.columns.iter().map(median).collect(),
         };
         if let (Some(j), [first, .., last]) = (bent, all) {
-            // what the prior alone says has no ends
+            // a quantity that only its prior determines has no open end
             let known =
                 |at: f64| unknowns[j].prior.map_or(0.0, |(mean, std)| ((at - mean) / std).powi(2));
             let least = known(all[lowest].at);
@@ -219,8 +221,8 @@ impl Solution<'_> {
     }
 }
 
-/// Returns the matrix that maps independent standard normal numbers to steps of the unknowns `which`. The steps have
-/// the covariance that follows from the derivatives.
+/// Returns the matrix that maps independent standard normal numbers to deviations of the unknowns `which`, so that their
+/// covariance follows from the Jacobian.
 fn spread(jacobian: &DMatrix<f64>, which: &[bool], keeps_flat: bool) -> DMatrix<f64> {
     let curvature = Curvature::new(jacobian, places(which)).with_flat(keeps_flat);
     let (vectors, inverse) = curvature.spread();
@@ -268,8 +270,8 @@ impl Derived {
         [at(0.025), at(0.975)]
     }
 
-    /// Mixes the draws of models that explain the recordings about as well: each contributes draws in proportion to its
-    /// probability.
+    /// Mixes the draws of several models that explain the recordings about equally well. Each model contributes draws in
+    /// proportion to its probability.
     pub fn mixed(all: &[(f64, Derived)]) -> Derived {
         let Some((_, first)) = all.first() else { return Derived::default() };
         let columns = vec![Vec::new(); first.names.len()];

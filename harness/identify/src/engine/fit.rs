@@ -11,30 +11,29 @@ use rayon::prelude::*;
 use super::problem::{Hold, Motion, Part, Problem, Role, Signal, Unknown};
 use super::{BEND, MOVE, STEPS, WIDER};
 
-/// A problem with the state of its search: the noise of its signals, and what its inputs do between rows.
+/// A problem with the state of its search: the noise of its signals, and the intersample behaviour of its inputs.
 pub struct Fit<'p> {
     pub problem: &'p Problem<'p>,
     pub noise: Vec<Noise>,
     pub hold: Hold,
-    /// Factor by which the noise is multiplied in the sum of squares; above 1 the priors lead the search.
+    /// Factor of the noise in the sum of squares. A factor above 1 gives the priors more weight.
     pub inflation: f64,
-    /// Part of each recording that is fitted, from its beginning.
+    /// Fraction of each recording, from its beginning, that is fitted.
     pub part: f64,
     pub free: Vec<bool>,
-    /// True if differences are taken to both sides, because a difference to one side is wrong where the outputs are strongly
-    /// curved in an unknown.
+    /// True for central differences, because one-sided differences are wrong if the outputs are strongly curved in an unknown.
     pub central: bool,
     pub ends: Vec<(f64, f64)>,
-    /// The unknown whose profile is followed, if the likelihood was seen to be no parabola along it.
+    /// The unknown whose profile is followed, if the likelihood along it was found not to be a parabola.
     pub bent: Option<usize>,
-    /// Step of each unknown's difference, and the least step whose effect exceeds the errors of the solver.
+    /// Step of each unknown's finite difference, and the smallest step whose effect exceeds the errors of the solver.
     pub(super) steps: Vec<(f64, f64)>,
     filters: Vec<Whitening>,
     driven: AtomicUsize,
 }
 
-/// A simulation at the coordinates `z`: the motion of each recording, the residuals over their standard deviations, followed by
-/// the deviations from the priors (`e`), and the sum of the squares of `e` (`cost`).
+/// A simulation at the coordinates `z`: the outputs of each recording (`motion`), the vector `e` of the whitened residuals
+/// followed by the normalised deviations from the priors, and `cost`, the sum of the squares of `e`.
 #[derive(Clone, Debug)]
 pub struct Point {
     pub z: Vec<f64>,
@@ -45,7 +44,7 @@ pub struct Point {
 
 #[derive(Clone, Debug)]
 pub struct Derivatives {
-    /// A column for each unknown, with the derivatives of `Point::e`; 0 for unknowns that were not asked for.
+    /// Jacobian of `Point::e` with a column for each unknown; the columns of unknowns that were not asked for are 0.
     pub matrix: DMatrix<f64>,
     pub means: DMatrix<f64>,
 }
@@ -72,7 +71,7 @@ impl<'p> Fit<'p> {
         fit
     }
 
-    /// Returns the number of simulations so far. A simulation of a part of the rows counts as this part.
+    /// Returns the number of simulations so far. A simulation of a part of the rows counts as a fraction.
     pub fn simulations(&self) -> f64 {
         let rows: usize = self.problem.recordings.iter().map(|r| r.time.len()).sum();
         self.driven.load(Relaxed) as f64 / rows as f64
@@ -130,7 +129,7 @@ impl<'p> Fit<'p> {
         Point { z: z.to_vec(), motion, e, cost }
     }
 
-    /// Returns measured minus modelled values of each signal; 0 in rows without a measured value.
+    /// Returns the measured minus the modelled values of each signal, and 0 in rows without a measured value.
     pub fn residuals(&self, z: &[f64], motion: &[Motion]) -> Vec<Vec<f64>> {
         let values = self.values(z);
         let of = |signal: &Signal| {
@@ -154,7 +153,7 @@ impl<'p> Fit<'p> {
         self.problem.signals.iter().map(of).collect()
     }
 
-    /// Whitens the residuals of each signal and divides them by their standard deviation.
+    /// Whitens the residuals of each signal, so that they have unit variance.
     pub fn innovations(&self, mut residuals: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         for (piece, filter) in residuals.iter_mut().zip(&self.filters) {
             filter.apply(piece);
@@ -171,17 +170,18 @@ impl<'p> Fit<'p> {
         self.innovations(residuals).concat().into_iter().chain(deviations).collect()
     }
 
-    /// Returns the number of priors, whose deviations follow the residuals.
+    /// Returns the number of priors, whose deviations follow the residuals in `Point::e`.
     pub fn priors(&self) -> usize {
         self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count()
     }
 
-    /// Returns −2 ln L of a point up to a constant, where L is the likelihood with the present noise parameters.
+    /// Returns −2 ln L of a point up to a constant, where L is the likelihood with the current noise.
     pub fn deviance(&self, point: &Point) -> f64 {
         point.cost + self.filters.iter().map(Whitening::log_variance).sum::<f64>()
     }
 
-    /// Returns the derivatives at a point by the unknowns `which`, and adapts the steps of their differences for the next time.
+    /// Returns the derivatives at a point by the unknowns `which`, and adapts the steps of the finite differences
+    /// for the next call.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -252,7 +252,7 @@ impl<'p> Fit<'p> {
         loop {
             let is_first = step == self.steps[j].0;
             let (mut pieces, mut bend) = self.difference(at, j, step)?;
-            // a wider step makes the part of the solver's errors smaller, and that of curvature larger
+            // a wider step makes the solver's errors matter less, and curvature more
             let mut wider = step * WIDER;
             while self.problem.rough && bend > BEND && wider <= STEPS.1 * reach {
                 match self.difference(at, j, wider) {
@@ -267,7 +267,7 @@ impl<'p> Fit<'p> {
             let (values, means) = whitened(pieces);
             let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt() * self.inflation;
             let next = (MOVE / norm.max(1e-300)).clamp(STEPS.0 * reach, STEPS.1 * reach).max(least);
-            // once more where the step was far from what shows
+            // repeated with a better step if the effect of this step was far too large or too small
             if !is_first || (0.05..20.0).contains(&(next / step)) || !norm.is_finite() {
                 return Ok(Column { values, means, step: (next, least) });
             }
@@ -275,9 +275,9 @@ impl<'p> Fit<'p> {
         }
     }
 
-    /// Returns the derivative of each residual by coordinate `j`, from a difference to one side or, if `central`, to both sides,
-    /// and the norm of the second difference over the norm of the first. This ratio is near √3 if errors of the solver decide the
-    /// difference, and small if neither these errors nor curvature matter.
+    /// Returns the derivative of each residual by coordinate `j` from a one-sided difference, or from a central one if `central`
+    /// is true. Also returns the norm of the second difference divided by the norm of the first. This ratio is near √3 if the
+    /// solver's errors dominate the difference, and small if neither these errors nor curvature matter.
     fn difference(&self, at: &Point, j: usize, step: f64) -> Result<(Vec<Vec<f64>>, f64)> {
         let (by, there) = self.moved(at, j, step)?;
         let other = self.central.then(|| self.moved(at, j, -by)).transpose().ok().flatten();
@@ -301,8 +301,8 @@ impl<'p> Fit<'p> {
         Ok((there.iter().zip(&base).map(slope).collect(), bend))
     }
 
-    /// Returns the residuals with coordinate `j` moved by a step, and this step. If the bounds or the system refuse the step, it
-    /// is made to the other side.
+    /// Returns the residuals after coordinate `j` was changed by a step, and this step. If the bounds or the system refuse the
+    /// step, it is taken in the opposite direction.
     fn moved(&self, at: &Point, j: usize, step: f64) -> Result<(f64, Vec<Vec<f64>>)> {
         let is_inside = |by: f64| (self.ends[j].0..=self.ends[j].1).contains(&(at.z[j] + by));
         let to = |by: f64| -> Result<(f64, Vec<Vec<f64>>)> {
@@ -313,7 +313,7 @@ impl<'p> Fit<'p> {
         to(first).or_else(|error| if is_inside(second) { to(second) } else { Err(error) })
     }
 
-    /// Returns coordinates and motion of a point with coordinate `j` at another value.
+    /// Returns coordinates and motion of a point, with coordinate `j` set to `value`.
     ///
     /// # Errors
     /// If the system refuses the value.
@@ -329,15 +329,15 @@ impl<'p> Fit<'p> {
         Ok((z, motion))
     }
 
-    /// Returns a weighted sum of motions at the coordinates z as residuals over their standard deviations. The weights have to
-    /// add up to 0, so that the measured values cancel.
+    /// Returns a weighted sum of simulations at the coordinates z as whitened residuals. The weights have to add up to 0, so that
+    /// the measured values cancel.
     pub fn change(&self, z: &[f64], motions: &[(f64, &[Motion])]) -> DVector<f64> {
         let residuals: Vec<_> =
             motions.iter().map(|(_, motion)| self.residuals(z, motion)).collect();
         self.weighted(motions.iter().map(|(weight, _)| *weight).zip(&residuals))
     }
 
-    /// Whitens a weighted sum of residuals. The elements that belong to priors are set to 0.
+    /// Whitens a weighted sum of residuals. Elements that belong to priors are 0.
     fn weighted<'r>(&self, all: impl Iterator<Item = (f64, &'r Vec<Vec<f64>>)>) -> DVector<f64> {
         let mut sum: Vec<Vec<f64>> = Vec::new();
         for (weight, residuals) in all {
@@ -352,7 +352,7 @@ impl<'p> Fit<'p> {
         DVector::from_vec(whitened)
     }
 
-    /// Returns the factor between an output and its reading: 1 plus the error of the sensor's scale.
+    /// Returns the factor from an output to its measured value: 1 plus the scale error of the sensor.
     fn scale(&self, z: &[f64], output: usize) -> f64 {
         let own =
             |(u, z): (&Unknown, &f64)| (u.role == Role::Gain(output, output)).then(|| u.value(*z));
@@ -420,7 +420,8 @@ fn masked(mut piece: Vec<f64>, signal: &Signal) -> Vec<f64> {
     piece
 }
 
-/// Returns the change of a signal's reading per unit of an unknown of its sensor, row by row; `None`: no change.
+/// Returns, row by row, the change of a signal per unit of an unknown of its sensor; `None` if the unknown does
+/// not affect the signal.
 fn reading<'m>(
     unknown: &Unknown,
     signal: &Signal,

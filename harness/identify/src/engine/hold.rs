@@ -1,8 +1,9 @@
-//! Decides by the likelihood which course the inputs take between rows.
+//! Chooses the intersample behaviour of the inputs by the likelihood.
 //!
-//! A held input comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ little.
-//! Therefore each course gets a minimum of its own with all unknowns free, and none is taken whose effect would precede its cause.
-//! Courses that explain the recordings about as well as the best one count by their probability.
+//! A zero-order hold delays the input by half a row on average, so "zero-order hold without a delay" and "linear with a delay of
+//! half a row" fit about equally well. Therefore the minimum is searched separately for each intersample behaviour, with all
+//! unknowns free. An intersample behaviour with an output that precedes its input is refused. If others explain the recordings
+//! about as well as the best one, all of them enter the result, each with its probability.
 
 use anyhow::Result;
 
@@ -10,27 +11,27 @@ use super::minimum::{End, Minimum};
 use super::problem::{Hold, Role};
 use super::{ALIKE, DECIDES, ENDS, Fit, SETS};
 
-/// Delay below 0, in rows, up to which it counts as none, because the time stamps of two channels may differ by so much.
+/// Negative delay, in rows, that still counts as no delay, because the time stamps of two channels may differ by so much.
 const EARLIEST: f64 = 0.05;
 
-/// A course of the inputs between rows that was not chosen, at its own minimum.
+/// An intersample behaviour that was not chosen, at its own minimum.
 #[derive(Clone, Debug)]
 pub struct Rival {
     pub hold: Hold,
-    /// Sum of squares less the sum of squares of the chosen course.
+    /// Sum of squares minus the sum of squares with the chosen intersample behaviour.
     pub more: f64,
-    /// Coordinates of its minimum less the coordinates of the minimum with the chosen course.
+    /// Coordinates of its minimum minus the coordinates of the minimum with the chosen intersample behaviour.
     pub shift: Vec<f64>,
-    /// Its delay, s, if there is one.
+    /// Its estimated delay, s, if a delay is estimated.
     pub delay: Option<f64>,
-    /// True if the delay would let the effect precede its cause.
+    /// True if an output would precede its input with this delay.
     pub early: bool,
-    /// True if the search for its minimum was given up, because its sum of squares is far above the least one.
+    /// True if the search for its minimum was given up, because its sum of squares is far above the lowest one.
     pub lost: bool,
 }
 
 impl Rival {
-    /// Returns true if it explains the recordings about as well as the chosen course.
+    /// Returns true if this intersample behaviour explains the recordings about as well as the chosen one.
     pub fn is_near(&self) -> bool {
         !self.early && self.more < DECIDES
     }
@@ -41,16 +42,16 @@ impl Fit<'_> {
         self.problem.unknowns.iter().position(|u| u.role == Role::Delay(0))
     }
 
-    /// Returns true if at the coordinates `z` an output would precede its cause by more than the uncertainty `spare` of the
-    /// delay, s, although the problem does not allow it.
+    /// Returns true if at the coordinates `z` an output precedes its input by more than the uncertainty `spare` of the delay, s,
+    /// and the problem does not allow that.
     pub fn is_early(&self, z: &[f64], spare: f64) -> bool {
         let step = self.problem.recordings.first().map_or(0.0, |r| r.step);
         let delay = self.delay().filter(|j| self.free[*j] && !self.problem.acausal);
         delay.is_some_and(|j| z[j] + spare < -EARLIEST * step)
     }
 
-    /// Searches a minimum for each course of the inputs between rows. Returns the minimum of the best course, which is then set,
-    /// and the other courses. A course that cannot be simulated is left out.
+    /// Searches the minimum for each intersample behaviour. Returns the minimum of the best one, which the fit then uses, and the
+    /// others. An intersample behaviour with which the system cannot be simulated is left out.
     ///
     /// # Errors
     /// If the system refuses the minimum that was found so far.

@@ -1,5 +1,5 @@
-//! Information of the recordings about the unknowns at a point: their covariance, the directions that no output shows, and the
-//! unknowns that the solver's errors decide.
+//! Information of the recordings about the unknowns at a point: the covariance, the directions in which no output changes, and
+//! the unknowns whose estimates depend on the solver's errors.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,14 @@ use super::fit::Fit;
 use super::minimum::{Curvature, places};
 use super::solver_error::SolverError;
 
-/// Shift of an estimate by the solver's errors, in standard deviations, above which these errors decide it.
+/// Shift of an estimate by the solver's errors, in standard deviations, above which the estimate is not usable.
 const DECIDED: f64 = 0.3;
 
-/// Unknowns that change together without a change of any output.
+/// Unknowns that can change together without a change of any output.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inseparable {
-    /// Change of each unknown, in its coordinate. The sign is such that the unknown whose change moves the outputs most grows.
+    /// Change of each unknown, in its coordinate. The sign is chosen so that the unknown with the largest effect
+    /// on the outputs increases.
     pub direction: BTreeMap<String, f64>,
 }
 
@@ -37,17 +38,17 @@ impl Inseparable {
 }
 
 pub struct Knowledge {
-    /// Covariance of all unknowns. The rows of unknowns at a bound are 0, and unknowns that are not resolved have an infinite
-    /// variance.
+    /// Covariance of all unknowns. The rows of unknowns at a bound are 0, and unknowns that the recordings do not determine
+    /// have an infinite variance.
     pub covariance: DMatrix<f64>,
     pub inseparable: Vec<Inseparable>,
-    /// True for each unknown whose derivative is lost in the solver's errors, or whose estimate these errors move by more than
-    /// [`DECIDED`] standard deviations.
+    /// True for each unknown whose derivative is smaller than the solver's errors, or whose estimate they shift by more
+    /// than [`DECIDED`] standard deviations.
     pub decided_by_solver: Vec<bool>,
 }
 
 impl Fit<'_> {
-    /// Computes the knowledge from the derivatives by the unknowns `which` and the solver's errors.
+    /// Computes the knowledge from the derivatives by the unknowns `which` and from the solver's errors.
     pub fn knowledge(
         &self,
         jacobian: &DMatrix<f64>,
@@ -59,7 +60,8 @@ impl Fit<'_> {
         let mut covariance = curvature.covariance(n);
         let (noise, both): (Vec<f64>, Vec<f64>) =
             which.iter().map(|&j| solver.derivative[j]).unzip();
-        // what curvature alone leaves unresolved is a property of the model; what noise adds is one of the solver
+        // directions that even exact derivatives do not resolve are a property of the model; the noise of
+        // the solver adds others
         let curved: Vec<f64> =
             both.iter().zip(&noise).map(|(b, n)| (b * b - n * n).max(0.0).sqrt()).collect();
         let (of_model, of_both) = (curvature.unresolved(&curved), curvature.unresolved(&both));

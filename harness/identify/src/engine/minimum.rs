@@ -1,7 +1,7 @@
 //! The minimum of a sum of squares within bounds.
 //!
-//! The method is Levenberg–Marquardt with projection: a step is cut at the bounds, and the unknowns that have not hit a bound are
-//! then solved for again. Broyden's updates replace new derivatives as long as the steps gain about what they forecast. The
+//! The method is projected Levenberg–Marquardt: a step is cut at the bounds, and the other unknowns are then solved for again.
+//! Broyden's updates replace new Jacobians as long as the steps decrease the sum of squares about as much as forecast. The
 //! distance to the minimum is the Newton decrement, in standard deviations.
 
 use anyhow::Result;
@@ -13,7 +13,7 @@ use super::fit::{Derivatives, Fit, Point};
 #[derive(Clone, Debug)]
 pub struct Minimum {
     pub point: Point,
-    /// Derivatives at the minimum; `None` if the last derivatives belong to another point.
+    /// Derivatives at the minimum; `None` if the last Jacobian belongs to another point.
     pub derivatives: Option<Derivatives>,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
@@ -25,32 +25,34 @@ pub struct End {
     pub sets: usize,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
-    /// Sum of squares above which a minimum is of no use, so that the search is given up.
+    /// Sum of squares above which a minimum is useless. The search is given up if it cannot get below.
     pub above: f64,
-    /// Least decrease of the sum of squares by one set of derivatives. If a set gains less, the search ends, because in a bent
-    /// valley every set gains a little and the search would go on and on.
+    /// Smallest decrease of the sum of squares by one Jacobian. The search ends below it, because in a bent valley every Jacobian
+    /// gains a little and the search would not end.
     pub gain: f64,
-    /// True if the search may end by a distance whose derivatives were only updated, once one set was computed from differences.
+    /// True if a decrement from an updated (Broyden) Jacobian may end the search, after at least one Jacobian
+    /// was computed from differences.
     pub trusts: bool,
 }
 
 impl End {
-    /// Creates the limits of a search: it ends after `sets` sets of derivatives, or when the expected decrease of the
-    /// cost is below `decrement`.
+    /// Creates the limits of a search, which ends after `sets` Jacobians, or when the Newton decrement is
+    /// below `decrement`, standard deviations.
     pub fn new(sets: usize, decrement: f64) -> Self {
         End { sets, decrement, above: f64::INFINITY, gain: 0.0, trusts: false }
     }
 }
 
-/// Eigenvalue of a curvature with a unit diagonal, over the largest one, up to which the recordings do not show its direction; also
-/// the least regularisation of such a curvature.
+/// Ratio of an eigenvalue to the largest eigenvalue of a curvature with unit diagonal, below which the recordings do not
+/// determine the eigenvector's direction. Also the smallest regularisation of such a curvature.
 const FLAT: f64 = 1e-12;
 /// A direction counts as resolved if its eigenvalue is at least this many times the eigenvalue that errors of the
 /// derivatives cause by chance.
 const RESOLVED: f64 = 4.0;
-/// Most dampings that are tried with one set of derivatives.
+/// Largest number of damping factors that are tried with one Jacobian.
 const TRIES: usize = 8;
-/// Factor by which the damping grows after a step that fails, and falls after a step that gains more than half its forecast.
+/// Factor by which the damping grows after a step that fails, and shrinks after a step with more than half
+/// of its forecast decrease.
 const DAMPING: f64 = 8.0;
 
 /// The curvature JᵀJ of a sum of squares, scaled to a unit diagonal.
@@ -71,25 +73,25 @@ impl Curvature {
         Curvature { which, matrix, scale, keeps_flat: false }
     }
 
-    /// Gives directions of which the recordings show next to nothing the largest variance that the curvature resolves, instead of
-    /// none, so that no unknown in such a direction seems to be known well.
+    /// If `keeps_flat` is true, directions that the recordings hardly determine get the largest variance that the curvature
+    /// resolves, so that no unknown in such a direction seems to be well known. Otherwise these directions get a variance of 0.
     pub fn with_flat(self, keeps_flat: bool) -> Self {
         Curvature { keeps_flat, ..self }
     }
 
-    /// Returns a gradient over the unknowns of `which` in the scales of the matrix.
+    /// Returns the gradient of the unknowns of `which`, in the scales of the matrix.
     fn scaled(&self, gradient: &DVector<f64>) -> Vec<f64> {
         self.which.iter().zip(&self.scale).map(|(j, s)| gradient[*j] * s).collect()
     }
 
-    /// Returns the decrease of the sum of squares that a full step from this gradient forecasts.
+    /// Returns the forecast decrease of the sum of squares for a full step, where `b` is the scaled negative gradient.
     fn forecast(&self, b: &[f64]) -> f64 {
         let all: Vec<usize> = (0..b.len()).collect();
         self.solve(b, &all, 0.0).iter().zip(b).map(|(s, b)| s * b).sum()
     }
 
-    /// Returns the damped step (JᵀJ + λ D)⁻¹ b in the unknowns of `which` that `keep` lists, with the damping λ and the
-    /// diagonal D of JᵀJ; `b` and the result are in the scales of the matrix.
+    /// Returns the damped step (JᵀJ + λ D)⁻¹ b of the unknowns of `which` that `keep` lists, with the damping λ and the diagonal
+    /// D of JᵀJ. `b` and the step are in the scales of the matrix.
     fn solve(&self, b: &[f64], keep: &[usize], damping: f64) -> DVector<f64> {
         let damped = |more: f64| {
             let entry = |i: usize, j: usize| {
@@ -115,7 +117,8 @@ impl Curvature {
         is_known.then(|| self.matrix.clone().symmetric_eigen())
     }
 
-    /// Returns the condition number of the derivatives, with columns of unit length; NaN if they are not finite.
+    /// Returns the condition number of the Jacobian with columns scaled to unit length; NaN if it has elements
+    /// that are not finite.
     pub fn condition(&self) -> f64 {
         let ratio = |found: SymmetricEigen<f64, Dyn>| {
             found.eigenvalues.max() / found.eigenvalues.min().max(1e-300)
@@ -123,8 +126,8 @@ impl Curvature {
         self.eigen().map_or(f64::NAN, ratio).sqrt()
     }
 
-    /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue. For directions of which the recordings
-    /// show next to nothing it is 0 unless the curvature is [`with_flat`](Self::with_flat).
+    /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue. The inverse is set to 0 for a
+    /// direction that the recordings hardly determine, unless [`with_flat`](Self::with_flat) changed that.
     pub fn spread(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.which.len();
         let Some(found) = self.eigen() else { return (DMatrix::zeros(n, n), DVector::zeros(n)) };
@@ -142,8 +145,9 @@ impl Curvature {
         (found.eigenvectors, inverse)
     }
 
-    /// Returns the directions that the curvature does not resolve, as unit vectors in its own scales. `errors` are the independent
-    /// relative errors of the derivatives: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i².
+    /// Returns the directions that the curvature does not resolve, as unit vectors in its own scales. `errors` are the
+    /// independent relative errors of the derivatives. On average they contribute Σ v_i² errors_i² to the eigenvalue of
+    /// a unit eigenvector v.
     pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
         let Some(found) = self.eigen() else { return Vec::new() };
         let flat = FLAT * found.eigenvalues.max();
@@ -155,7 +159,7 @@ impl Curvature {
         all.filter(is_flat).map(|(_, v)| v.into_owned()).collect()
     }
 
-    /// Returns the covariance as a matrix of `all` unknowns; 0 for unknowns that the curvature does not have.
+    /// Returns the covariance as a matrix over `all` unknowns, with zeros for unknowns outside the curvature.
     pub fn covariance(&self, all: usize) -> DMatrix<f64> {
         let (vectors, inverse) = self.spread();
         let inner = &vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
@@ -180,7 +184,7 @@ pub fn without(which: &[bool], j: usize) -> Vec<bool> {
 }
 
 impl Fit<'_> {
-    /// Returns the unknowns that are free and not at a bound beyond which the sum of squares falls.
+    /// Returns the free unknowns, without those at a bound beyond which the sum of squares would decrease.
     pub fn inner(&self, z: &[f64], gradient: &DVector<f64>, free: &[bool]) -> Vec<usize> {
         let is_inner = |j: &usize| {
             let ((low, high), z, slope) = (self.ends[*j], z[*j], gradient[*j]);
@@ -189,8 +193,8 @@ impl Fit<'_> {
         places(free).into_iter().filter(is_inner).collect()
     }
 
-    /// Searches the minimum from z over the unknowns `free`. If `derivatives` of a nearby point are given, the search begins with
-    /// them.
+    /// Searches the minimum from z over the unknowns `free`. The search begins with `derivatives`, if given, which come
+    /// from a nearby point.
     ///
     /// # Errors
     /// If the system refuses the start, or every step of an unknown.
@@ -206,7 +210,7 @@ impl Fit<'_> {
         self.minimise_on(point, free, derivatives, end)
     }
 
-    /// Searches the minimum from the coordinates of a point over all free unknowns.
+    /// Searches the minimum over all free unknowns, from the coordinates of a point.
     ///
     /// # Errors
     /// If the system refuses the start, or every step of an unknown.
@@ -215,7 +219,7 @@ impl Fit<'_> {
         self.minimise(&from.z, &free, None, end)
     }
 
-    /// Searches the minimum as [`Fit::minimise`] does, from a point that is simulated already.
+    /// Searches the minimum as [`Fit::minimise`] does, from a point that has already been simulated.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -228,11 +232,11 @@ impl Fit<'_> {
     ) -> Result<Minimum> {
         let n = point.z.len();
         let (mut damping, mut fresh, mut decrement, mut sets) = (1e-3, false, f64::INFINITY, 0);
-        // sum of squares at the last set of derivatives
+        // sum of squares at the last Jacobian
         let mut last = f64::INFINITY;
         loop {
-            // If the residual is larger than the noise, distances and gains count in its standard deviations: a search for digits
-            // that a misfit hides would be of no use.
+            // If the residual is larger than the noise, distances and gains are relative to the standard deviation of the
+            // residual, because digits below the misfit are of no use.
             let scale = (point.cost / point.e.len() as f64).max(1.0);
             if derivatives.is_none() {
                 if sets == end.sets || last - point.cost < scale * end.gain {
@@ -262,7 +266,7 @@ impl Fit<'_> {
                 derivatives = None;
                 continue;
             }
-            // where dry friction stops the hub, the first forecast may be half of what the steps win
+            // where dry friction stops the hub, the forecast may be only half of the decrease that the steps achieve
             let is_near = decrement < 30.0 * scale.sqrt();
             if fresh && sets > 1 && is_near && point.cost - 1.5 * won > end.above {
                 break;
@@ -278,7 +282,7 @@ impl Fit<'_> {
                     |j: usize| !(self.ends[j].0..=self.ends[j].1).contains(&(point.z[j] + step[j]));
                 let keep: Vec<usize> = all.iter().copied().filter(|k| !hits(which[*k])).collect();
                 if !keep.is_empty() && keep.len() < all.len() {
-                    // a cut step is taken again without the unknowns that hit a bound
+                    // a step that was cut at a bound is solved again without the unknowns that hit it
                     let mut cut = vec![0.0; n];
                     for &j in which.iter().filter(|j| hits(**j)) {
                         let (low, high) = self.ends[j];
@@ -325,7 +329,7 @@ impl Fit<'_> {
                 }
             }
             match outcome {
-                // differences to one side may point elsewhere where the answer bends
+                // one-sided differences may mislead where the outputs are curved
                 None if !self.central && decrement > super::ENDS.0 * 0.2 && sets < end.sets => {
                     self.central = true;
                     derivatives = None;
@@ -338,7 +342,7 @@ impl Fit<'_> {
         Ok(Minimum { point, derivatives, decrement, free: free.to_vec() })
     }
 
-    /// Returns the distance of a point to the minimum over the unknowns `free`, standard deviations.
+    /// Returns the Newton decrement of a point over the unknowns `free`, standard deviations.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -349,7 +353,8 @@ impl Fit<'_> {
         Ok(curvature.forecast(&curvature.scaled(&gradient)).max(0.0).sqrt())
     }
 
-    /// Returns the derivatives at a minimum by the unknowns that were searched for, and keeps them there.
+    /// Returns the derivatives at a minimum by the unknowns that were searched for. They are stored in the minimum
+    /// for the next call.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -385,7 +390,7 @@ mod tests {
             assert!(curvature.covariance(2).iter().all(|v| v.is_finite()));
             assert!(curvature.unresolved(&[0.0; 2]).is_empty());
         }
-        // sizes alone change nothing
+        // the unit of a column changes nothing
         for size in [1e-150, 1e-9, 1.0, 1e9, 1e150] {
             let line =
                 DMatrix::from_fn(5, 2, |k, j| if j == 0 { size } else { (k as f64 - 2.0) * size });
@@ -400,7 +405,7 @@ mod tests {
         let found = Curvature::new(&line, vec![0, 1]).covariance(2);
         assert!((found[(0, 0)] - 0.2).abs() < 1e-15 && (found[(1, 1)] - 0.1).abs() < 1e-15);
         assert!(found[(0, 1)].abs() < 1e-15);
-        // of two columns that nearly are the same only the sum is known: neither may seem to be
+        // two nearly equal columns determine only the sum, so that both variances must be large
         let alike = DMatrix::from_fn(5, 2, |k, j| 1.0 + if j == 0 { 1e-8 * k as f64 } else { 0.0 });
         let sure = Curvature::new(&alike, vec![0, 1]).covariance(2);
         let honest = Curvature::new(&alike, vec![0, 1]).with_flat(true).covariance(2);
@@ -408,7 +413,7 @@ mod tests {
         let blind = DMatrix::from_fn(5, 2, |_, j| if j == 0 { 1.0 } else { 0.0 });
         let blind = Curvature::new(&blind, vec![0, 1]).with_flat(true).covariance(2);
         assert!((blind[(0, 0)] - 0.2).abs() < 1e-15 && blind[(1, 1)] == 0.0, "{blind}");
-        // two columns that are the same are not told apart
+        // two equal columns cannot be distinguished
         let same = Curvature::new(&DMatrix::from_element(5, 2, 1.0), vec![0, 1]);
         assert_eq!(same.unresolved(&[0.0; 2]).len(), 1);
     }

@@ -1,19 +1,20 @@
-//! The noise of a signal from its residual, by maximum likelihood with a weak prior of the drift.
+//! The noise of a signal, estimated from its residual by maximum likelihood with a weak prior of the drift.
 //!
-//! A short recording cannot tell its drift from the friction of its bearing. So the drift of a gyro is expected to be of the size that
-//! its kind has ([`Drift`]).
+//! A short recording cannot separate the drift of a gyro from the friction of the bearing. Therefore the drift has a prior, whose
+//! size is typical of gyros of its kind ([`Drift`]).
 
 use analysis::gauss_markov::Noise;
 use analysis::statistics::deviation;
 
 use super::problem::{Drift, Signal};
 
-/// Smallest white noise, relative to the standard deviation of the signal. A simulated recording may have less, but there the
-/// residual is the error of the solver, which no test of noise passes.
+/// Smallest white noise, relative to the standard deviation of the signal. A simulated recording may have less, but its residual
+/// is then the error of the solver, which no test accepts as noise.
 const LEAST_NOISE: f64 = 1e-5;
-/// Standard deviation of the logarithm of a drift's correlation time about its expected value.
+/// Prior standard deviation of the logarithm of a drift's correlation time.
 const TIME_WIDTH: f64 = 1.0;
-/// Least step of the search over the logarithms of a drift's size and correlation time; a finer search moves no estimate.
+/// Smallest step of the search over the logarithms of a drift's size and correlation time. A finer search would
+/// not change any estimate.
 const LEAST_STEP: f64 = 0.05;
 
 impl Signal {
@@ -22,14 +23,14 @@ impl Signal {
         Noise { white: self.own_noise(), drift, time }
     }
 
-    /// Returns the noise that neighbouring rows show, but at least the least noise.
+    /// Returns the noise between neighbouring rows, but at least the smallest noise that a fit assumes.
     pub fn own_noise(&self) -> f64 {
         self.white.max(self.least_noise())
     }
 
     fn least_noise(&self) -> f64 {
         let spread = deviation(&self.picked(&self.measured));
-        // a constant signal has a spread of 0
+        // a constant signal has a standard deviation of 0
         (LEAST_NOISE * spread).max(1e-6 * self.white).max(f64::MIN_POSITIVE)
     }
 
@@ -84,7 +85,8 @@ mod tests {
 
     const TIME: f64 = 100.0; // s
 
-    /// Returns the noise of a residual with white noise and a drift (rad/s) in a recording whose rate has a standard deviation of 1 rad/s.
+    /// Returns the estimated noise, the residual and the innovations of a simulated residual with white noise and a drift
+    /// (rad/s). The recorded rate has a standard deviation of 1 rad/s.
     fn estimated(white: f64, drift: f64) -> (Noise, Vec<f64>, Vec<f64>) {
         let mut random = Random::new(3, 1);
         let time: Vec<f64> = (0..135_000).map(|k| 0.02 * f64::from(k)).collect();
@@ -111,7 +113,8 @@ mod tests {
     fn the_estimated_noise_is_the_simulated_noise_and_makes_the_innovations_white() {
         let (white, drift) = (4.07e-4, 7.85e-5);
         let (found, time, residual) = estimated(white, drift);
-        // 1/sqrt(2 N) = 0.2 %; the drift has 27 correlation times: 20 %, four of them
+        // expected error of the white noise 1/sqrt(2 N) = 0.2 %; with 27 correlation times that of the drift is 20 %; four
+        // of them are allowed
         assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
         assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");
         let mut e = residual.clone();
@@ -122,8 +125,6 @@ mod tests {
         }
     }
 
-    /// A residual of 5e-11 rad/s comes from the solver, not from a sensor; the estimated noise is then the least noise that
-    /// a fit assumes.
     #[test]
     fn a_residual_as_small_as_solver_errors_gets_the_least_noise() {
         let found = estimated(5e-11, 1e-11).0;

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-/// The course of an input between the rows of a recording (Ljung; Pintelon & Schoukens).
+/// Intersample behaviour: the course of an input between two rows of a recording (Ljung; Pintelon & Schoukens).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hold {
     FirstOrderHold,
@@ -22,37 +22,40 @@ impl Hold {
     }
 }
 
-/// The place at which an unknown acts; outputs and recordings are given by their index.
+/// The place at which an unknown acts. Outputs and recordings are given by their index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// The unknown changes the simulation of one recording, or of all recordings (`None`), so that its derivatives are
     /// differences between simulations.
     Run(Option<usize>),
-    /// Delay of the reading of an output, s. The run takes it into account; its derivative is the derivative of the output by
-    /// time.
+    /// Delay of the measured output with this index, s. The simulation applies it, and its derivative is the time
+    /// derivative of the output.
     Delay(usize),
-    /// Added to the reading of an output, in one recording or in all.
+    /// Bias that is added to the output with the first index, in the recording with the second index or
+    /// in all recordings (`None`).
     Bias(usize, Option<usize>),
-    /// The second output times the unknown is added to the reading of the first. If both are the same output, the unknown is the
-    /// error of its scale.
+    /// The second output times the unknown is added to the first output. If both indices are equal, the unknown is the scale
+    /// error of the sensor.
     Gain(usize, usize),
-    /// The unknown acts in no reading, but in quantities that [`System::derive`] computes.
+    /// The unknown changes no output, only quantities that [`System::derive`] computes.
     Derived,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     Free,
-    /// A known value with a prior: held in the search, and joined at the end.
+    /// A known value with a prior. It is fixed during the search, and its prior widens the intervals at the end.
     Tolerance,
-    /// An effect that is absent (its start is 0) unless the residual asks for it.
+    /// An effect that is left out (its value stays at 0) unless the residual shows that it is needed.
     Candidate,
 }
 
-/// One unknown number with its `unit`. The search moves its coordinate z, which is its value or, with `log`, the logarithm of that.
+/// One unknown number with its `unit`. The search works with its coordinate z, which is the value or, if `log` is true, the
+/// logarithm of the value.
 ///
-/// `start` and `bounds` are values. `prior`, mean and standard deviation of what is known beforehand, and `reach`, the plausible
-/// distance from the start, are coordinates. `bent` says that the likelihood along it is no parabola, so that its profile is followed.
+/// `start` and `bounds` are values. `prior` (mean and standard deviation of the knowledge before the recordings) and `reach`
+/// (plausible distance from the start) are in the coordinate. If `bent` is true, the likelihood along the unknown is no parabola,
+/// and its profile is followed.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     pub name: String,
@@ -72,7 +75,7 @@ impl Unknown {
         Unknown { log: true, reach: 0.3, ..Unknown::linear(name, unit, role, (start, 0.3), bounds) }
     }
 
-    /// Creates an unknown that is searched in its value; `reach` is the plausible distance from its start.
+    /// Creates an unknown whose coordinate is its value. `reach` is the plausible distance from its start.
     pub fn linear(
         name: &str,
         unit: &str,
@@ -94,7 +97,7 @@ impl Unknown {
         }
     }
 
-    /// Returns the unknown with a prior, whose mean and standard deviation are in its coordinate.
+    /// Returns the unknown with a prior. `mean` and `std` are in the coordinate of the unknown.
     pub fn with_prior(self, mean: f64, std: f64) -> Self {
         Unknown { prior: Some((mean, std)), ..self }
     }
@@ -115,12 +118,12 @@ impl Unknown {
         (end(self.bounds.0), end(self.bounds.1))
     }
 
-    /// Returns true for a known value with a tolerance that has an effect in the recordings.
+    /// Returns true for a known value with a tolerance that affects the simulated outputs.
     pub fn is_held(&self) -> bool {
         self.part == Part::Tolerance && self.role != Role::Derived
     }
 
-    /// Returns true if the unknown has an effect in this recording.
+    /// Returns true if the unknown affects the outputs of this recording.
     pub fn is_of(&self, recording: usize) -> bool {
         match self.role {
             Role::Run(of) | Role::Bias(_, of) => of.is_none_or(|of| of == recording),
@@ -130,8 +133,8 @@ impl Unknown {
     }
 }
 
-/// A recording: `time`, s, and `inputs` at its rows, with which the residual is compared, and the usual time between the samples of
-/// the inputs, `step`, s.
+/// One recording for the fit: `time` (s) of its rows, the `inputs` at these rows, and `step`, the usual time between two samples
+/// of the inputs, s. Residuals are computed at these rows.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     pub name: String,
@@ -140,10 +143,10 @@ pub struct Recorded {
     pub step: f64,
 }
 
-/// An output of a recording as it was measured.
+/// A measured output of a recording.
 ///
-/// `recording` and `output` are indices. `measured` has a value in each row; only rows that are `sampled` have a measured one.
-/// `white` is the white noise from one row to the next, and `drift` the drift that is expected of the sensor, if it drifts.
+/// `recording` and `output` are indices. `measured` has a value in each row, which was measured only where `sampled` is true.
+/// `white` is the standard deviation of the white noise of one row, and `drift` the drift expected of this sensor, if it drifts.
 #[derive(Clone, Debug)]
 pub struct Signal {
     pub recording: usize,
@@ -156,16 +159,16 @@ pub struct Signal {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Drift {
-    /// Size, relative to the white noise of a row.
+    /// Standard deviation of the drift, relative to the white noise of one row.
     pub size: f64,
     /// Correlation time, s.
     pub time: f64,
-    /// Standard deviation of the logarithm of the size about its expected value.
+    /// Prior standard deviation of the logarithm of `size`.
     pub width: f64,
 }
 
-/// A simulated run at the rows of one recording: each output, its derivative by time if the system computes it, and `others`,
-/// quantities that the system needs later and the search does not.
+/// A simulation at the rows of one recording: the outputs, their time derivatives (`slopes`) if the system computes them, and
+/// `others`, quantities that the search does not need but the system does afterwards.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     pub outputs: Vec<Vec<f64>>,
@@ -174,8 +177,8 @@ pub struct Motion {
 }
 
 pub trait System: Sync {
-    /// Runs through the first `rows` rows of a recording with these values of all unknowns. Slopes are returned where `whole` is
-    /// true; the other runs are for differences.
+    /// Simulates the first `rows` rows of a recording with these values of all unknowns. Time derivatives of the outputs are
+    /// returned if `whole` is true; simulations for finite differences do without them.
     ///
     /// # Errors
     /// If the system refuses the values.
@@ -190,17 +193,17 @@ pub trait System: Sync {
 
     fn derived(&self) -> Vec<(String, String)>;
 
-    /// Returns the quantities that users ask for, such as tank and hub, from values of all unknowns; `None` if no system has these
-    /// values.
+    /// Returns the quantities that users ask for, such as the tank and the inertia of the hub, from the values of all unknowns;
+    /// `None` if the values are impossible.
     fn derive(&self, values: &[f64]) -> Option<Vec<f64>>;
 }
 
-/// Recordings that are fitted together, unknowns, and the system.
+/// Recordings that are fitted together, the unknowns, and the simulated system.
 ///
-/// `starts` are values of all unknowns, and `holds` possible courses of the inputs between rows, the likeliest first. With
-/// `acausal` a reading may come before its cause. If the starts from the data lead to no good fit, `drawn` starts are drawn
-/// within the bounds. The outputs of a `rough` system have errors of a solver that jump from one value of an unknown to the next;
-/// the steps of differences then have to be so wide that their effect exceeds these errors.
+/// Each element of `starts` holds a start value of every unknown. `holds` are the possible intersample behaviours, the likeliest
+/// first. If `acausal` is true, an output may precede its input. If no start from the data leads to a good fit, `drawn` random
+/// starts within the bounds are tried. If `rough` is true, the solver's errors jump when an unknown changes, and finite
+/// differences take steps so wide that their effect exceeds these errors.
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub system: &'a dyn System,

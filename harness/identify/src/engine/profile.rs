@@ -1,4 +1,4 @@
-//! The profile of the likelihood along one unknown whose likelihood is no parabola.
+//! The profile likelihood of one unknown along which the likelihood is no parabola.
 
 use anyhow::Result;
 use nalgebra::DMatrix;
@@ -7,19 +7,20 @@ use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::Part;
 use super::{DECIDES, ENDS, Fit, GAIN, SETS, VAGUE, Z};
 
-/// Growth of the sum of squares below which an end of the range leaves an interval open: 1.96².
+/// Rise of the sum of squares, 1.96², that closes a 95 % interval. If the sum of squares rises less up to the end of the
+/// profile's range, the interval is open on that side.
 pub const OPEN: f64 = Z * Z;
-/// Largest relative difference between the root of the likelihood's rise and a straight line, at which the likelihood still
-/// counts as a parabola.
+/// Largest relative difference between the square root of the likelihood's rise and a straight line at which the likelihood
+/// still counts as a parabola.
 pub const PARABOLIC: f64 = 0.1;
-/// Shortest and longest first step, and longest step, of the coordinate.
+/// Shortest first step, longest first step and longest later step of a profile, in the coordinate.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
-/// Distance to the minimum, in standard deviations, at which the search of a point ends: it adds a hundredth of [`OPEN`] to the
-/// sum of squares.
+/// Distance to the minimum, in standard deviations, at which the search for a point of the profile ends. It adds a hundredth of
+/// [`OPEN`] to the sum of squares.
 const NEAR: f64 = 0.2;
-/// Most points of a profile on each side.
+/// Largest number of points on each side of a profile.
 const POINTS: usize = 16;
-/// Values of the bent unknown, relative to its start, at which other minima are searched.
+/// Factors of the start value of the bent unknown at which other minima are searched.
 const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
 
 pub type Profile = (usize, Vec<Point>);
@@ -35,8 +36,8 @@ pub fn lowest(points: &[Point]) -> Option<&Point> {
 }
 
 impl Fit<'_> {
-    /// Finds the unknown along which the likelihood is least like a parabola, if the problem names no unknown as bent. Returns
-    /// true if a profile along this unknown is needed from now on.
+    /// Finds the unknown along which the likelihood is least like a parabola, if the problem does not name one as bent. Returns
+    /// true if the profile of this unknown has to be followed.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -60,8 +61,8 @@ impl Fit<'_> {
         Ok(self.bent.is_some())
     }
 
-    /// Returns by which part the root of the likelihood's rise along unknown `j` differs from the root of a parabola's rise, at
-    /// the ends of the 95 % interval or at a bound before them: the larger of both sides.
+    /// Returns how far the likelihood along unknown `j` is from a parabola: the relative difference between the square roots of
+    /// the two rises at an end of the 95 % interval, or at a bound before this end. The larger value of both sides counts.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -92,14 +93,14 @@ impl Fit<'_> {
         self.problem.unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free)
     }
 
-    /// Looks for a lower minimum at other values of the unknown that is bent, with all others free: between two such minima the
-    /// likelihood may have a ridge that no search crosses.
+    /// Looks for a lower minimum at other values of the bent unknown, with all other unknowns free. A search cannot cross a
+    /// ridge of the likelihood between two minima. Returns the points that it found.
     ///
     /// # Errors
     /// If the system refuses the minimum.
     pub fn across_ridges(&mut self, minimum: &mut Minimum) -> Result<Vec<Point>> {
         let unknowns = &self.problem.unknowns;
-        // below 0 there is no sum of squares
+        // a minimum this close to 0 cannot be beaten, because a sum of squares is not negative
         let bent = self.stated_bent().filter(|_| minimum.point.cost > DECIDES);
         let Some(j) = bent else { return Ok(Vec::new()) };
         let derivatives = Some(self.derivatives_at(minimum)?);
@@ -126,9 +127,9 @@ impl Fit<'_> {
         Ok(points)
     }
 
-    /// Returns the bent unknown and its profile through a minimum; `None` if no unknown is bent, or if the bent unknown is
-    /// determined so well that its likelihood is a parabola. The points are in the order of the coordinate. Points of `beyond`
-    /// outside the range of the profile are added.
+    /// Returns the bent unknown and its profile through a minimum, in ascending order of the coordinate. Returns `None` if no
+    /// unknown is bent, or if the recordings determine the bent unknown so well that its likelihood is a parabola. Points of
+    /// `beyond` outside the range of the profile are added.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -141,7 +142,7 @@ impl Fit<'_> {
         let curvature = Curvature::new(&jacobian, places(&self.free));
         let covariance = curvature.with_flat(!self.problem.rough).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
-        // what stands for it along the bent valley is a size, and not an error about 0
+        // an unknown that compensates the bent one along the valley is a positive size, not an error about 0
         let partner = |i: &usize| {
             let correlation = covariance[(*i, j)] / (std(*i) * std(j));
             !unknowns[*i].log
@@ -150,7 +151,7 @@ impl Fit<'_> {
                 && std(*i) > VAGUE * minimum.point.z[*i].abs()
         };
         let has_partner = places(&self.free).iter().any(|i| *i != j && partner(i));
-        // with the noise of now
+        // sums of squares with the current noise
         let beyond: Vec<Point> = beyond
             .iter()
             .map(|p| {
@@ -163,7 +164,7 @@ impl Fit<'_> {
         if found.is_none() && !(std(j) > VAGUE || has_partner || rivals) {
             return Ok(None);
         }
-        // lengths are those of a logarithm; of a value they are relative to its standard deviation
+        // LENGTHS holds for logarithms; a coordinate without a logarithm scales them with its standard deviation
         let lengths =
             LENGTHS.map(|length| if unknowns[j].log { length } else { 2.0 * std(j) * length });
         let first = (0.25 * std(j)).clamp(lengths[0], lengths[1]);
@@ -172,7 +173,7 @@ impl Fit<'_> {
         let base = minimum.point.cost;
         let mut least = base;
         for side in [-1.0, 1.0] {
-            // direction of the valley: at first that of the curvature, then the way from point to point
+            // direction of the valley: at first from the curvature, then from one point to the next
             let own = covariance[(j, j)];
             let along = |i: usize| if own > 0.0 { covariance[(i, j)] / own } else { 0.0 };
             let mut tangent: Vec<f64> = (0..unknowns.len()).map(along).collect();
@@ -205,7 +206,7 @@ impl Fit<'_> {
                     more if more < 6.0 => 1.0,
                     _ => 0.7,
                 };
-                // shorter steps than the first lead nowhere
+                // steps much shorter than the first one would not get ahead
                 (h, risen) = ((h * factor).clamp(h.min(0.5 * first), lengths[2]), rise);
             }
         }
@@ -217,7 +218,7 @@ impl Fit<'_> {
     }
 }
 
-/// A cubic curve through points that is monotone wherever the points are (Fritsch and Carlson 1980).
+/// A cubic interpolation that is monotone wherever its points are (Fritsch and Carlson 1980).
 pub struct Curve {
     x: Vec<f64>,
     y: Vec<f64>,
@@ -264,7 +265,8 @@ mod tests {
     use crate::engine::search::solve_near;
     use crate::engine::{Hold, Motion, Problem, Recorded, Role, Signal, System, Unknown};
 
-    /// Friction c + d exp(−(ω/ω_s)²) at rates ω far below ω_s, which show c + d and d/ω_s² much better than c, d and ω_s.
+    /// Friction c + d exp(−(ω/ω_s)²) at rates ω far below ω_s. Such data determine c + d and d/ω_s² much better than
+    /// c, d and ω_s.
     struct Bearing(Vec<f64>);
 
     fn shape(rate: f64, speed: f64) -> f64 {

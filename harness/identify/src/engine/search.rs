@@ -13,44 +13,45 @@ use super::profile::{self, Profile};
 use super::{ALIKE, DECIDES, ENDS, Fit, GAIN, Hold, INFLATIONS, PRIOR_ALONE, ROUNDS, SETS};
 use crate::news::News;
 
-/// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
-/// minimum for each cycle, over its beginning only one.
+/// Fractions of the recordings that a search fits one after the other. Over a whole oscillation the sum of squares has a minimum
+/// for each cycle, over its beginning only one.
 const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
-/// Least noise of a growing beginning, relative to the spread of the signal, for an FMU of which nothing is known: a precise sensor
-/// would drive unknowns to their bounds before the search is near.
+/// Smallest noise that is assumed for the beginning of a recording of an arbitrary FMU, relative to the standard deviation of the
+/// signal. With the noise of a precise sensor the first steps would drive unknowns to their bounds.
 const BEGINNING_NOISE: f64 = 0.03;
-/// Ratio of the residual's white noise to the noise that neighbouring rows show, above which the residual contains more than the
-/// sensor's noise.
+/// Ratio of the residual's white noise to the noise between neighbouring rows, above which the residual is more than
+/// noise of the sensor.
 const ABOVE: f64 = 1.5;
-/// Most turns of noise and minimum, and the sum of squares over the number of rows above which a turn is the last one: it is 1 if
-/// the noise belongs to the residual.
+/// Largest number of alternations between noise and minimum, and the sum of squares per row above which the alternation ends. The
+/// sum of squares per row is 1 if the noise matches the residual.
 const TURNS: usize = 8;
 const SETTLED: f64 = 0.98;
-/// Most doublings of the distance at which a side of a start is examined.
+/// Largest number of doublings of the distance at which the likelihood on one side of an initial value is examined.
 const LOOKS: usize = 8;
-/// First distance at which a side of a start is examined, standard deviations.
+/// First distance at which the likelihood on one side of an initial value is examined, standard deviations.
 const FAR: f64 = 3.0;
-/// Root of the likelihood's rise at this distance, relative to the root of a parabola's rise, below which the likelihood has a
-/// kink.
+/// Ratio of the square root of the likelihood's rise to the square root of a parabola's rise at the distance `FAR`. Below this
+/// ratio the likelihood has a kink.
 const KINKED: f64 = 0.8;
-/// A start leads nowhere if, over more than this part of the recordings, its sum of squares is more than so many times the sum of
-/// squares of the best search. It leads to the minimum of the best search if the two are alike there.
+/// Fraction of the recordings, and a factor: if a search over more than this fraction has a sum of squares of more than this
+/// factor times that of the best search, its start is given up.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
-/// Limits of the noise while a misfit is examined: largest white noise over the noise of neighbouring rows, largest relative size
-/// and least correlation time (s) of the drift.
+/// Limits of the noise while a misfit is examined: largest white noise relative to the noise between neighbouring rows, largest
+/// relative size of the drift, and smallest correlation time of the drift, s.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
 pub struct Solution<'p> {
-    /// The problem, with the noise and the course of the inputs between rows that were found.
+    /// The problem with the noise and the intersample behaviour that were found.
     pub fit: Fit<'p>,
     pub minimum: Minimum,
     pub profile: Option<Profile>,
-    /// Courses of the inputs between rows that were not chosen.
+    /// Intersample behaviours that were not chosen.
     pub rivals: Vec<Rival>,
     pub tests: Vec<Tests>,
     pub at_bound: Vec<usize>,
-    /// Initial values of recordings along which a kink of the likelihood leaves more room on a side than the curvature says, with
-    /// the standard deviation on each side over the standard deviation from the curvature.
+    /// Initial values of recordings at which the likelihood has a kink, so that an interval is wider than the curvature
+    /// predicts. The two numbers are the standard deviation on the lower and on the upper side, divided by the standard
+    /// deviation from the curvature.
     pub sides: Vec<(usize, [f64; 2])>,
     pub starts: usize,
 }
@@ -61,8 +62,8 @@ impl Solution<'_> {
         self.tests.iter().all(Tests::passed) && !self.fit.is_loud()
     }
 
-    /// Returns the value of −2 ln L above which the search for another model can end early: if the residual of this
-    /// solution is noise, it is the −2 ln L of a noise that is e^0.5 times as large; otherwise it is infinite.
+    /// Returns the value of −2 ln L above which another model is clearly worse, so that its search can end early. It is infinite
+    /// if the residual of this solution is more than noise; otherwise it is the −2 ln L for a noise that is e^0.5 times as large.
     pub fn ceiling(&self) -> f64 {
         if !self.is_noise() {
             return f64::INFINITY;
@@ -71,10 +72,12 @@ impl Solution<'_> {
     }
 }
 
-/// Searches the minimum of a problem from the values `first`, if there are any, and from the problem's starts. `first` also has the
-/// course of the inputs between rows that is assumed at first. A finite `ceiling` says that another model, from which `first` is,
-/// fits: the search then begins on the whole recordings, and if its minimum has a −2 ln L above the ceiling, it ends there, without
-/// other courses and without profile.
+/// Searches the minimum of a problem from the values `first`, if there are any, and from the starts of the problem. `first` also
+/// holds the intersample behaviour that is assumed at first.
+///
+/// A finite `ceiling` means that `first` comes from another model, which fits. The search then begins with the whole
+/// recordings. If its minimum has a −2 ln L above the ceiling, the search ends without a comparison of intersample behaviours
+/// and without a profile.
 ///
 /// # Errors
 /// If the search fails from every start.
@@ -96,7 +99,7 @@ pub fn solve<'p>(
     for (number, parts) in ways.into_iter().flat_map(|(all, parts)| all.map(move |k| (k, parts))) {
         let is_whole = parts.is_empty();
         if let Some(best) = best.as_mut().filter(|_| number == 0 && is_whole || number == given) {
-            // no other start has led to a lower minimum; what is drawn is the last resort
+            // the starts of the problem have led to no lower minimum: random starts are the last resort
             best.judge(&mut fit, ceiling, news)?;
             if best.is_noise || number >= given && !best.is_loud || best.deviance > ceiling {
                 break;
@@ -124,7 +127,7 @@ pub fn solve<'p>(
             number + 1,
             fit.simulations()
         )));
-        // a minimum that one search alone has found may be one of many, unless none can be lower
+        // a minimum that only one search has found may be a local one, unless its sum of squares is next to nothing
         let is_least = found.as_ref().is_some_and(|found| found.point.cost < DECIDES);
         let agrees =
             best.as_ref().is_some_and(|best| (best.first - deviance).abs() < 2.0 * DECIDES);
@@ -196,7 +199,6 @@ struct Found {
     first: f64,
     /// Value of −2 ln L with the best intersample behaviour.
     deviance: f64,
-    /// True if the courses between rows were compared.
     is_judged: bool,
     is_noise: bool,
     is_loud: bool,
@@ -217,8 +219,8 @@ impl Found {
         }
     }
 
-    /// Compares the courses of the inputs between rows and tests the residual of the best. The fit then has the best course and
-    /// its noise. Nothing is compared if −2 ln L is above the `ceiling`.
+    /// Compares the intersample behaviours and tests the residual of the best one. The fit then uses the best one and its noise.
+    /// Does nothing if −2 ln L is above the `ceiling`.
     fn judge(&mut self, fit: &mut Fit, ceiling: f64, news: &mut dyn FnMut(&News)) -> Result<()> {
         (fit.hold, fit.inflation) = (self.hold, 1.0);
         fit.set(self.noise.clone(), 1.0);
@@ -243,7 +245,7 @@ impl Found {
     }
 }
 
-/// Draws a start within the bounds and within three times each unknown's reach.
+/// Draws a random start within the bounds and within three times the `reach` of each unknown.
 fn drawn(problem: &Problem, random: &mut Random) -> Vec<f64> {
     let first = &problem.starts[0];
     let one = |(unknown, start): (&super::Unknown, &f64)| {
@@ -259,12 +261,12 @@ fn drawn(problem: &Problem, random: &mut Random) -> Vec<f64> {
 }
 
 impl Fit<'_> {
-    /// Returns true if the noise of a signal is clearly larger than neighbouring rows show.
+    /// Returns true if the estimated white noise of a signal is clearly larger than the noise between neighbouring rows.
     pub fn is_loud(&self) -> bool {
         self.noise.iter().zip(&self.problem.signals).any(|(n, s)| n.white > ABOVE * s.own_noise())
     }
 
-    /// Returns the number of rows with a new value, over all signals.
+    /// Returns the number of measured values, over all signals.
     fn sampled(&self) -> usize {
         self.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum()
     }
@@ -277,8 +279,8 @@ impl Fit<'_> {
         places(&self.free).into_iter().filter(is_stuck).collect()
     }
 
-    /// Returns a minimum that is not above a start of the problem: if a start has a smaller sum of squares, the minimum is
-    /// searched from this start.
+    /// Returns the minimum, or a lower one: if a start of the problem has a smaller sum of squares than the minimum, the search
+    /// is repeated from this start.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -293,7 +295,8 @@ impl Fit<'_> {
         Ok(minimum)
     }
 
-    /// Limits the noise to about the noise that neighbouring rows show, so that it does not contain the misfit of a model.
+    /// Limits the estimated noise to about the noise between neighbouring rows, so that the misfit of a model is
+    /// not taken for noise.
     pub fn limit_noise(&mut self) {
         let own = |(noise, signal): (&Noise, &Signal)| Noise {
             white: noise.white.min(OWN.0 * signal.own_noise()),
@@ -304,8 +307,8 @@ impl Fit<'_> {
         self.set(noise, self.part);
     }
 
-    /// Completes a minimum: with the known values that the recordings show, across ridges, along the profile, and with tolerances if
-    /// only they make the residual noise. Returns the profile.
+    /// Completes a minimum: frees known values that the recordings determine better than their tolerances, looks for lower minima
+    /// across ridges and along the profile, and frees the tolerances if the residual is noise only then. Returns the profile.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -330,8 +333,9 @@ impl Fit<'_> {
         Ok(profile)
     }
 
-    /// Alternates between noise and minimum until the noise belongs to the residual. Unknowns at a bound are tried once more from
-    /// their starts, and a lower minimum on the profile replaces the minimum. Returns the minimum and its profile.
+    /// Alternates between estimates of the noise and searches of the minimum until the noise matches the residual. Unknowns at
+    /// a bound are tried once more from their starts, and a lower minimum on the profile replaces the minimum. Returns the
+    /// minimum and its profile.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -349,12 +353,12 @@ impl Fit<'_> {
                 let before = self.noise.clone();
                 self.renew_noise(&minimum.point);
                 if turn > 0 && self.noise.iter().zip(before).all(|(n, b)| n.white == b.white) {
-                    // the noise is the least one
+                    // the noise is at its lower limit
                     break;
                 }
                 let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
                 minimum = self.minimise_from(&minimum.point, end)?;
-                // the noise is that of the point before, which matters where it is next to nothing
+                // the minimum was found with the noise of the point before, which matters if this noise is next to nothing
                 if minimum.point.cost > SETTLED * rows as f64 {
                     break;
                 }
@@ -374,7 +378,7 @@ impl Fit<'_> {
             }
             profile = self.profile(&mut minimum, beyond)?;
             let Some((j, points)) = &profile else { break };
-            // along the profile the likelihood is known, and the others are at their minimum
+            // the likelihood along the profile is known, and the other unknowns are at their minimum
             let others = without(&free, *j);
             let lowest = profile::lowest(points);
             let fall = lowest.map_or(0.0, |low| minimum.point.cost - low.minimum.point.cost);
@@ -388,7 +392,7 @@ impl Fit<'_> {
             news(&News::Detail("the profile led to a lower minimum".into()));
         }
         if minimum.decrement > ENDS.0 {
-            // sets that gain little may lead on all the same, with differences to both sides
+            // one-sided differences may gain little although the minimum is lower, so central ones are tried
             self.central = true;
             let others =
                 profile.as_ref().map_or_else(|| free.clone(), |(bent, _)| without(&free, *bent));
@@ -399,8 +403,8 @@ impl Fit<'_> {
         Ok((minimum, profile))
     }
 
-    /// Frees the known values that the recordings determine about as well as their tolerances do, for example if slosh is not
-    /// linear, or if an encoder shows the error of the clock.
+    /// Frees the known values that the recordings determine about as well as their tolerances do. This happens if slosh is
+    /// nonlinear, or if an encoder shows the error of the clock.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -426,9 +430,9 @@ impl Fit<'_> {
         Ok(())
     }
 
-    /// Returns the initial values of recordings with the factor of the standard deviation on each side (`Solution::sides`). It
-    /// differs from 1 if dry friction stops the hub before the first fitted row: the likelihood then has a kink, beyond which it
-    /// is flat.
+    /// Returns the content of [`Solution::sides`]: initial values of recordings, with the factor of the standard deviation on
+    /// each side. A factor differs from 1 if dry friction stops the hub before the first fitted row: the likelihood then has a
+    /// kink, and is flat beyond it.
     fn sides(&mut self, minimum: &Minimum) -> Vec<(usize, [f64; 2])> {
         let unknowns = &self.problem.unknowns;
         let is_start = |j: &usize| matches!(unknowns[*j].role, Role::Run(Some(_)));
@@ -441,7 +445,8 @@ impl Fit<'_> {
         let mut side = |j: usize, sign: f64| {
             let std = covariance[(j, j)].sqrt();
             let free = without(&self.free, j);
-            // root of the rise of the sum of squares at so many standard deviations, over the others
+            // square root of the rise of the sum of squares at this number of standard deviations, with the other
+            // unknowns at their minimum
             let mut rise = |deviations: f64| {
                 let by = sign * deviations / std;
                 let z: Vec<f64> = (0..unknowns.len())
@@ -471,9 +476,9 @@ impl Fit<'_> {
         self.tests(point).iter().all(Tests::passed) && !self.is_loud()
     }
 
-    /// Frees the known values within their tolerances if that turns a residual that is more than noise into noise, and returns
-    /// the minimum with them; otherwise returns `None` and leaves them fixed. It happens if slosh is not linear or an encoder
-    /// shows the clock, because a recording then determines some of them better than their tolerances.
+    /// Frees the known values within their tolerances, if the residual is more than noise and becomes noise by that. Returns the
+    /// minimum with these values, or `None` if they stay fixed. It happens if slosh is nonlinear, or if an encoder shows the
+    /// error of the clock: a recording then determines some known values better than their tolerances.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -497,9 +502,10 @@ impl Fit<'_> {
         Ok(None)
     }
 
-    /// Returns the minimum from a start: over growing `parts` of the recordings, or, if there are none, over the whole recordings with
-    /// less and less inflated noise. `own` receives the least sum of squares over each part, and `best` has those of the best search
-    /// so far. Returns `None` if the search meets the best one.
+    /// Returns the minimum from a start. With `parts`, growing parts of the recordings are fitted one after the other;
+    /// without parts, the whole recordings with a noise that is less inflated each time. The smallest sum of squares over
+    /// each part is added to `own`; `best` has those of the best search so far. Returns `None` if the search approaches the
+    /// minimum of the best search.
     fn search_from(
         &mut self,
         z: &[f64],
@@ -522,7 +528,7 @@ impl Fit<'_> {
             }
             for &part in parts {
                 self.set(noise.clone(), part);
-                // a model that fits as well as another has its minimum near the other's
+                // a second model that fits as well as the first has its minimum near the first one's
                 let sets = if parts.len() > 1 { SETS } else { SETS / 2 };
                 let end = End { gain: ALIKE, ..End::new(sets, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;

@@ -1,15 +1,15 @@
-//! Errors of a system's solver in the estimates and in the derivatives.
+//! Effect of the solver's errors on the estimates and on the derivatives.
 //!
-//! The errors of an adaptive solver jump where the pattern of its steps changes. Two things are measured at the minimum, both as
-//! vectors ε of whitened residuals:
+//! The errors of an adaptive solver jump when its sequence of step sizes changes. Two vectors ε of whitened residuals are
+//! measured at the minimum:
 //!
-//! * the noise of the outputs between neighbouring values of an unknown: fourth differences of five runs, over √70, which is
-//!   their norm for independent errors (Moré and Wild, SIAM J. Sci. Comput. 33, 2011). A smooth answer leaves next to nothing of
-//!   them;
-//! * the change of the outputs of the same system with smaller errors.
+//! * the noise of the outputs between neighbouring values of an unknown. It is the fourth difference of five simulations,
+//!   divided by √70, which is the norm of the weights for independent errors (Moré and Wild, SIAM J. Sci. Comput. 33, 2011).
+//!   Smooth outputs have a fourth difference near 0;
+//! * the change of the outputs if the same system is simulated with smaller errors.
 //!
-//! Each ε moves the estimates by (JᵀJ)⁻¹ Jᵀ ε. An interval of the measurement's noise alone holds as long as that is small
-//! against the standard deviation. A solver that has the same errors in all of these runs shows none of them.
+//! Each ε shifts the estimates by (JᵀJ)⁻¹ Jᵀ ε. If this shift is small against the standard deviation, an interval that
+//! considers only the measurement noise is valid. A solver whose error is the same in all of these simulations is not detected.
 
 use analysis::statistics::peak;
 use nalgebra::{DMatrix, DVector};
@@ -19,20 +19,21 @@ use super::fit::{Fit, Point};
 use super::minimum::{Curvature, places};
 use super::problem::{Motion, Role, System};
 
-/// Part of an output's peak by which rounding may change it.
+/// Change of an output, relative to its largest absolute value, that may come from rounding.
 const ROUNDING: f64 = 1e-12;
 
 #[derive(Clone, Debug)]
 pub struct SolverError {
     pub shift: Vec<f64>,
-    /// Relative error of each derivative: from noise, and with the curvature within its step.
+    /// Relative error of each derivative: from the noise of the outputs alone, and from this noise and the
+    /// curvature within the step.
     pub derivative: Vec<(f64, f64)>,
-    /// True for each of the systems with smaller errors whose outputs differ.
+    /// For each system with smaller errors, true if its outputs differ.
     pub differs: Vec<bool>,
 }
 
-/// Roughness of the outputs along one unknown: a sample of their noise between neighbouring values of the unknown, the
-/// norm of h³ times the third derivative without this noise, and the step h.
+/// Roughness of the outputs along one unknown: one sample of their noise between neighbouring values of the unknown, the norm of
+/// h³ times the third derivative with the noise subtracted, and the step h.
 struct Roughness {
     noise: DVector<f64>,
     third: f64,
@@ -60,15 +61,15 @@ impl Fit<'_> {
                 weights.into_iter().zip(motions.iter().map(Vec::as_slice)).collect();
             self.change(&at.z, &pairs)
         };
-        // the squares of the weights add up to 70 and to 10
+        // squares of the weights: 70 for the fourth difference, 10 for the third
         let noise = combined([1.0, -4.0, 6.0, -4.0, 1.0]) / 70.0_f64.sqrt();
         let third = combined([-1.0, 2.0, 0.0, -2.0, 1.0]).norm_squared();
         let third = third - 10.0 * noise.norm_squared();
         Some(Roughness { noise, third: 0.5 * third.max(0.0).sqrt(), step })
     }
 
-    /// Measures the solver's errors at a point with these derivatives by the unknowns `which`. `finer` are copies of the system
-    /// whose solver has smaller errors.
+    /// Measures the solver's errors at a point, whose derivatives by the unknowns `which` are given. `finer` are copies of the
+    /// system with smaller solver errors.
     pub fn solver_error(
         &self,
         at: &Point,
@@ -81,7 +82,7 @@ impl Fit<'_> {
             (0..n).into_par_iter().map(|j| self.roughness(at, j)).collect();
         let covariance = Curvature::new(jacobian, places(which)).covariance(n);
         let shift = |e: &DVector<f64>| &covariance * jacobian.tr_mul(e);
-        // noise is another one at each point: the mean square over the samples
+        // the noise differs from point to point: mean square over the samples
         let samples: Vec<DVector<f64>> = found.iter().flatten().map(|r| shift(&r.noise)).collect();
         let mut squares = DVector::zeros(n);
         for sample in &samples {
@@ -101,7 +102,7 @@ impl Fit<'_> {
         let derivative = |j: usize| {
             let norm = jacobian.column(j).norm();
             let Some(r) = found[j].as_ref().filter(|_| norm > 0.0) else { return (0.0, 0.0) };
-            // of a central difference over 2 h: √2 ε/(2 h), and h² y'''/6
+            // errors of a central difference over 2 h: √2 ε/(2 h) from noise, h² y'''/6 from curvature
             let noise = r.noise.norm() / (std::f64::consts::SQRT_2 * r.step * norm);
             (noise, noise.hypot(r.third / (6.0 * r.step * norm)))
         };
@@ -116,7 +117,7 @@ impl Fit<'_> {
     }
 }
 
-/// Returns true if an output differs by more than rounding.
+/// Returns true if an output differs from the output of `base` by more than rounding.
 fn is_changed(motion: &[Motion], base: &[Motion]) -> bool {
     let outputs = motion.iter().zip(base).flat_map(|(a, b)| a.outputs.iter().zip(&b.outputs));
     outputs.into_iter().any(|(new, old)| {
