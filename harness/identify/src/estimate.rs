@@ -4,10 +4,11 @@ use serde::Serialize;
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimated {
     pub value: f64,
-    /// Standard deviation from noise and tolerances. If the interval is skew, it is the longer side over 1.96.
+    /// Standard deviation from noise and tolerances. If the interval is asymmetric, it is the longer side divided by 1.96.
     pub std: f64,
     pub std_noise: f64,
-    /// 95 % interval. An upper end that the recording does not determine is infinite, and null in JSON; such a lower end is 0.
+    /// 95 % interval. If the recording does not determine the upper end, it is infinite, and null in JSON; a lower end that is
+    /// not determined is 0.
     pub interval: [f64; 2],
     /// True if the recording determines the value: both ends of the interval are finite, and the standard deviation is less than
     /// half the value, unless the value may be zero by nature.
@@ -21,14 +22,13 @@ impl Estimated {
         Estimated { value, std, std_noise: std, interval, determined: true, unit: unit.into() }
     }
 
-    /// Returns `of`, for example a standard deviation, as a percentage of the estimated value.
-    /// `None` if the value is zero within its standard deviation, because a percentage would then
-    /// mean nothing.
+    /// Returns `of`, for example a standard deviation, as a percentage of the estimated value. Returns `None` if the value is
+    /// zero within its standard deviation, because a percentage would then be meaningless.
     pub fn percent(&self, of: f64) -> Option<f64> {
         (self.value.abs() > self.std).then(|| 100.0 * of / self.value)
     }
 
-    /// Returns a change of the value in words: in percent or, if the value is near zero, in its own unit.
+    /// Returns the change `by` of the value as text: in percent or, if the value is near zero, in its own unit.
     pub fn change(&self, by: f64) -> String {
         match self.percent(by) {
             Some(percent) => format!("{percent:+.2} %"),

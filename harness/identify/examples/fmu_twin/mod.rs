@@ -10,7 +10,7 @@ use host::drive::Inputs;
 use host::fmu::Fmu;
 
 use identify::bench::design::Multisine;
-use identify::bench::simulate::TORQUE_BESIDES;
+use identify::bench::simulate::ADDITIONAL_TORQUE;
 use identify::engine::Hold;
 use identify::input::recording::Recording;
 
@@ -199,7 +199,7 @@ impl Twin {
         let (mut angle, mut random) = (Vec::new(), Random::new(seed.unwrap_or(0).into(), 1));
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
         let mut filter = Lag::default();
-        let names = [TORQUE, TORQUE_BESIDES];
+        let names = [TORQUE, ADDITIONAL_TORQUE];
         let names = if drags { &names[..] } else { &names[..1] };
         let inputs = Inputs::new(fmu.description(), names, held)?;
         let mut steps = 0;

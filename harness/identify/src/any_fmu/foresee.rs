@@ -1,4 +1,5 @@
-//! Information from a planned recording: the Cramér–Rao bound of each unknown from its sensitivities along the planned inputs.
+//! Predicts the accuracy of a planned recording: the Cramér–Rao bound of each unknown from its sensitivities
+//! along the planned inputs.
 
 use anyhow::{Result, ensure};
 use serde::Serialize;
@@ -15,31 +16,29 @@ use analysis::gauss_markov::Noise;
 pub struct Bound {
     pub name: String,
     pub value: f64,
-    /// Least standard deviation of an unbiased estimate; NaN if the recordings allow no estimate or the solver's errors decide
-    /// it.
+    /// Smallest standard deviation of an unbiased estimate; NaN if the recordings allow no estimate or if the bound depends
+    /// on the solver's errors.
     pub std: f64,
-    /// True if the recordings determine the unknown hardly better than its prior or, without a prior, not even to within its own
-    /// value.
+    /// True if the estimate would hardly be more accurate than the prior or, without a prior, if its standard deviation
+    /// exceeds its own value.
     pub not_determined: bool,
-    /// True if the solver's errors decide the bound; `std` and `std_alone` are then NaN.
+    /// True if the bound depends on the solver's errors; `std` and `std_alone` are then NaN.
     pub decided_by_solver: bool,
     /// Names of the unknowns that the recordings cannot distinguish from this one.
     pub inseparable_from: Vec<String>,
-    /// Least standard deviation of an unbiased estimate of this unknown if all other unknowns were
-    /// known.
+    /// Smallest standard deviation of an unbiased estimate of this unknown if all other unknowns were known.
     pub std_alone: f64,
     pub prior: Option<f64>,
     pub unit: String,
-    /// Name of the unknown with which the correlation is largest, and this correlation.
+    /// Name of the unknown with the largest correlation, and this correlation.
     pub with: Option<(String, f64)>,
-    /// True for a parameter or start of the FMU that is estimated; false for errors of sensors and known values.
+    /// True for a parameter or a start value of the FMU; false for errors of sensors and for known values.
     pub is_parameter: bool,
 }
 
-/// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at
-/// the start values. `noise` is the standard deviation of one sample of each output. Values that
-/// the question states with tolerances are unknowns with a prior. `warn` receives the FMU's
-/// warnings.
+/// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at the start values. `noise` is
+/// the standard deviation of one sample of each output. Values with a tolerance in the question are unknowns with a prior.
+/// `warn` receives the FMU's warnings.
 ///
 /// # Errors
 /// If the question has a fault (the message lists all), or the FMU refuses a call.
@@ -70,7 +69,7 @@ pub fn foresee(
     fit.set(problem.signals.iter().map(|s| Noise::white(noise[s.output])).collect(), 1.0);
     let at = fit.at(&x)?;
     let everything = vec![true; x.len()];
-    // the second time with steps that suit the noise
+    // computed twice, because the first call adapts the steps of the finite differences to the noise
     fit.derivatives(&at, &everything)?;
     let jacobian = fit.derivatives(&at, &everything)?.matrix;
     let solver = system.with_finer(|finer| fit.solver_error(&at, &jacobian, &everything, finer));

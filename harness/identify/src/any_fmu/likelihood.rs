@@ -1,4 +1,4 @@
-//! The likelihood of an identification at other points, for those who sample the posterior (Markov chain Monte Carlo).
+//! The likelihood of an identification at given points, for users who sample the posterior (Markov chain Monte Carlo).
 
 use analysis::gauss_markov::Noise;
 use anyhow::{Context, Result, ensure};
@@ -12,12 +12,12 @@ use crate::input::question::Question;
 use crate::input::record::Record;
 use crate::model::simulate::Model;
 
-/// Returns the deviance −2 ln L of each point, with the priors and up to a constant. A point has the values of the unknowns in
-/// the order of the result's correlations. The noise and the rows that are left out are taken from `result`, the text of a
-/// `result.json`. The deviance is infinite outside the bounds and where the FMU refuses the values.
+/// Returns the deviance −2 ln L of each point, including the priors, up to a constant. A point holds the values of the
+/// unknowns in the order of the result's correlations. The noise and the rows that are left out are read from `result`, the
+/// text of a `result.json`. The deviance is infinite outside the bounds and where the FMU refuses the values.
 ///
 /// # Errors
-/// If the result belongs to another question, or a point has another number of values.
+/// If the result belongs to another question, or a point has a wrong number of values.
 pub fn deviances(
     model: &Model,
     question: &Question,

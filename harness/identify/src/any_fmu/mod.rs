@@ -1,7 +1,8 @@
-//! Identification of any FMU by output error: finds the parameters and initial values with which its outputs fit the recordings.
+//! Identification of any FMU by output error: estimates the parameters and initial values with which its
+//! outputs fit the recordings.
 //!
-//! A [`Question`] names the unknowns, [`Record`]s hold the recordings, and a [`Model`] runs the FMU with its own solver or the
-//! host's ([`host::exchange`]). Together they are a [`system::FmuSystem`], a system of the [`crate::engine`].
+//! A [`Question`] names the unknowns, [`Record`]s hold the recordings, and a [`Model`] simulates the FMU with its own solver or
+//! the host's ([`host::exchange`]). All three together are a [`system::FmuSystem`], which the [`crate::engine`] fits.
 
 pub mod foresee;
 pub mod likelihood;
@@ -33,12 +34,10 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
-/// Distance, in standard deviations, by which the minimum may lie beyond a bound of an unknown by
-/// chance.
+/// Distance, in standard deviations, by which the minimum may lie beyond a bound by chance.
 const PRESSED: f64 = 3.0;
-/// Second difference of a simulated output that counts as a jump: the multiple of the standard
-/// deviation of the output's noise, and the multiple of the median of all second differences, that
-/// it must exceed.
+/// A second difference of a simulated output counts as a jump if it exceeds the first number times the standard deviation of the
+/// output's noise, and the second number times the median of all second differences.
 const JUMP: (f64, f64) = (8.0, 20.0);
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -47,8 +46,7 @@ pub struct Details {
     pub not_determined: Vec<String>,
     pub cannot_tell_apart: Vec<Inseparable>,
     pub decided_by_solver: Vec<String>,
-    /// For each estimate, by name, how far it shifts because of the errors of the FMU's solver, in
-    /// the estimate's unit.
+    /// For each estimate, by name, its shift by the errors of the FMU's solver, in the estimate's unit.
     pub solver_shift: BTreeMap<String, f64>,
     pub at_bound: Vec<String>,
     /// Estimates whose likelihood is not a parabola, so that their interval is not the value ± 1.96 standard deviations.
@@ -56,8 +54,8 @@ pub struct Details {
     /// −2 ln L of the likelihood L at the estimates, up to a constant.
     pub deviance: f64,
     pub starts: usize,
-    /// Newton decrement: the distance of the estimates from the minimum of −2 ln L, in standard deviations, that one further Newton step
-    /// predicts.
+    /// Newton decrement: the distance from the estimates to the minimum of −2 ln L, in standard deviations, as predicted by
+    /// one more Newton step.
     pub decrement: f64,
     pub covariance: Vec<Vec<f64>>,
 }
@@ -76,13 +74,13 @@ pub struct Output {
     /// Fit of the simulated ŷ to the measured y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_percent: f64,
     pub tests: Tests,
-    /// Mean of the whitened residual of an output over the standard deviation of this mean. A large
-    /// value shows that the residual has an offset.
+    /// Mean of an output's whitened residual, divided by the standard deviation of this mean. A large value means that the
+    /// residual has an offset.
     pub mean: f64,
 }
 
 impl Output {
-    /// Returns true if the residual is noise about 0.
+    /// Returns true if the residual is noise with zero mean.
     pub fn passed(&self) -> bool {
         self.tests.passed() && self.mean.abs() < LIMIT
     }
@@ -106,23 +104,23 @@ pub fn identify(
     }
     let (system, unknowns) = FmuSystem::new(model, question, records)?;
     let mut done = Vec::new();
-    let mut told = |words: &News| {
+    let mut report = |words: &News| {
         if let News::Step(line) = words {
             done.push(line.clone());
         }
         news(words);
     };
     let count = unknowns.len();
-    told(&News::Step(format!("{count} unknowns, {} recordings", records.len())));
+    report(&News::Step(format!("{count} unknowns, {} recordings", records.len())));
     for warning in system.warnings(&unknowns)? {
-        told(&News::Step(format!("the FMU warns: {warning}")));
+        report(&News::Step(format!("the FMU warns: {warning}")));
     }
     let mut problem = system.problem(unknowns, question);
     let (mut near, mut starts, mut turn): (Option<Vec<f64>>, usize, usize) = (None, 0, 0);
     loop {
         let mut solution = match &near {
-            None => solve(&problem, None, f64::INFINITY, &mut told)?,
-            Some(values) => solve_near(&problem, values, &mut told)?,
+            None => solve(&problem, None, f64::INFINITY, &mut report)?,
+            Some(values) => solve_near(&problem, values, &mut report)?,
         };
         (starts, turn) = (starts.max(solution.starts), turn + 1);
         let (point, noise) = (&solution.minimum.point, &solution.fit.noise);
@@ -130,20 +128,23 @@ pub fn identify(
         let jumps = leave_out_jumps(&mut signals, records, &point.motion, noise);
         let is_same = signals.iter().zip(&problem.signals).all(|(a, b)| a.sampled == b.sampled);
         if turn == ROUNDS || is_same {
-            told(&News::Step(format!("{:.0} runs of each recording", solution.fit.simulations())));
+            report(&News::Step(format!(
+                "{:.0} runs of each recording",
+                solution.fit.simulations()
+            )));
             let mut found = conclude(&system, &mut solution, question)?;
             found.details.starts = starts;
             found.done = done;
             return Ok(found);
         }
-        told(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
+        report(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
         near = Some(solution.fit.values(&point.z));
         problem.signals = signals;
     }
 }
 
-/// Leaves out the rows next to jumps of the model's outputs and returns their number. If the estimate puts an event on the wrong side
-/// of a row, the sum of squares jumps, and the row does not show how far the event is off.
+/// Leaves out the rows next to jumps of the model's outputs and returns their number. When an event moves past a row during the
+/// search, the sum of squares jumps, and its derivatives do not show how far the event has to move.
 fn leave_out_jumps(
     signals: &mut [Signal],
     records: &[Record],
@@ -165,8 +166,7 @@ fn leave_out_jumps(
     count
 }
 
-/// Returns advice on how to make the solver's errors smaller. `heeds_tolerance` is true if a finer tolerance changes the FMU's
-/// outputs.
+/// Returns advice for smaller errors of the solver. `heeds_tolerance` is true if a smaller tolerance changes the FMU's outputs.
 fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     let finer = "a smaller tolerance, --solver own:TOLERANCE, makes them smaller";
     match system.model {
@@ -192,8 +192,8 @@ fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     }
 }
 
-/// A 95 % interval of an estimate and how it was found: for each end whether it follows from the
-/// likelihood or is a bound of the unknown, and whether the likelihood is a parabola there.
+/// A 95 % interval of an estimate. `ended` is true for an end that follows from the likelihood, and false for an end at a bound
+/// of the unknown. `is_quadratic` is true if the likelihood is a parabola within the interval.
 struct Interval {
     ends: [f64; 2],
     ended: [bool; 2],
@@ -207,8 +207,8 @@ struct Numbers {
     intervals: Vec<Interval>,
     inseparable: Vec<Inseparable>,
     decided: Vec<bool>,
-    /// Indices of unknowns at a bound, and of those among them whose minimum lies beyond the bound by more than [`PRESSED`]
-    /// standard deviations.
+    /// Indices of the unknowns at a bound. `pressed` are those of them whose minimum lies beyond the bound by more
+    /// than [`PRESSED`] standard deviations.
     held: Vec<usize>,
     pressed: Vec<usize>,
     solver: SolverError,
@@ -232,12 +232,12 @@ impl Numbers {
         let is_inner: Vec<bool> = (0..n).map(|j| inner.contains(&j)).collect();
         let solver =
             system.with_finer(|finer| fit.solver_error(point, &jacobian, &is_inner, finer));
-        let told = fit.knowledge(&jacobian, &is_inner, &solver);
+        let knowledge = fit.knowledge(&jacobian, &is_inner, &solver);
         let asked: Vec<usize> = inner.iter().copied().filter(|j| !known[*j]).collect();
         let alone = Curvature::new(&jacobian, asked).covariance(n);
-        // where the search ended before the minimum, how far it may be off is part of how sure it is
+        // a search that ended before the minimum widens the standard deviation by its distance
         let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
-        // of one at a bound: curvature with the others at their minimum
+        // curvature along an unknown at a bound, with the other unknowns at their minimum
         let inverse = Curvature::new(&jacobian, inner.clone()).covariance(n);
         let curvature = |j: usize| {
             let crossed = jacobian.tr_mul(&jacobian.column(j));
@@ -247,9 +247,9 @@ impl Numbers {
         let beyond = |j: &&usize| gradient[**j].abs() / curvature(**j).max(0.0).sqrt() > PRESSED;
         let pressed = held.iter().filter(beyond).copied().collect();
         let mut std: Vec<f64> = (0..n)
-            .map(|j| match (told.decided_by_solver[j], is_inner[j]) {
+            .map(|j| match (knowledge.decided_by_solver[j], is_inner[j]) {
                 (true, _) => f64::NAN,
-                (_, true) => (widened * told.covariance[(j, j)].sqrt()).hypot(solver.shift[j]),
+                (_, true) => (widened * knowledge.covariance[(j, j)].sqrt()).hypot(solver.shift[j]),
                 _ => 1.0 / jacobian.column(j).norm(),
             })
             .collect();
@@ -258,7 +258,7 @@ impl Numbers {
             false => std.clone(),
         };
         let draws = match solution.profile {
-            Some(_) => Some(solution.draw(true)?).filter(|draws| draws.is_told()),
+            Some(_) => Some(solution.draw(true)?).filter(|draws| draws.has_enough_draws()),
             None => None,
         };
         let z = &solution.minimum.point.z;
@@ -271,15 +271,15 @@ impl Numbers {
                 let ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
                 found = Interval { ends, ended: [false; 2], is_quadratic: false };
             } else if !is_inner[j] {
-                // the sum of squares rises by c x² + 2 g x from the bound on
+                // from the bound the sum of squares rises by c x² + 2 g x
                 let (c, g) = (curvature(j).max(1e-300), gradient[j].abs());
                 let far = ((g * g + Z * Z * c).sqrt() - g) / c;
                 let is_upper = z[j] >= high;
                 let ends = if is_upper { [z[j] - far, high] } else { [low, z[j] + far] };
                 found = Interval { ends, ended: [is_upper, !is_upper], is_quadratic: false };
             } else if let (Some(draws), false) = (&draws, known[j]) {
-                // what the solver and the search add widens the draws
-                let wider = std[j] / told.covariance[(j, j)].sqrt();
+                // errors of the solver and of the search widen the interval
+                let wider = std[j] / knowledge.covariance[(j, j)].sqrt();
                 found.ends = draws.interval(j).map(|end| z[j] + wider * (end - z[j]));
                 if let Some((_, open)) =
                     draws.open.as_ref().filter(|(of, _)| *of == unknowns[j].name)
@@ -302,12 +302,12 @@ impl Numbers {
             intervals.push(found);
         }
         Ok(Numbers {
-            covariance: told.covariance,
+            covariance: knowledge.covariance,
             std,
             std_noise,
             intervals,
-            inseparable: told.inseparable,
-            decided: told.decided_by_solver,
+            inseparable: knowledge.inseparable,
+            decided: knowledge.decided_by_solver,
             held,
             pressed,
             solver,
@@ -380,7 +380,7 @@ fn conclude(
     found.fits = (!fits || !is_decided && pressed.is_empty()).then_some(fits);
     let mut words = vec![match found.fits {
         None if !is_decided => format!(
-            "{NOT_JUDGED}: the residual of every output is noise, but bounds hold {}: the recordings want to go further, so that \
+            "{NOT_JUDGED}: the residual of every output is noise, but {} would fit better beyond a bound, so that \
              no interval can be trusted. Wider bounds, or another start, may lead to another minimum.",
             pressed.join(", ")
         ),
@@ -452,8 +452,8 @@ fn conclude(
         let share = 1.0 - (numbers.std_noise[j] / std[j]).powi(2);
         Some(Share { name: names[j].clone(), share, most: names[*most].clone() })
     };
-    let told = asked.iter().copied().filter(|j| std[*j].is_finite());
-    let shares: Vec<Share> = told.filter_map(share).collect();
+    let known_spread = asked.iter().copied().filter(|j| std[*j].is_finite());
+    let shares: Vec<Share> = known_spread.filter_map(share).collect();
     let sizes: Vec<String> = known.iter().map(|&j| size(system, unknowns, j)).collect();
     match known.is_empty() {
         true => words.push(NOISE_ALONE.into()),
@@ -489,7 +489,7 @@ fn conclude(
     Ok(found)
 }
 
-/// Returns the name of known value `j` with its tolerance in words, for example `tank.r 0.40 %`.
+/// Returns the name of known value `j` with its tolerance, for example `tank.r 0.40 %`.
 fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
     let Unknown { name, unit, prior, .. } = &unknowns[j];
     let (mean, std) = prior.unwrap_or_default();
@@ -590,7 +590,7 @@ pub fn lines(found: &Identification) -> Vec<String> {
         "output", "rows", "noise", "fit %", "worst test"
     )];
     for o in &found.details.outputs {
-        // an output that stands still has no share that is explained
+        // a constant output has no variance that a model could explain
         let fit = match o.fit_percent.is_finite() {
             true => format!("{:.2}", o.fit_percent),
             false => "–".into(),

@@ -1,4 +1,4 @@
-//! One self-contained page on the identification of any FMU.
+//! The self-contained HTML page about the identification of any FMU.
 
 use maud::html;
 use report::page::table;

@@ -1,4 +1,4 @@
-//! An FMU and its recordings as a system of the engine.
+//! An FMU and its recordings as a system that the engine can fit.
 
 use std::borrow::Cow;
 
@@ -11,10 +11,10 @@ use crate::model::overridden::{near, refuse};
 use crate::model::simulate::{Finer, Model, Setup, Value};
 use crate::model::unknown::Target;
 
-/// Smallest noise of an output, relative to the output's spread, that is assumed before there is a
-/// residual, because recordings from a simulation have no noise.
+/// Smallest noise of an output before the first residual is known, relative to the output's standard deviation. It is needed
+/// because simulated recordings have no noise.
 const LEAST_NOISE: f64 = 1e-3;
-/// Expected drift of an output of unknown kind. Its width is large because next to nothing is known of the sensor.
+/// Prior of the drift of an output. Its width is large because the kind of sensor is unknown.
 const DRIFT: Drift = Drift { size: 0.3, time: 30.0, width: 3.0 };
 
 pub struct FmuSystem<'a> {
@@ -26,7 +26,7 @@ pub struct FmuSystem<'a> {
 }
 
 impl<'a> FmuSystem<'a> {
-    /// Returns the system for a question, and the unknowns in the order of its targets.
+    /// Returns the system for a question, and its unknowns in the order of the targets.
     ///
     /// # Errors
     /// If the question has a fault; the message lists all.
@@ -73,7 +73,7 @@ impl<'a> FmuSystem<'a> {
             signals,
             starts: vec![unknowns.iter().map(|unknown| unknown.start).collect()],
             unknowns,
-            // each input runs as the question says
+            // the question states the intersample behaviour of each input, so that none has to be estimated
             holds: vec![Hold::FirstOrderHold],
             acausal: true,
             drawn: question.starts.saturating_sub(1),
@@ -81,17 +81,17 @@ impl<'a> FmuSystem<'a> {
         }
     }
 
-    /// Returns the FMU's warnings at the start values of the unknowns, each once.
+    /// Returns the FMU's warnings at the start values of the unknowns, each only once.
     ///
     /// # Errors
-    /// If an unknown has no effect in any recording because of another parameter.
+    /// If an unknown has no effect in any recording because another parameter replaces it.
     pub fn warnings(&self, unknowns: &[Unknown]) -> Result<Vec<String>> {
         let start: Vec<f64> = unknowns.iter().map(|u| u.start).collect();
         let moved: Vec<f64> = unknowns.iter().map(|u| near(u.start, u.bounds, u.reach)).collect();
         let of = |(number, record): (usize, &Record)| {
             let with =
                 |x: &[f64]| self.setup.warnings(self.model, &self.reals(x, number), number, record);
-            // what the FMU refuses here, the search tells
+            // values that the FMU refuses are reported later, by the search
             with(&moved).or_else(|_| with(&start)).unwrap_or_default()
         };
         let warnings: Vec<Vec<String>> = self.records.iter().enumerate().map(of).collect();
@@ -101,7 +101,7 @@ impl<'a> FmuSystem<'a> {
             let name = recording.and_then(|_| unknown.name.rsplit_once('@'));
             let name = name.map_or(&*unknown.name, |(name, _)| name);
             let refused: Vec<Result<()>> = own.map(|(_, said)| refuse(name, said)).collect();
-            // an unknown that has an effect in one recording can be estimated
+            // one recording in which the unknown has an effect is enough
             if refused.iter().all(Result::is_err) {
                 refused.into_iter().collect::<Result<()>>()?;
             }
@@ -115,8 +115,8 @@ impl<'a> FmuSystem<'a> {
         Ok(once)
     }
 
-    /// Calls `use_them` with copies of this system whose solver has smaller errors ([`Setup::finer`]); the first copy has a finer
-    /// tolerance.
+    /// Calls `use_them` with copies of this system that have smaller solver errors ([`Setup::finer`]). The first copy
+    /// has a smaller tolerance.
     pub fn with_finer<T>(&self, use_them: impl FnOnce(&[&dyn System]) -> T) -> T {
         let finer = self.setup.finer(self.model);
         let mut systems: Vec<FmuSystem> = Vec::new();

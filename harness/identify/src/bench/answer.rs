@@ -1,4 +1,4 @@
-//! The answer of the engine about the bench: estimates, combinations, causes and words.
+//! The result for the bench, from the solution of the engine: estimates, combinations, causes and sentences of the verdict.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -28,7 +28,7 @@ use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::RATE;
 
-/// Fit of the rates below which a minimum counts as a wrong one, %.
+/// Fit of the rates, %, below which a minimum counts as a wrong one.
 const POOR_FIT: f64 = 90.0;
 
 pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
@@ -60,7 +60,8 @@ pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
     }
 }
 
-/// Returns the fit, %, of each recording of `validation`, which is simulated with the solution's values and was not fitted.
+/// Returns the fit, %, of each recording of `validation`. These recordings were not fitted; they are simulated
+/// with the estimated values.
 ///
 /// # Errors
 /// If the FMU refuses to run.
@@ -84,7 +85,7 @@ pub fn validate(
         let rate = recording.of_fresh(&recording.rate);
         let model = recording.of_fresh(&motion.outputs[0]);
         let scale = 1.0 + own.value(&values, &Target::GyroScale).unwrap_or(0.0);
-        // the bias of another recording is its own
+        // a recording that was not fitted has a bias of its own
         let off: Vec<f64> = rate.iter().zip(&model).map(|(y, w)| y - scale * w).collect();
         Ok(fit_percent(&about_mean(&off), &rate))
     };
@@ -97,8 +98,9 @@ pub struct Fitted<'p> {
     pub fit: ModelFit,
 }
 
-/// Concludes the identification from the chosen model `best`. `near` has the probability of the chosen model and, with their
-/// probabilities, the other models that explain the recordings about as well; their draws widen the intervals.
+/// Completes the identification with the chosen model `best`. `near` contains the probability of the chosen model, and the
+/// other models that explain the recordings about as well, each with its probability. The draws of all of them are mixed,
+/// which widens the intervals.
 ///
 /// # Errors
 /// If the FMU refuses a run at the minimum.
@@ -152,9 +154,9 @@ pub fn conclude(
     let angles = motion.iter().map(|motion| peak(&motion.others[0]));
     let is_frozen = fit.model == SloshModel::Frozen.name();
     let slosh_angle = if is_frozen { 0.0 } else { angles.fold(0.0, f64::max) };
-    if !full.is_told() {
+    if !full.has_enough_draws() {
         verdict.push(
-            "No interval is given: hardly any tank and hub have the slosh mode that the recordings show.".into(),
+            "No interval is given: hardly any combination of tank and hub has the slosh mode that the recordings show.".into(),
         );
     }
     verdict.extend(regime(&fit.model, slosh_angle));
@@ -171,7 +173,7 @@ pub fn conclude(
         slosh_angle,
         ..Details::default()
     };
-    let converged = fit.converged && full.is_told();
+    let converged = fit.converged && full.has_enough_draws();
     Ok(Identification {
         parameters,
         measurement,
@@ -194,21 +196,21 @@ fn estimated(
 ) -> Estimated {
     let name = &full.names[k];
     let unknown = &solution.fit.problem.unknowns[k];
-    let (mut std, mut interval) = match full.is_told() {
+    let (mut std, mut interval) = match full.has_enough_draws() {
         true => (full.std(k), full.interval(k)),
         false => (f64::NAN, [f64::NAN; 2]),
     };
-    let std_noise = if own.is_told() { own.std(k) } else { f64::NAN };
+    let std_noise = if own.has_enough_draws() { own.std(k) } else { f64::NAN };
     let positive = unknown.log || unknown.bounds.0 >= 0.0;
     if let Some((_, open)) = full.open.as_ref().filter(|(open, _)| open == name) {
         let ends = [0.0, f64::INFINITY];
         (0..2).filter(|end| open[*end]).for_each(|end| interval[end] = ends[end]);
     }
     let value = full.values[k];
-    // of a skew interval that of the longer side
+    // an asymmetric interval has the standard deviation of its longer side
     let mut ends = interval;
     if !interval[1].is_finite() {
-        // as far as the range of the profile
+        // up to the end of the profile
         ends[1] = full.columns[k].iter().copied().fold(value, f64::max);
     }
     let reach = ends.map(|end| (end - value).abs() / Z);
@@ -245,7 +247,7 @@ fn findings(
         let unknown = &problem.unknowns[*j];
         let target = &system.targets[*j];
         let is_own = matches!(target, Target::Parameter(_)) && !unknown.bent;
-        // friction may be 0
+        // friction may be 0, so its smallest start is no bound
         let least = LEAST_FRICTION * unknown.start;
         let is_zero =
             !unknown.log && unknown.bounds.0 >= 0.0 && solution.minimum.point.z[*j] <= 2.0 * least;
@@ -262,7 +264,7 @@ fn findings(
     if solution.fit.is_loud() {
         let (noise, signal) = (&solution.fit.noise[0], &problem.signals[0]);
         doubts.push(format!(
-            "the residual is {:.1} times what neighbouring rows show of noise",
+            "the residual is {:.1} times the noise between neighbouring rows",
             noise.white / signal.own_noise()
         ));
     }
@@ -321,13 +323,13 @@ fn torque_words(solution: &Solution) -> Option<String> {
     ))
 }
 
-/// Returns the sentence on estimates whose uncertainty is due to tolerances more than to the recording.
+/// Returns the sentence on the estimates whose uncertainty comes mostly from tolerances.
 fn shares<'a>(
     full: &Derived,
     own: &Derived,
     known: impl Iterator<Item = (&'a str, f64)>,
 ) -> Option<String> {
-    if !full.is_told() || !own.is_told() {
+    if !full.has_enough_draws() || !own.has_enough_draws() {
         return None;
     }
     let mut all = Vec::new();
@@ -343,8 +345,8 @@ fn shares<'a>(
     tolerance::shares(&known, &all)
 }
 
-/// Returns a warning if the fit leaves the range of linear slosh. The measure is the wave's height at the wall of an upright
-/// cylinder relative to its radius, 2 α/(ξ² − 1), with the slosh angle α and the first zero ξ = 1.841 of J₁'.
+/// Returns a warning if the fit is outside the range of linear slosh. The measure is the wave height at the wall of an upright
+/// cylinder divided by its radius, 2 α/(ξ² − 1), with the slosh angle α and the first zero ξ = 1.841 of J₁'.
 fn regime(model: &str, angle: f64) -> Option<String> {
     let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
     let (is, advice) = match Regime::from_ratio(wave) {
@@ -361,8 +363,8 @@ fn regime(model: &str, angle: f64) -> Option<String> {
     ))
 }
 
-/// Adds the known values that the recordings determine better than their tolerances to `parameters`, as estimates within these
-/// tolerances. Returns a sentence on each.
+/// Adds those known values to `parameters` that the recordings determine better than their tolerances. Returns
+/// a sentence about each.
 fn shown(
     system: &BenchSystem,
     solution: &Solution,
@@ -375,7 +377,7 @@ fn shown(
         let found = full.tolerances.iter().find(|(name, _)| *name == unknown.name);
         let (Some((_, prior)), Some((name, draws))) = (unknown.prior, found) else { continue };
         let relative = deviation(draws);
-        // the recordings have at least as much information as the tolerance
+        // the recordings contain at least as much information as the tolerance
         if !free[j] || unknown.part != Part::Tolerance || relative > FRAC_1_SQRT_2 * prior {
             continue;
         }
@@ -388,7 +390,7 @@ fn shown(
         let value = nominal * unknown.value(solution.minimum.point.z[j]);
         let estimated = Estimated::normal(value, relative * value, unit);
         sentences.push(format!(
-            "{name} is estimated within its tolerance, because the recordings tell more of it than was known: {value:.4e} ± {:.1e} {}.",
+            "{name} is estimated within its tolerance, because the recordings determine it better than the tolerance: {value:.4e} ± {:.1e} {}.",
             estimated.std,
             prose(unit)
         ));

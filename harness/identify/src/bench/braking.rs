@@ -3,23 +3,22 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// Measured friction at one rate: the mean, over rows of similar rate, of the torque less inertia
-/// times acceleration.
+/// Friction measured at one rate: mean of the torque minus inertia times acceleration, over rows of similar rate.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FrictionPoint {
     pub rate: f64,
-    /// Mean friction torque, N·m; positive if it brakes a positive rate.
+    /// Mean friction torque, N·m. It is positive if it brakes a positive rate.
     pub torque: f64,
     pub rows: usize,
 }
 
-/// Deceleration of the hub without torque in one direction, over its angle θ: β_0 + Σ β_h^s sin hθ + β_h^c cos hθ with the
-/// harmonics h (thesis 5.4).
+/// Deceleration of the hub without torque in one direction of rotation, as a function of its angle θ: β_0 + Σ β_h^s sin hθ +
+/// β_h^c cos hθ with the harmonics h (thesis 5.4).
 #[derive(Clone, Debug, Serialize)]
 pub struct Braking {
     pub direction: &'static str,
-    /// Speed to which the coefficients belong, rad/s: the mean over both directions. The dependence of the deceleration on the
-    /// speed is fitted as a parabola.
+    /// Speed at which the coefficients hold, rad/s: the mean over both directions. The fit includes the dependence on the
+    /// speed as a parabola.
     pub speed: f64,
     /// Coefficients in the order β_0, β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
@@ -27,8 +26,7 @@ pub struct Braking {
     pub rmse: f64,
     pub r_squared: f64,
     pub rows: usize,
-    /// Number of parts of the decays from which the coefficients were computed. A part is one
-    /// revolution of the hub within one decay.
+    /// Number of stretches from which the coefficients were computed. A stretch is one revolution of the hub within one decay.
     pub stretches: usize,
     /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]
@@ -38,8 +36,7 @@ pub struct Braking {
     pub(crate) covariance: Option<DMatrix<f64>>,
 }
 
-/// Returns the regressors of the deceleration [`Braking`] at an angle θ: the number 1, then cos hθ and sin hθ of each
-/// harmonic h.
+/// Returns the regressors of the deceleration [`Braking`] at an angle θ: 1, then cos hθ and sin hθ of each harmonic h.
 pub(crate) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
     let each = (1..=harmonics).flat_map(|h| {
         let (sin, cos) = (angle * h as f64).sin_cos();
@@ -49,10 +46,10 @@ pub(crate) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
 }
 
 impl Braking {
-    /// Returns the half-width of the fit's simultaneous 95 % band at an angle, rad/s²: with a probability of 95 % the whole curve
-    /// lies in the band. The residuals of one stretch count as one value, because deceleration also depends on the rate, which
-    /// changes slowly within a stretch. `None` if there are too few stretches. Liang and Zeger, Biometrika 73 (1986) 13, with
-    /// Scheffé's factor.
+    /// Returns half the width of the fit's simultaneous 95 % confidence band at an angle, rad/s²; `None` if there are too few
+    /// stretches. With a probability of 95 % the whole curve lies in the band. All residuals of a stretch count as one value,
+    /// because the deceleration also depends on the rate, which changes slowly within a stretch (Liang and Zeger, Biometrika 73
+    /// (1986) 13, with Scheffé's factor).
     pub fn half_width(&self, angle: f64) -> Option<f64> {
         let width = self.coefficients.len();
         let row = DVector::from_vec(harmonics_at(angle, (width - 1) / 2));

@@ -1,9 +1,9 @@
-//! Effects that would explain why no model fits, in words, with the options that estimate them.
+//! Effects that may explain why no model fits: their description in words, and the options that estimate them.
 
 use names::hubslosh::{hub, slosh, wheel};
 use serde::Serialize;
 
-use super::system::{BESIDES, BenchSystem, Target};
+use super::system::{ADDITIONAL_TORQUES, BenchSystem, Target};
 use crate::engine::cause::Effect;
 use crate::estimate::prose;
 
@@ -11,9 +11,9 @@ use crate::estimate::prose;
 pub struct Cause {
     pub effect: String,
     pub flags: String,
-    /// Size of the effect, if it has one number: name, value and unit.
+    /// Name, value and unit of the effect's size, if it has a size.
     pub size: Option<(String, f64, String)>,
-    /// Decrease of −2 ln L, with the likelihood L, if the effect is added to the model.
+    /// Decrease of −2 ln L (L: likelihood) when the model includes the effect.
     pub gain: f64,
 }
 
@@ -33,8 +33,8 @@ impl Cause {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missing {
     pub follows: String,
-    /// Factor k of the missing torque, which is k times a quantity of the motion; `std` is its
-    /// standard deviation, in the same `unit`.
+    /// Factor k of the missing torque k q, where q is a quantity of the motion. `std` is its standard deviation,
+    /// in the same `unit`.
     pub factor: f64,
     pub std: f64,
     pub unit: String,
@@ -68,8 +68,8 @@ pub fn words(target: &Target) -> String {
         Target::Parameter(name) if name == slosh::ZETA_AMPLITUDE => {
             "damping that grows with the amplitude"
         }
-        Target::Besides(kind) => {
-            let follows = BESIDES.get(*kind).map_or("the motion", |one| one.follows);
+        Target::ProportionalTorque(kind) => {
+            let follows = ADDITIONAL_TORQUES.get(*kind).map_or("the motion", |one| one.follows);
             return format!("a torque that follows {follows}");
         }
         _ => "an effect",
@@ -77,7 +77,8 @@ pub fn words(target: &Target) -> String {
     .into()
 }
 
-/// Returns the effect as a cause, with the flags that estimate it; `None` if it is a torque, because no option estimates one.
+/// Returns the effect as a cause, with the flags that estimate it. Returns `None` if the effect is an additional torque,
+/// because no option estimates such a torque.
 pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
     let target = &system.targets[effect.unknown];
     let value = effect.size.0;
@@ -108,10 +109,11 @@ pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
     Some(Cause { effect: words(target), flags, size, gain: effect.gain })
 }
 
-/// Returns the effect as a missing torque; `None` if it is no torque that follows the motion.
+/// Returns the effect as a missing torque. Returns `None` if the effect is no torque proportional to a
+/// quantity of the motion.
 pub fn missing(system: &BenchSystem, effect: &Effect) -> Option<Missing> {
-    let Target::Besides(kind) = &system.targets[effect.unknown] else { return None };
-    let one = BESIDES.get(*kind)?;
+    let Target::ProportionalTorque(kind) = &system.targets[effect.unknown] else { return None };
+    let one = ADDITIONAL_TORQUES.get(*kind)?;
     let (factor, std) = effect.size;
     Some(Missing {
         follows: one.follows.into(),

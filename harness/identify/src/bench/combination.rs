@@ -1,4 +1,4 @@
-//! Two unknowns of which only a sum or a product is known.
+//! Two unknowns of which the recordings determine only a sum or a product.
 
 use analysis::statistics::{deviation, mean};
 use names::hubslosh::friction;
@@ -7,15 +7,14 @@ use crate::engine::draws::Derived;
 use crate::engine::{PAIR, VAGUE};
 use crate::words::combination::Combination;
 
-/// Standard deviation of an estimated asymmetry of the friction above which the recordings do not
-/// determine it.
+/// Standard deviation above which an asymmetry of the friction counts as not determined.
 pub const ONE_WAY: f64 = 0.25;
-/// Ratio of the angle that the hub turns against its main direction to the angle that it turns in
-/// it, above which the hub counts as turning both ways.
+/// If the angle that the hub turns against its main direction is more than this fraction of the angle in the main direction, the
+/// hub counts as turning both ways.
 const BOTH_WAYS: f64 = 0.05;
 
-/// Returns the direction of a hub that turns only one way (1: counter-clockwise, −1: clockwise), from its rates. `None` if it
-/// rests, or if more than [`BOTH_WAYS`] of its path leads the other way.
+/// Returns the direction of a hub that turns only one way, from its rates: 1 counter-clockwise, −1 clockwise. Returns `None` for
+/// a hub at rest, or if more than [`BOTH_WAYS`] of its path leads the other way.
 pub fn way(rates: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut forwards, mut backwards) = (0.0, 0.0);
     rates.for_each(|rate| *if rate < 0.0 { &mut backwards } else { &mut forwards } += rate.abs());
@@ -24,8 +23,8 @@ pub fn way(rates: impl Iterator<Item = f64>) -> Option<f64> {
     (along > 0.0 && against <= BOTH_WAYS * along).then_some(way)
 }
 
-/// Returns the combinations that the draws determine although they do not determine the two unknowns: c (1 ± asymmetry) and d (1
-/// ± asymmetry) of the dry friction if the hub turns one `way`, otherwise c + d.
+/// Returns combinations of two unknowns that the draws determine better than either of the two. If the hub turns only one `way`,
+/// these are c (1 ± asymmetry) and d (1 ± asymmetry) of the dry friction; otherwise c + d.
 pub fn combinations(draws: &Derived, way: Option<f64>) -> Vec<Combination> {
     let place = |name: &str| draws.place(name);
     let mut found = Vec::new();
@@ -64,7 +63,6 @@ pub fn combinations(draws: &Derived, way: Option<f64>) -> Vec<Combination> {
 mod tests {
     use super::*;
 
-    /// A hub counts as turning in one direction only if nearly the whole path that it travels is in this direction.
     #[test]
     fn a_hub_turns_one_way_if_nearly_all_of_its_path_does() {
         assert_eq!(way([1.0, 2.0, -0.1].into_iter()), Some(1.0));

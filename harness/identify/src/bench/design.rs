@@ -1,4 +1,4 @@
-//! Design of experiments: torques for identification, and the Cramér–Rao bound of each parameter before anything is recorded.
+//! Design of experiments: torques for an identification, and the Cramér–Rao bound of each parameter before the recording.
 
 use std::f64::consts::TAU;
 
@@ -22,14 +22,14 @@ use crate::tuning::{ANGLE_ROUNDS, LINE_GROUP, SPREAD_POWER};
 use analysis::gauss_markov::Noise;
 use names::hubslosh::{FrictionModel, SloshModel, slosh};
 
-/// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
-/// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`LINE_GROUP`] left out at random.
+/// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification, chapter 4): Σ a_k sin(2π k
+/// f_0 t + φ_k) over odd k. One line of each group of [`LINE_GROUP`] is left out at random.
 ///
 /// In the response, power at an odd line that was left out is odd nonlinear distortion, power at even lines is even distortion,
-/// and power between lines (in records of several periods) is noise.
+/// and power between lines (in recordings of several periods) is noise.
 #[derive(Clone, Debug)]
 pub struct Multisine {
-    /// Length of a period, s; lines are 1/period apart.
+    /// Length of a period, s. Lines are 1/period apart.
     pub period: f64,
     pub lines: Vec<u32>,
     /// Odd lines of the band without power.
@@ -39,8 +39,8 @@ pub struct Multisine {
 }
 
 impl Multisine {
-    /// Creates a multisine with lines between two frequencies (Hz) and the largest torque `peak` (N·m). Phases are drawn 20 times
-    /// and those with the smallest crest factor are kept, because they have the most power at this peak.
+    /// Creates a multisine with lines between two frequencies (Hz) and the largest torque `peak` (N·m). Phases are drawn 20
+    /// times; those with the smallest crest factor are used, because they give the most power for this peak.
     pub fn new(period: f64, band: (f64, f64), peak: f64, seed: u64) -> Result<Self> {
         let odd = odd_lines(period, band, peak)?;
         let mut random = Random::new(seed, 0);
@@ -57,13 +57,13 @@ impl Multisine {
         Ok(flat.drawn(peak, &mut random))
     }
 
-    /// Returns a multisine with the same lines, these shares of the power, and phases that are drawn anew.
+    /// Returns a multisine with the same lines, with these shares of the power and new random phases.
     pub fn shaped(&self, shares: &[f64], peak: f64, seed: u64) -> Self {
         let amplitudes = shares.iter().map(|p| p.sqrt()).collect();
         Multisine { amplitudes, ..self.clone() }.drawn(peak, &mut Random::new(seed, 1))
     }
 
-    /// Draws phases 20 times, keeps those with the smallest crest factor, and scales the largest torque to `peak` (N·m).
+    /// Draws phases 20 times, uses those with the smallest crest factor, and scales the largest torque to `peak` (N·m).
     fn drawn(self, peak: f64, random: &mut Random) -> Self {
         let mut best: Option<(f64, Self)> = None;
         for _ in 0..20 {
@@ -85,7 +85,7 @@ impl Multisine {
         Multisine { amplitudes, ..self.clone() }
     }
 
-    /// Frequencies of the lines with power, Hz.
+    /// Returns the frequencies of the lines with power, Hz.
     pub fn frequencies(&self) -> Vec<f64> {
         self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
     }
@@ -97,7 +97,8 @@ impl Multisine {
     }
 }
 
-/// Refuses a multisine with too many lines for `rows` values, before its phases are drawn: the drawing alone would take seconds.
+/// Refuses a multisine with too many lines for `rows` values. It is called before the phases are drawn, because drawing them
+/// alone would take seconds.
 ///
 /// # Errors
 /// If it is too much work, or [`Multisine::new`] refuses the band, the period or the peak.
@@ -138,15 +139,16 @@ fn odd_lines(period: f64, band: (f64, f64), peak: f64) -> Result<Vec<u32>> {
     Ok(odd)
 }
 
-/// Returns the D-optimal power of lines at these frequencies (Hz): it maximises the determinant of the information on a linear
-/// bench's five parameters. The share [`SPREAD_POWER`] is the same on all lines.
+/// Returns the D-optimal power of lines at these frequencies (Hz): it maximises the determinant of the information matrix of a
+/// linear bench's five parameters. A fraction [`SPREAD_POWER`] is spread evenly over all lines.
 ///
 /// ```text
 /// maximise ln det Σ p_k A_k,  A_k = Re(J_kᴴ J_k),  J_k = ∂H(f_k)/∂ ln(f, ζ, m, I0, b):
 /// p_k ← p_k tr(M⁻¹ A_k)/5
 /// ```
 ///
-/// (Titterington's iteration, which never makes it worse; Goodwin & Payne, Dynamic System Identification, 1977, chapter 6.)
+/// (Titterington's iteration, in which the determinant never decreases; Goodwin & Payne, Dynamic System
+/// Identification, 1977, chapter 6.)
 pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
     let moved = |which: usize, by: f64| {
         let mut moved = plant.clone();
@@ -187,13 +189,13 @@ pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
 pub struct Wheel {
     pub torque: f64,
     pub inertia: f64,
-    /// Speed at the start, and the least and the largest that are allowed, rad/s.
+    /// Speed at the start, and smallest and largest allowed speed, rad/s.
     pub speeds: [f64; 3],
 }
 
 impl Wheel {
-    /// Returns the wheel's least and largest speed, rad/s, under a torque τ on the hub. The speed W follows I_w W' = −τ with the
-    /// wheel's inertia I_w.
+    /// Returns the wheel's smallest and largest speed, rad/s, under a torque τ on the hub. The speed W follows I_w W' = −τ with
+    /// the wheel's inertia I_w.
     pub fn range(&self, time: &[f64], torque: &[f64]) -> (f64, f64) {
         let mut speed = self.speeds[0];
         let (mut least, mut largest) = (speed, speed);
@@ -204,7 +206,8 @@ impl Wheel {
         (least, largest)
     }
 
-    /// Returns the largest factor (at most 1) by which a torque can be multiplied within the wheel's limits.
+    /// Returns the largest factor (at most 1) by which a torque can be multiplied so that the wheel stays
+    /// within its speed limits.
     pub fn factor(&self, time: &[f64], torque: &[f64]) -> f64 {
         let (least, largest) = self.range(time, torque);
         let [start, low, high] = self.speeds;
@@ -219,14 +222,14 @@ impl Wheel {
     }
 }
 
-/// Returns the largest angle of the liquid's first mode under a torque that begins at rest, rad.
+/// Returns the largest slosh angle of the first mode under a torque that begins at rest, rad.
 pub fn slosh_angle(fmu: &Fmu, setup: &Setup, time: &[f64], torque: &[f64]) -> Result<f64> {
     let rate = vec![0.0; time.len()];
     let recording = Recording::of("plan", time.to_vec(), torque.to_vec(), rate);
     Ok(peak(&setup.run(fmu, &[], &recording, 0.0)?.slosh_angle))
 }
 
-/// Returns the largest factor (at most 1) by which a torque can be multiplied so that the liquid stays within `limit`, rad.
+/// Returns the largest factor (at most 1) by which a torque can be multiplied so that the slosh angle stays within `limit`, rad.
 pub fn within_angle(
     fmu: &Fmu,
     setup: &Setup,
@@ -241,8 +244,7 @@ pub fn within_angle(
     if angle(1.0)? <= limit {
         return Ok(1.0);
     }
-    // Dry friction takes its share first, so the angle grows faster than the torque: between a factor within the limit and
-    // one beyond it the middle one.
+    // Bisection, because the angle is not proportional to the torque: dry friction takes the same torque at any amplitude.
     let (mut within, mut beyond) = (0.0, 1.0);
     for _ in 0..ANGLE_ROUNDS {
         let factor = 0.5 * (within + beyond);
@@ -252,17 +254,18 @@ pub fn within_angle(
     Ok(within)
 }
 
-/// Returns the geometric mean of the relative standard deviations, by which plans are compared: the smaller it is, the more information a
-/// plan gives. An unknown that is expected to be 0, such as a delay or a bias, has no relative deviation and does not count.
+/// Returns the geometric mean of the relative standard deviations, by which plans are compared: a smaller value means
+/// more information. An unknown with the expected value 0, such as a delay or a bias, has no relative standard deviation
+/// and is left out.
 pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
     let relative = bounds.iter().filter(|(_, value, _)| *value != 0.0);
     let logarithms: Vec<f64> = relative.map(|(_, value, std)| (std / value.abs()).ln()).collect();
     analysis::statistics::mean(&logarithms).exp()
 }
 
-/// Returns name, expected value and Cramér–Rao bound of each unknown for a planned torque and the noise of a gyro. The bound is
-/// the standard deviation that the engine would state at the start, with its weak priors. With `sensor_errors`, delay, gyro bias
-/// and asymmetry of the friction are unknown as well.
+/// Returns the name, expected value and Cramér–Rao bound of each unknown for a planned torque and the noise of a gyro. The bound
+/// is the standard deviation that the engine would report at the start values, with its weak priors. With `sensor_errors`, the
+/// delay, the gyro's bias and the asymmetry of the friction are unknown as well.
 ///
 /// # Errors
 /// If the hub does not turn, some combination of the unknowns has no influence on its rate, or the FMU refuses to run.
@@ -276,7 +279,7 @@ pub fn cramer_rao(
     let largest = peak(&torque);
     let rate = vec![0.0; time.len()];
     let recordings = [Recording::of("plan", time, torque, rate)];
-    // what is set of the unknowns is expected, not known
+    // a value that is set for an unknown is an expected value, not a known one
     let is_expected =
         |name: &str| PARAMETERS.contains(&name) || name == slosh::ZETA_FROM_CORRELATION;
     let known = settings.iter().filter(|(name, _)| !is_expected(name)).cloned();
@@ -345,8 +348,8 @@ pub fn cramer_rao(
 mod tests {
     use super::*;
 
-    /// A multisine of 100 s period from 1.25 to 3.5 Hz contains only odd multiples of 0.01 Hz, and its peak is 0.25 N·m
-    /// within 16 %.
+    /// The multisine with a period of 100 s from 1.25 to 3.5 Hz contains only odd multiples of 0.01 Hz, and its peak is 0.25
+    /// N·m within 16 %.
     #[test]
     fn a_multisine_has_only_odd_lines_and_the_given_peak() {
         let torque = Multisine::new(100.0, (1.25, 3.5), 0.25, 1).unwrap();
@@ -354,9 +357,9 @@ mod tests {
         assert!(torque.detection.len() >= torque.lines.len() / LINE_GROUP);
         let largest =
             (0..20_000).map(|k| torque.at(f64::from(k) * 0.005).abs()).fold(0.0, f64::max);
-        // the search looks every 0.05 s, at 3.5 Hz within cos(π 0.05 3.5) of a crest
+        // the peak was searched every 0.05 s, which at 3.5 Hz may miss a crest by a factor of cos(π 0.05 3.5)
         assert!((0.2499..0.29).contains(&largest), "{largest}");
-        // odd lines alone: the second half of a period is the first with the other sign
+        // with odd lines only, the second half of a period is the negative of the first
         assert!((torque.at(13.7) + torque.at(63.7)).abs() < 1e-9);
     }
 
@@ -372,7 +375,7 @@ mod tests {
             .filter(|(f, _)| (2.25..2.55).contains(*f))
             .map(|(_, p)| p)
             .sum();
-        // 13 % of the lines; the antiresonance and the resonance are there
+        // 13 % of the lines contain the antiresonance and the resonance
         assert!(near > 0.3, "{near}");
     }
 
@@ -381,11 +384,11 @@ mod tests {
         let bound = |value: f64, std: f64| ("name".to_string(), value, std);
         let known = [bound(2.0, 0.02), bound(-1.0, 0.04)];
         let with_zero = [&known[..], &[bound(0.0, 1e-4)]].concat();
-        // the geometric mean of 1 % and 4 %
+        // geometric mean of 1 % and 4 %
         assert!((merit(&known) - 0.02).abs() < 1e-15 && merit(&with_zero) == merit(&known));
     }
 
-    /// 0.1 N·m for 10 s would change the speed of the wheel by 444 rad/s, and 146.6 rad/s are left to its lowest speed.
+    /// 0.1 N·m for 10 s would change the speed of the wheel by 444 rad/s, but its lowest speed is only 146.6 rad/s away.
     #[test]
     fn the_torque_of_a_design_is_scaled_down_to_the_limits_of_the_wheel() {
         let rpm = std::f64::consts::TAU / 60.0;
@@ -395,11 +398,11 @@ mod tests {
             speeds: [1600.0 * rpm, 200.0 * rpm, 3000.0 * rpm],
         };
         let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
-        // 0.1 N·m for 10 s is 444 rad/s; 146.6 rad/s are there
+        // 146.6 rad/s of 444 rad/s are available
         let factor = wheel.factor(&time, &vec![0.1; 1000]);
         assert!((factor - 146.6 / 444.0).abs() < 1e-3, "{factor}");
         let fast: Vec<f64> = time.iter().map(|t| 0.52 * (TAU * 3.0 * t).sin()).collect();
-        // the sine's crests lie between rows: (π 3 0.01)²/2 = 0.4 %
+        // crests of the sine lie between rows: (π 3 0.01)²/2 = 0.4 %
         assert!((wheel.factor(&time, &fast) - 0.5).abs() < 3e-3);
     }
 }

@@ -1,15 +1,16 @@
-//! Effects of a bench that the FMU does not have: an actuator that lags its command, a filtered gyro, friction that drifts.
+//! Effects on a bench that the FMU does not model: an actuator that lags its command, a gyro with a low-pass
+//! filter, friction that drifts.
 //!
 //! ```text
 //! actuator lag   T τ' = τ_cmd − τ          gyro lag   T y' = ω − y
 //! friction drift (b, c, d)(t) = (b, c, d) (1 + a (t − t₀)/(t₁ − t₀)), from the recording's first row t₀ to its last t₁
 //! ```
 //!
-//! The lags are computed from the signals outside the FMU, exactly for lines between instants.
+//! The lags are applied to the signals outside the FMU. The solution is exact for signals that are linear between instants.
 
 use crate::tuning::LAG_PARTS;
 
-/// Sizes of the effects that the FMU does not have; an effect of size 0 is absent.
+/// Sizes of the effects that the FMU does not model. An effect of size 0 is absent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects<'a> {
     /// Torque on the hub in addition to the recorded torque, at the recording's rows, N·m.
@@ -20,15 +21,15 @@ pub struct Effects<'a> {
 }
 
 /// Returns the output of a first-order lag (s) at the end of a step `h` (s). At the beginning of the step the output is `y` and
-/// the input is a; the input follows a line with slope b.
+/// the input is a; within the step the input is linear with the slope b.
 fn lagged(y: f64, (a, b): (f64, f64), h: f64, lag: f64) -> f64 {
     let settled = a - b * lag;
     settled + b * h + (y - settled) * (-h / lag).exp()
 }
 
-/// Returns times and values of the torque of an actuator with this lag (s), at the knots of its command and between them, so
-/// close that lines can join the values. The command is `held` from knot to knot, or joined by lines. At the first knot the
-/// actuator has settled at the first command.
+/// Returns times and values of the torque of an actuator with this lag (s). The times are the knots of the command and points
+/// between them, dense enough for linear interpolation. The command is held from knot to knot if `held` is true, and linear
+/// otherwise. At the first knot the actuator's torque equals the command.
 pub fn of_actuator(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<f64>, Vec<f64>) {
     let (mut time, mut values) = (vec![knots[0]], vec![torque[0]]);
     let mut y = torque[0];
@@ -47,7 +48,8 @@ pub fn of_actuator(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<
     (time, values)
 }
 
-/// Returns the output of a first-order filter with this lag (s) at growing times (s). Its input follows lines between the values.
+/// Returns the output of a first-order filter with this lag (s) at increasing times (s). Its input is linear
+/// between the given values.
 pub fn of_gyro(lag: f64, time: &[f64], lines: &[f64]) -> Vec<f64> {
     let mut y = lines[0];
     let mut read = vec![y];
@@ -63,13 +65,13 @@ pub fn of_gyro(lag: f64, time: &[f64], lines: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A lag of the time constant T changes a sine of the frequency Ω by the amplitude factor 1/√(1 + (ΩT)²) and the
-    /// phase −atan ΩT.
+    /// A lag with the time constant T multiplies the amplitude of a sine with the angular frequency Ω by 1/√(1 + (ΩT)²) and
+    /// shifts its phase by −atan ΩT.
     #[test]
     fn lags_of_a_sine_equal_those_of_its_frequency_response() {
         let (w, lag, h) = (15.0_f64, 0.03, 0.02);
         let time: Vec<f64> = (0..2000).map(|k| h * f64::from(k)).collect();
-        // lines through a sine act as a sine that is smaller by sinc²
+        // linear interpolation of a sine reduces its amplitude by sinc²
         let half = 0.5 * w * h;
         let more = (half / half.sin()).powi(2);
         let sine: Vec<f64> = time.iter().map(|t| more * (w * t).sin()).collect();
@@ -77,13 +79,13 @@ mod tests {
         let expected = |t: f64| gain * (w * t - (w * lag).atan()).sin();
         let read = of_gyro(lag, &time, &sine);
         let (knots, torque) = of_actuator(lag, &time, &sine, false);
-        // from 15 lags on, away from the end
+        // after 15 lags the transient has decayed; the end is left out
         for k in 100..1900 {
-            // the lines' harmonics, 1/(2π/Ωh)² of the sine and more, pass the lag too
+            // the harmonics of the linear interpolation, 1/(2π/Ωh)² of the sine and more, pass the lag as well
             assert!((read[k] - expected(time[k])).abs() < 1e-3, "{k}");
             assert!((torque[3 * k] - expected(knots[3 * k])).abs() < 1e-3, "{k}");
         }
-        // a held command settles by 1 − 1/e within a lag
+        // a held command is reached to 1 − 1/e after one lag
         let held = of_actuator(1.0, &[0.0, 0.5, 1.5], &[0.0, 1.0, 1.0], true);
         let last = held.1[held.1.len() - 1];
         assert!((last - (1.0 - (-1.0_f64).exp())).abs() < 1e-12, "{last}");

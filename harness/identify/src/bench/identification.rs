@@ -17,17 +17,17 @@ pub struct ModelFit {
     /// Fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_pct: f64,
     pub converged: bool,
-    /// Newton decrement: the distance of the estimates from the minimum of −2 ln L, in standard deviations, that one further Newton step
-    /// predicts.
+    /// Newton decrement: the distance from the estimates to the minimum of −2 ln L, in standard deviations, as predicted by
+    /// one more Newton step.
     pub newton_decrement: f64,
     pub tests: Vec<Tests>,
-    /// Fit of each recording for validation, %.
+    /// Fit of each validation recording, %.
     pub validation_pct: Vec<f64>,
     /// Standard deviation of the gyro's white noise, rad/s.
     pub noise_white: f64,
-    /// Number of simulations of all recordings. A simulation of a part of the rows counts as this part.
+    /// Number of simulations of all recordings. A simulation of a part of the rows counts as a fraction.
     pub simulations: f64,
-    /// True if neither noise nor a small effect explains the residual.
+    /// True if the residual is more than noise and no small effect explains it.
     #[serde(skip)]
     pub poor: bool,
 }
@@ -53,18 +53,18 @@ pub struct Details {
     pub fit: ModelFit,
     pub combinations: Vec<Combination>,
     pub condition: f64,
-    /// Torque that the model lacks. It is named only if it leaves noise as residual, and no other effect explains the recordings
-    /// as well.
+    /// Torque that the model lacks. It is named only if the residual is noise with it, and no other effect explains
+    /// the recordings as well.
     pub missing: Vec<Missing>,
-    /// Cause of a misfit. It is named only if it leaves noise as residual, and no other effect explains the recordings as well.
+    /// Cause of a misfit. It is named only if the residual is noise with it, and no other effect explains the recordings as well.
     pub cause: Option<Cause>,
     pub models: Vec<ModelFit>,
     pub frequency_response: Option<Response>,
     pub start: Option<Start>,
-    /// Braking over the angle in free decay, counter-clockwise and clockwise, of friction runs.
+    /// Deceleration over the angle in free decays, counter-clockwise and clockwise. Empty except for friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub braking: Vec<Braking>,
-    /// Measured friction over the rate, of friction runs.
+    /// Measured friction over the rate. Empty except for friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub friction_points: Vec<FrictionPoint>,
     /// Largest slosh angle of the fit, rad; 0 without slosh.

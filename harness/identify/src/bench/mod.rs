@@ -1,5 +1,5 @@
-//! The slosh bench as an estimation problem for [`crate::engine`]: the model and its unknowns, their conversion to dimensions of tank and
-//! hub, and effects that the model lacks, for example lags of the actuator and the gyro.
+//! The slosh bench as an estimation problem for [`crate::engine`]: the model and its unknowns, the conversion of unknowns to
+//! dimensions of tank and hub, and effects that the FMU does not model, for example lags of the actuator and the gyro.
 
 pub mod answer;
 pub mod braking;

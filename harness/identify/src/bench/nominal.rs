@@ -1,4 +1,4 @@
-//! The bench as the FMU is set up, before anything is estimated.
+//! The bench with the FMU's settings, before anything is estimated.
 
 use anyhow::{Result, ensure};
 use experiments::rest;
@@ -17,7 +17,7 @@ pub struct Bench {
     pub gravity: f64,
 }
 
-/// Parameters of the FMU that have a start from the data, in the order of [`Start`].
+/// Parameters of the FMU whose start is estimated from the data, in the order of [`Start`].
 pub const PARAMETERS: [&str; 8] = [
     tank::D,
     tank::H,
@@ -29,17 +29,15 @@ pub const PARAMETERS: [&str; 8] = [
     friction::OMEGA_S,
 ];
 
-/// Start values of the parameters of the bench for a search in the time domain, estimated from the
-/// data; SI units.
+/// Start values for a fit of the bench in the time domain, estimated from the data; SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
 pub struct Start {
-    /// Length of the first mode's pendulum, m.
+    /// Length of the pendulum that is equivalent to the first mode, m.
     pub length: f64,
-    /// Ratio of two inertias about the hub's axis: of the first mode's mass, and of everything that
-    /// turns with the hub.
+    /// Inertia of the first mode's mass about the hub's axis, divided by the inertia of everything that turns with the hub.
     pub mass_ratio: f64,
-    /// Inertia that turns with the hub, without the first mode's mass, kg·m².
+    /// Inertia that turns with the hub, without the mass of the first mode, kg·m².
     pub inertia: f64,
     pub d: f64,
     pub h: f64,
@@ -69,7 +67,7 @@ impl Start {
         }
     }
 
-    /// Returns the start with length, mass ratio and inertia of the first mode in its tank.
+    /// Returns the start, completed by length, mass ratio and inertia of the first mode in its tank.
     pub fn with_modes(self, bench: Bench) -> Self {
         let liquid = bench.liquid(self.d, self.h);
         let mode = pendulum(0, self.d, self.h, liquid);
@@ -119,7 +117,7 @@ pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>>
     Ok(instance.take_warnings())
 }
 
-/// Returns true if the settings state how much liquid is in the tank, or that there is none.
+/// Returns true if the settings state the amount of liquid in the tank, or that the tank is empty.
 pub fn states_liquid(settings: &[(String, String)]) -> bool {
     settings.iter().any(|(name, _)| [tank::H, fluid::RHO].contains(&name.as_str()))
 }
@@ -144,7 +142,7 @@ impl Bench {
         pendulum(0, d, h, self.liquid(d, h)).mass
     }
 
-    /// Returns the moment of inertia about the hub's axis, kg·m², of a mass (kg) in the tank that turns with the hub.
+    /// Returns the moment of inertia about the hub's axis, kg·m², of a mass (kg) in the tank.
     pub fn inertia(self, mass: f64) -> f64 {
         mass * self.arm.powi(2)
     }
@@ -173,7 +171,7 @@ impl Nominal {
         Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.element([1]))? })
     }
 
-    /// Returns the longest mean time between rows with which this bench can be identified, s: five rows in a period of the slosh.
+    /// Returns the longest mean time between rows with which this bench can be identified, s: a fifth of the slosh period.
     pub fn coarsest(&self) -> f64 {
         (self.period / 5.0).max(COARSEST)
     }

@@ -18,16 +18,16 @@ pub struct Options {
     pub starts: Vec<(String, f64)>,
     /// True to estimate delay, gyro bias and friction asymmetry as well.
     pub sensor_errors: bool,
-    /// Effects that are estimated although the FMU does not have them, such as [`Target::ActuatorLag`].
+    /// Effects that the FMU does not model but the fit estimates, such as [`Target::ActuatorLag`].
     pub effects: Vec<Target>,
-    /// True to estimate the damping by waves that break, if the fit reaches them.
+    /// True to estimate the damping by breaking waves, if the waves of the fit are steep enough.
     pub breaking: bool,
-    /// Standard deviation of the gyro's scale about 1, from its data sheet; 0 if the scale is exactly 1.
+    /// Standard deviation of the gyro's scale about 1, from its data sheet; 0 for an exact scale.
     pub gyro_scale: f64,
     pub tolerances: Tolerances,
-    /// Intersample behaviour of the torque; `None` chooses the best fit.
+    /// Intersample behaviour of the torque; `None` to choose the best by the likelihood.
     pub intersample: Option<Hold>,
-    /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
+    /// True if the rate's time stamps may be early. A negative delay then raises no doubt.
     pub acausal: bool,
     pub validation: Vec<Recording>,
 }

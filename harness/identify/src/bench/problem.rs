@@ -11,39 +11,37 @@ use host::fmu::Fmu;
 use names::hubslosh::{FrictionModel, SloshModel, friction, hub, init, slosh, tank, wheel};
 
 use super::combination;
-use super::system::{BESIDES, BenchSystem, Besides, Target};
+use super::system::{ADDITIONAL_TORQUES, BenchSystem, ProportionalTorque, Target};
 use crate::bench::breaking;
 use crate::bench::nominal::{self, Nominal, PARAMETERS, Start};
 use crate::bench::options::Options;
-use crate::bench::simulate::TORQUE_BESIDES;
+use crate::bench::simulate::ADDITIONAL_TORQUE;
 use crate::engine::{Drift, Hold, Part, Problem, Recorded, Role, Signal, Unknown};
 use crate::input::recording::Recording;
 use crate::input::tolerance;
 use crate::model::overridden::{near, refuse};
 use crate::model::unknown::range;
 
-/// Indices of the gyro's rate and of the encoder's angle among the outputs.
+/// Indices of the gyro's rate and the encoder's angle in the list of outputs.
 const RATE: usize = 0;
 const ANGLE: usize = 1;
 
-/// Expected drift of the gyro: that of a MEMS gyro (the thesis's LSM6DS3).
+/// Expected drift of a MEMS gyro (the thesis's LSM6DS3).
 const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
-/// Drift of an encoder's angle: it integrates the rate that the model does not explain, whose size is unknown, so that its width
-/// is large.
+/// Expected drift of an encoder's angle. It is the integral of the rate that the model does not explain. The size of this rate is
+/// unknown, so the width is large.
 const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
 /// Standard deviation of a delay's prior, and the delay's bounds, s.
 pub const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
-/// Standard deviation of the prior of the dry friction's asymmetry, which is small against 1.
+/// Prior standard deviation of the asymmetry of the dry friction, which is usually small against 1.
 const ASYMMETRY: f64 = 0.5;
-/// Standard deviation of the prior of each friction coefficient b, c and d, over the coefficient's
-/// start value.
+/// Prior standard deviation of each friction coefficient b, c and d, relative to its start value.
 const FRICTION_WIDTH: f64 = 10.0;
-/// Lower bound of each friction coefficient b, c and d, over the coefficient's start value.
+/// Lower bound of each friction coefficient b, c and d, relative to its start value.
 pub const LEAST_FRICTION: f64 = 1e-4;
-/// Standard deviation of the prior of ln ω_s, where ω_s is the Stribeck speed, and the largest
-/// factor between ω_s and its start value.
+/// Prior standard deviation of ln ω_s, where ω_s is the Stribeck speed, and the largest factor between ω_s and its start value.
 const SPEED: (f64, f64) = (1.5, 30.0);
-/// Least and largest factor by which a known value may differ from its nominal value.
+/// Smallest and largest ratio of a known value to its nominal value.
 const WIDEST: (f64, f64) = (0.6, 1.6);
 
 struct List<'a> {
@@ -62,8 +60,7 @@ impl List<'_> {
         self.add(Target::Parameter(unknown.name.clone()), unknown);
     }
 
-    /// Returns the unit of a parameter of the FMU, and its bounds: those of the FMU within `least`
-    /// and `largest`.
+    /// Returns the unit of a parameter of the FMU, and its bounds: the FMU's own ones, restricted to `least` and `largest`.
     fn variable(&self, name: &str, (least, largest): (f64, f64)) -> (String, (f64, f64)) {
         let description = self.fmu.description();
         let Ok(variable) = description.variable(name) else {
@@ -78,8 +75,8 @@ impl List<'_> {
         Unknown::positive(name, &unit, Role::Run(None), start, bounds)
     }
 
-    /// Returns a parameter of the FMU that may be 0, such as a friction coefficient, as an unknown.
-    /// The search varies the value itself, because a logarithm cannot reach 0.
+    /// Returns a parameter of the FMU that may be 0, such as a friction coefficient, as an unknown. Its coordinate is the value
+    /// itself, because a logarithm cannot reach 0.
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (unit, bounds) = self.variable(name, (0.0, f64::INFINITY));
         Unknown::linear(name, &unit, Role::Run(None), (start, start), bounds)
@@ -103,7 +100,7 @@ pub fn system<'a>(
     let given = |name: &str| options.starts.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
     let frozen = model == SloshModel::Frozen.name();
     let run = Role::Run(None);
-    // the FMU's own parameters where tank, hub or modes are set or known
+    // if tank, hub or modes are set or known, the FMU's own parameters are the unknowns
     let shapes = [tank::D, tank::H, hub::I];
     let is_shaped = |name: &str| name.starts_with("slosh.") && name != slosh::MODEL;
     let by_modes = !frozen
@@ -151,23 +148,23 @@ pub fn system<'a>(
         if used && !is_set(name) {
             let start = first.parameter(name);
             let own = list.nonnegative(name, start).with_prior(start, FRICTION_WIDTH * start);
-            // the bristle law takes none that is 0
+            // the LuGre law does not allow 0
             list.add_parameter(Unknown { bounds: (LEAST_FRICTION * start, own.bounds.1), ..own });
         }
     }
     if dry && !is_set(friction::OMEGA_S) {
-        // a recording whose rates stay below the bearing's usual speed does not show it, and must not place it
+        // the bearing's usual speed, if the recorded rates stay below it: they do not show ω_s and must not determine it
         let start = first.omega_s.max(nominal.start.omega_s);
         let unknown = list.parameter(friction::OMEGA_S, start).with_prior(start.ln(), SPEED.0);
         let bounds = (start / SPEED.1, start * SPEED.1);
         list.add_parameter(Unknown { bounds, bent: !is_set(friction::D), ..unknown });
     }
     if law == FrictionModel::Lugre.name() && !is_set(friction::SIGMA0) {
-        // stiffer bristles move less than 1/100 of what a gyro of this kind sees
+        // stiffer bristles deflect less than 1/100 of the angle that such a gyro resolves
         let unknown = list.parameter(friction::SIGMA0, 100.0);
         list.add_parameter(Unknown { bounds: (0.1, 1000.0), ..unknown });
     }
-    // parameters that are estimated because a start or something known of them is given
+    // parameters are also estimated if a start or a prior of them is given
     for name in options.starts.iter().map(|s| &s.0).chain(options.known.iter().map(|k| &k.0)) {
         let is_listed = list.unknowns.iter().any(|u| u.name == *name);
         let is_of_bench = PARAMETERS.contains(&name.as_str()) || name == friction::ASYMMETRY;
@@ -252,7 +249,7 @@ pub fn system<'a>(
             list.add(Target::Initial(k, (*name).into()), state.with_prior(start.0, *std));
         }
     }
-    // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
+    // an encoder shows the scale of the rate; nonlinear slosh shows it too, and without it the residual would not be noise
     let nonlinear = !frozen && model != SloshModel::Linear.name();
     if options.gyro_scale > 0.0 {
         let std = options.gyro_scale;
@@ -268,9 +265,9 @@ pub fn system<'a>(
     for ((target, name), std) in
         targets.into_iter().zip(tolerance::NAMES).zip(options.tolerances.all())
     {
-        // a value with a prior or a start gets no tolerance in addition
-        let is_told = known(name).is_some() || given(name).is_some();
-        if std > 0.0 && !is_told && !(target == Target::Gravity && is_recorded) {
+        // a value with a prior or a start has no tolerance in addition
+        let has_value = known(name).is_some() || given(name).is_some();
+        if std > 0.0 && !has_value && !(target == Target::Gravity && is_recorded) {
             let is_derived = target == Target::Density && by_modes;
             let role = if is_derived { Role::Derived } else { run };
             let one = Unknown::positive(name, "1", role, 1.0, WIDEST).with_prior(0.0, std);
@@ -284,7 +281,7 @@ pub fn system<'a>(
         (friction::MODEL.to_string(), law.to_string()),
     ];
     if law == FrictionModel::Lugre.name() {
-        // the bristles' damping is no more than a bearing with little viscous friction allows
+        // a bearing with little viscous friction allows no damping of the bristles
         settings.push((friction::SIGMA1.into(), "0".into()));
     }
     let chosen = |name: &str| matches!(name, slosh::MODEL | friction::MODEL);
@@ -332,7 +329,7 @@ pub fn system<'a>(
 }
 
 /// Returns the direction, 1 or −1, in which the hub turns in all recordings; 0 if it turns both ways. If a recording begins at
-/// rest, its first reading is subtracted, because it is the gyro's bias.
+/// rest, its first value is subtracted, because it is the gyro's bias.
 fn way(recordings: &[Recording]) -> f64 {
     let one = |recording: &Recording| {
         let bias = if recording.from_rest { recording.first_rate() } else { 0.0 };
@@ -349,7 +346,7 @@ fn bias(name: &str, unit: &str, (output, recording): (usize, usize), start: f64)
     Unknown::linear(name, unit, role, (start, 1e-2), (f64::NEG_INFINITY, f64::INFINITY))
 }
 
-/// Returns an effect that the FMU does not have as an unknown. A free effect starts at its plausible size, any other at 0.
+/// Returns the unknown for an effect that the FMU does not model. If it is free, it starts at its plausible size, otherwise at 0.
 pub fn effect(target: &Target, part: Part) -> Unknown {
     let (name, unit, reach, bounds) = match target {
         Target::ActuatorLag => ("actuator_lag", "s", 0.02, (0.0, 1.0)),
@@ -358,8 +355,8 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
         Target::Limit => ("limit", "1", 0.1, (0.0, 0.7)),
         Target::Compliance => ("compliance", "rad/(N.m)", 1e-2, (0.0, 10.0)),
         Target::SecondMode => ("second mode", "1", 1.0, (0.0, 3.0)),
-        Target::Besides(kind) => {
-            let Besides { follows, unit, .. } = BESIDES[*kind];
+        Target::ProportionalTorque(kind) => {
+            let ProportionalTorque { follows, unit, .. } = ADDITIONAL_TORQUES[*kind];
             (follows, unit, 1e-4, (f64::NEG_INFINITY, f64::INFINITY))
         }
         _ => ("effect", "1", 1.0, (0.0, 1.0)),
@@ -386,8 +383,8 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
         let unknown = Unknown { part: Part::Candidate, reach, ..list.nonnegative(name, 0.0) };
         all.extend((used && !is_set(name)).then(|| (Target::Parameter(name.into()), unknown)));
     }
-    if list.fmu.description().variable(TORQUE_BESIDES).is_ok() {
-        let torques = (0..BESIDES.len()).map(Target::Besides);
+    if list.fmu.description().variable(ADDITIONAL_TORQUE).is_ok() {
+        let torques = (0..ADDITIONAL_TORQUES.len()).map(Target::ProportionalTorque);
         all.extend(torques.map(|target| (target.clone(), effect(&target, Part::Candidate))));
     }
     for (target, unknown) in all {
@@ -397,8 +394,7 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     }
 }
 
-/// Returns an error if the settings make an unknown ineffective, because another parameter replaces
-/// it.
+/// Returns an error if an unknown has no effect because the settings replace it by another parameter.
 fn refuse_overridden(
     fmu: &Fmu,
     settings: &[(String, String)],
@@ -414,7 +410,7 @@ fn refuse_overridden(
     });
     let parameters: Vec<_> = parameters.collect();
     let settings = [settings, &parameters].concat();
-    // what the FMU refuses here, the search tells
+    // values that the FMU refuses are reported later, by the search
     let warnings = nominal::warnings(fmu, &settings).unwrap_or_default();
     parameters.iter().try_for_each(|(name, _)| refuse(name, &warnings))
 }
@@ -473,8 +469,8 @@ pub fn problem<'a>(
     }
 }
 
-/// Returns the possible courses of the torque between rows, the likeliest first: a torque that seldom changes is probably held. A
-/// torque that hardly varies gets only one course, because all give the same motion.
+/// Returns the possible intersample behaviours of the torque, the likeliest first: a torque that changes seldom is probably held.
+/// A nearly constant torque gets only one, because all of them give the same motion.
 fn guessed(recordings: &[Recording]) -> Vec<Hold> {
     let square = |x: f64| x * x;
     let varies = |recording: &Recording| {

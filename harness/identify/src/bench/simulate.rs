@@ -1,4 +1,4 @@
-//! The FMU's answer to a recording's torque, at the recording's instants.
+//! Simulates the FMU's response to the torque of a recording, at the instants of the recording.
 
 use anyhow::{Result, ensure};
 use experiments::rest;
@@ -15,10 +15,10 @@ use crate::input::recording::{Recording, masked};
 use crate::model::simulate::most_steps;
 use crate::tuning::SAME_INSTANT;
 
-/// The FMU's input for a torque on the hub besides the actuator's.
-pub const TORQUE_BESIDES: &str = TAU_EXT;
+/// The FMU's input for a torque on the hub in addition to the actuator's.
+pub const ADDITIONAL_TORQUE: &str = TAU_EXT;
 
-/// The FMU's parameters to which the friction of the bearing is proportional.
+/// The FMU's parameters that are multiplied by a drift of the friction.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
 #[derive(Clone, Debug, Default)]
@@ -29,24 +29,24 @@ pub struct Motion {
     pub slosh_angle: Vec<f64>,
 }
 
-/// The parts of a [`Motion`] that a run reads from the FMU in every row; all other parts stay
-/// empty.
+/// The quantities of a [`Motion`] that a run reads from the FMU in every row; all others stay empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Read {
     All,
-    /// Only angle and rate, for differences of runs: both are states, so that the FMU need not compute its outputs.
+    /// Only angle and rate, for finite differences. Both are states, so that the FMU does not have to compute its outputs.
     States,
 }
 
-/// Returns values that act, joined by lines, like the smooth signal whose samples `signal` has. Lines through samples of a sine
-/// of frequency Ω have the amplitude sinc²(Ωh/2), with the time h between rows: 0.8 % less than the sine's at 2.4 Hz and 50 Hz
-/// sampling. This is corrected with the second difference δ², which multiplies a sine by −(Ωh)² + (Ωh)⁴/12:
+/// Returns corrected samples of a smooth signal, so that linear interpolation between them has the same effect as the
+/// signal. Linear interpolation of a sine with the angular frequency Ω reduces its amplitude by sinc²(Ωh/2), with the time h
+/// between rows: by 0.8 % at 2.4 Hz and 50 Hz sampling. The correction uses the second difference δ², which multiplies a
+/// sine by −(Ωh)² + (Ωh)⁴/12:
 ///
 /// ```text
 /// 1/sinc²(Ωh/2) = 1 + (Ωh)²/12 + (Ωh)⁴/240 + … ≈ 1 − δ²/12 + δ⁴/90
 /// ```
 ///
-/// If rows are unevenly spaced, only the term with δ² is used.
+/// In unevenly spaced rows only the term with δ² is used.
 pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     let n = signal.len();
     let second = |x: &[f64]| -> Vec<f64> {
@@ -63,8 +63,8 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
 }
 
-/// Returns the instants of a recording's torque, s, and its values there, N·m, with the recording's first and last row among
-/// them. The values of a band-limited torque are corrected so that lines can join them ([`smooth`]).
+/// Returns the instants of a recording's torque, s, and its values there, N·m, including the first and the last row of the
+/// recording. A band-limited torque is corrected for linear interpolation ([`smooth`]).
 pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) {
     let commanded = recording.commanded.as_deref();
     let mut knots = masked(&recording.time, commanded);
@@ -93,8 +93,8 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Runs the FMU with these real parameters, by name, through a recording. `delay` (s) lies
-    /// between the recorded torque and the recorded rate: row k sees the FMU at t_k − delay.
+    /// Simulates the FMU with these real parameters, by name, over a recording. `delay` (s) is the time from the recorded
+    /// torque to the recorded rate: row k reads the FMU at t_k − delay.
     ///
     /// # Errors
     /// If the delay is longer than the recording, a step takes more than [`most_steps`], or the FMU refuses a call.
@@ -108,8 +108,8 @@ impl Setup {
         self.run_under(fmu, values, recording, delay, &Effects::default(), Read::All)
     }
 
-    /// Runs the FMU as [`Setup::run`] does, with effects that the FMU does not have, and returns the part `read` of the motion.
-    /// The rate is the output of the gyro's filter, if it has one.
+    /// Simulates the FMU as [`Setup::run`] does, with effects that the FMU does not model, and returns the quantities `read` of
+    /// the motion. If the gyro has a filter, the rate is its output.
     pub fn run_under(
         &self,
         fmu: &Fmu,
@@ -153,10 +153,10 @@ impl Setup {
             knots.iter().map(value).collect()
         };
         let gravity = recording.gravity.as_deref().map(at_knots);
-        let besides = effects.torque.map(at_knots);
+        let additional = effects.torque.map(at_knots);
         let mut driven = vec![(TAU_CMD, torque.as_slice())];
         driven.extend(gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
-        driven.extend(besides.as_ref().map(|torque| (TORQUE_BESIDES, torque.as_slice())));
+        driven.extend(additional.as_ref().map(|torque| (ADDITIONAL_TORQUE, torque.as_slice())));
         let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let inputs = Inputs::new(fmu.description(), &names, held)?;
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
@@ -175,7 +175,7 @@ impl Setup {
             Read::States => &outputs[..2],
         };
         let mut motion = Motion::default();
-        // the row that is read next; the knot from which on the signals go to the one after it
+        // `row` is read next; the signals run from `knot` to the next knot
         let (mut row, mut knot) = (0, 0);
         inputs.drive(&mut instance, time[0], |instance, t, course| {
             let target = loop {
@@ -224,8 +224,8 @@ impl Setup {
     }
 }
 
-/// Returns value and slope of a signal `lead` (s) after each time, on the cubic between two rows with these values and slopes.
-/// Beyond the ends the signal continues as a line.
+/// Returns value and slope of a signal `lead` (s) after each time, by cubic Hermite interpolation between rows. Beyond the ends
+/// the signal continues as a line.
 fn hermite(time: &[f64], values: &[f64], slopes: &[f64], lead: f64) -> Vec<(f64, f64)> {
     let last = time.len() - 1;
     let mut row = 0;
@@ -252,7 +252,7 @@ fn hermite(time: &[f64], values: &[f64], slopes: &[f64], lead: f64) -> Vec<(f64,
     time.iter().copied().map(at).collect()
 }
 
-/// Returns angle and rate of a motion `lead` (s) after the instants at which it was read.
+/// Returns angle and rate of a motion `lead` (s) after the instants `time`.
 pub fn angle_and_rate_at(time: &[f64], motion: &Motion, lead: f64) -> [Vec<f64>; 2] {
     if lead == 0.0 {
         return [motion.angle.clone(), motion.rate.clone()];
@@ -266,21 +266,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_through_smoothed_values_are_the_sine_that_was_sampled() {
+    fn linear_interpolation_of_corrected_samples_has_the_amplitude_of_the_sine() {
         let h = 0.02;
         for f in [1.25, 2.4, 3.5] {
             let w = std::f64::consts::TAU * f;
             let time: Vec<f64> = (0..5000).map(|k| h * f64::from(k)).collect();
             let sine: Vec<f64> = time.iter().map(|t| (w * t).sin()).collect();
             let amplitude = |x: &[f64]| {
-                // of the lines through x at f: that of x times sinc²
+                // amplitude of the linear interpolation: sinc² times the amplitude of the samples
                 let half: f64 = 0.5 * w * h;
                 let tone = time.iter().zip(x).map(|(t, x)| x * (w * t).sin()).sum::<f64>();
                 let whole = sine.iter().map(|s| s * s).sum::<f64>();
                 tone / whole * (half.sin() / half).powi(2)
             };
             assert!(amplitude(&sine) < 0.998);
-            // the next term of the series, (Ωh)⁶/1600: 5e-6 at 3.5 Hz, and the two ends
+            // the next term of the series is (Ωh)⁶/1600, 5e-6 at 3.5 Hz; the two ends add to it
             assert!((amplitude(&smooth(&time, &sine)) - 1.0).abs() < 2e-5, "{f}");
         }
     }

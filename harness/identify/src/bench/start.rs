@@ -1,5 +1,5 @@
-//! Starts from the data: frequency response, three poles and two zeros, and from these the tank, the
-//! inertia and the friction ([`translate`]). The tank is the upright cylinder whose first mode has this frequency and mass.
+//! Start values from the data. The frequency response is fitted with three poles and two zeros, which give the tank, the inertia
+//! and the friction ([`translate`]). The tank is the upright cylinder whose first mode has this frequency and mass.
 
 use std::f64::consts::{PI, TAU};
 
@@ -22,16 +22,16 @@ use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS};
 pub struct Response {
     pub slosh_frequency: f64,
     pub slosh_damping: f64,
-    /// Frequency of the transfer function's pair of poles, which is the resonance, Hz.
+    /// Resonance frequency, Hz: frequency of the complex pole pair of the transfer function.
     pub resonance_frequency: f64,
     pub slosh_mass: f64,
     /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
-    /// Share of the measured response that the fitted transfer function explains, %.
+    /// Fraction of the measured response that the fitted transfer function explains, %.
     pub fit: f64,
 }
 
-/// Fits a hub with one slosh mode and viscous friction b, as three poles and two zeros, to a measured response.
+/// Computes a hub with one slosh mode and viscous friction b from the three poles and two zeros that fit a measured response.
 ///
 /// ```text
 /// Ω/τ = (b2 s² + b1 s + b0)/(s³ + a2 s² + a1 s + a0),   μ = m r²/I0
@@ -39,8 +39,8 @@ pub struct Response {
 /// a0 = ω² b/I0,  a1 = ω²(1 + μ) + 2ζω b/I0,  a2 = b/I0 + 2ζω(1 + μ)
 /// ```
 ///
-/// (thesis 6.7, corrected). The six coefficients are functions of five unknowns, so that a2 follows from the others. `None` if no
-/// such hub has these coefficients, or if the slosh is not within the measured band.
+/// (thesis 6.7, corrected). The six coefficients are functions of five unknowns, so that a2 follows from the others. Returns
+/// `None` if no such hub has these coefficients, or if the slosh frequency is outside the measured band.
 pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let model = TransferFunction::fit(measured)?;
     let ([b2, b1, b0], [_, a1, a0]) = (model.numerator, model.denominator());
@@ -65,16 +65,16 @@ pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
     tank_of_first_mode(length, mass, bench.density)
 }
 
-/// Returns the bench that the frequency response shows, and starts from the data, the likeliest first. If the response shows no
-/// slosh, it is `None` and there is one start. The further starts are for recordings in which the first leads to no minimum. They
-/// come from the response's antiresonance and resonance, from the balance of torques in parts of the band (because a slew's
-/// torque has its power far below the slosh), and from the FMU as it is set up.
+/// Estimates the bench from the frequency response of the recordings, and returns it with start values, the likeliest first. If
+/// the response shows no slosh, the bench is `None`, and there is one start. The further starts are used if the first leads to no
+/// minimum. They come from the antiresonance and resonance of the response, from the torque balance in parts of the band (because
+/// a slew's torque has its power far below the slosh frequency), and from the FMU's settings.
 pub fn from_data(
     recordings: &[Recording],
     nominal: &Nominal,
 ) -> Result<(Option<Response>, Vec<Start>)> {
     let bench = nominal.bench;
-    // a part of a slow sweep excites little; the others tell
+    // a recording that excites little has no response; the others suffice
     let (measured, failed): (Vec<_>, Vec<_>) =
         recordings.iter().map(response).partition(Result::is_ok);
     if measured.is_empty() {
@@ -83,7 +83,7 @@ pub fn from_data(
     let both = |m: FrequencyResponse| [translate(&m, bench), from_features(&m, bench)];
     let mut responses: Vec<Response> =
         measured.into_iter().flatten().flat_map(both).flatten().collect();
-    // a step may have a response by chance: one with the inertia of the bench comes first
+    // a response by chance, as from a step, has an implausible inertia and comes last
     let key = |r: &Response| (!plausible::is_size(r.inertia, nominal.inertia), -r.fit);
     responses.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
     let rough = friction(recordings);
@@ -117,15 +117,13 @@ fn balances(
     found.into_iter().map(|(_, response)| response).collect()
 }
 
-/// Returns the lowest and the highest frequency, Hz, between which the torque of a recording has
-/// its power.
+/// Returns the lowest and the highest frequency, Hz, between which the torque of a recording has its power.
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
     let (step, torque, rate) = recording.even().ok()?;
     excited_band(step, &torque, &rate)
 }
 
-/// Returns frequency bands of two octaves between `low` and `high`, Hz. Each band begins one octave
-/// above the one before.
+/// Returns frequency bands of two octaves between `low` and `high`, Hz. Each band begins one octave above the band before it.
 fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
     let count = ((high / low).log2() as u32).saturating_sub(1);
     (0..count).map(|k| low * f64::from(1u32 << k)).map(|f| (f, 4.0 * f)).collect()
@@ -170,17 +168,18 @@ impl Response {
     }
 }
 
-/// Estimates the slosh mode from the balance of the torques T in the frequency domain, with the *measured* rate W:
+/// Estimates the slosh mode from the torque balance in the frequency domain, with the spectra T of the torque and W
+/// of the *measured* rate:
 ///
 /// ```text
 /// T = jΩ I0 W + jΩ m r² G(Ω) W + b W + c S − δ jΩ T,   G = (ω² + 2jζωΩ)/(ω² − Ω² + 2jζωΩ)
 /// ```
 ///
-/// S is the spectrum of the rate's sign, and δ a delay, which also absorbs the effect of dry friction on the phase and is not
-/// used further. The unknowns are linear except the slosh frequency ω and the damping ratio ζ, which are taken from a grid. The
-/// residual is divided by |jΩ(I0 + m r² G)|, which makes it a rate. Because nothing is simulated, the lines of a multisine make
-/// no false minima; because dry friction is a term, its loss at small amplitudes is not taken for damping. The result has the root
-/// mean square of the residual over the root mean square of the hub's rate, and the bench.
+/// S is the spectrum of the rate's sign. δ is a delay, which also absorbs the effect of dry friction on the phase and is not used
+/// further. The equation is linear in the unknowns except the slosh frequency ω and the damping ratio ζ, which are taken from a
+/// grid. The residual is divided by |jΩ(I0 + m r² G)|, which makes it a rate. Because nothing is simulated, the lines of a
+/// multisine cause no false minima. Because the equation contains dry friction, its loss at small amplitudes is not taken for
+/// damping of the slosh. Returns the root mean square of the residual divided by that of the hub's rate, and the bench.
 fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<(f64, Response)> {
     let (step, torque, rate) = recording.even().ok()?;
     let n = rate.len();
@@ -188,20 +187,20 @@ fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<(f64
     let noise = recording.rate_noise();
     let signs: Vec<f64> = rate.iter().map(|w| ((w - mean) / (3.0 * noise)).tanh()).collect();
     let transform = Forward::new(n);
-    // Hann's window: what happened before the record and after it does not leak
+    // Hann window, so that the motion before and after the recording does not leak
     let window = |k: usize| 1.0 - (TAU * k as f64 / n as f64).cos();
     let spectrum = |x: &[f64]| transform.transform((0..n).map(|k| x[k] * window(k)).collect());
     let (t, w, s) = (spectrum(&torque), spectrum(&rate), spectrum(&signs));
     let width = 1.0 / (n as f64 * step);
     let (first, last) = ((0.9 * band.0 / width) as usize, (1.1 * band.1 / width) as usize);
-    // lines with more than noise in them
+    // only lines above the noise
     let floor = 9.0 * noise.powi(2) * 1.5 * n as f64;
     let lines: Vec<usize> =
         (first.max(1)..last.min(w.len() - 1)).filter(|&k| w[k].norm_sqr() > floor).collect();
     if lines.len() < 30 {
         return None;
     }
-    // some 1500 of them say it as well
+    // 1500 lines are enough
     let lines: Vec<usize> = lines.iter().copied().step_by((lines.len() / 1500).max(1)).collect();
     let all: f64 = lines.iter().map(|&k| w[k].norm_sqr()).sum();
     let try_mode = |frequency: f64, damping: f64, before: (f64, f64)| {
@@ -266,14 +265,14 @@ fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<(f64
     best.filter(|(residual, _)| *residual < 0.3)
 }
 
-/// Returns a start from antiresonance, resonance and the inertia at the band's ends, for recordings that the transfer function
-/// does not fit (large amplitudes bend its peak). Without viscous friction b, the resonance ω_p and the antiresonance ω satisfy
-/// ω_p² = ω²(1 + m r²/I0).
+/// Returns a start from antiresonance, resonance and the inertia at both ends of the band, for recordings that the transfer
+/// function does not fit because large amplitudes distort the resonance peak. Without viscous friction, the resonance ω_p and the
+/// antiresonance ω satisfy ω_p² = ω²(1 + m r²/I0).
 fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let features = Features::find(measured);
     let (f, fp) = (features.f_dip?, features.f_res?);
     let ratio = (fp / f).powi(2) - 1.0;
-    // far from both, Ω/τ = (ω² − Ω²)/(jΩ I0 (ω_p² − Ω²))
+    // far from resonance and antiresonance, Ω/τ = (ω² − Ω²)/(jΩ I0 (ω_p² − Ω²))
     let inertias: Vec<f64> = measured
         .frequency
         .iter()
@@ -293,11 +292,11 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
 }
 
 /// Returns a start of the friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩ + δ⟨τ'ω⟩, with the friction
-/// torque T and a delay δ. The delay is needed because torque and rate are nearly a quarter of a cycle apart, so that a small
-/// delay looks like power. After least squares for δ, the median of T over the windows is shared among b, c and d at the speeds
-/// of the recording; in most windows the liquid takes as much power as it gives.
+/// torque T and a delay δ. The delay is needed because torque and rate are nearly 90° out of phase, so that a small delay looks
+/// like power. First δ is estimated by least squares, then T as the median over the windows, because the liquid takes as much
+/// power as it gives back in most of them. T is divided into b, c and d for the speeds of the recording.
 fn friction(recordings: &[Recording]) -> Start {
-    // power and τ'ω over |ω|, and |ω|
+    // [power, mean of τ'ω, mean of |ω|], the first two divided by the third
     let mut windows: Vec<[f64; 3]> = Vec::new();
     for r in recordings {
         let width = ((20.0 / r.step()) as usize).max(3);
@@ -323,7 +322,7 @@ fn friction(recordings: &[Recording]) -> Start {
     let torque = median(&torques).unwrap_or(1e-3);
     let middle = median(&speeds).unwrap_or(1e-2);
     let fastest = quantile(&speeds, 0.99).unwrap_or(1e-2);
-    // the peak of a sine is π/2 times its mean
+    // the peak of a sine is π/2 times its mean absolute value
     let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
     let (c, stribeck) = (0.55 * torque, 0.35 * torque);
     Start { zeta: 0.003, b, c, stribeck, omega_s, ..Start::default() }
@@ -338,14 +337,12 @@ mod tests {
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 
-    /// The start values of a fit, computed from poles and zeros of the bench's exact frequency response, equal the
-    /// parameters of the bench.
     #[test]
     fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
         let measured =
             Linear::bench_10_cm(0.002_975_7).frequency_response(&logarithmic_grid(BAND, 1200));
         let found = translate(&measured, BENCH).unwrap();
-        // the table of physics: 10 cm of water in a cylinder of 163 mm
+        // the value of the book's table of physics: 10 cm of water in a cylinder of 163 mm diameter
         assert!((found.slosh_frequency / 2.343_618_143_1 - 1.0).abs() < 1e-6, "{found:?}");
         assert!((found.slosh_mass / 0.756_293_271_9 - 1.0).abs() < 1e-4, "{found:?}");
         assert!((found.slosh_damping / 0.002_975_7 - 1.0).abs() < 1e-4, "{found:?}");

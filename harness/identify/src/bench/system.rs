@@ -1,14 +1,15 @@
-//! The FMU of the bench as a system.
+//! The FMU of the bench as a system that the engine can fit.
 //!
-//! The unknowns of the search are the numbers that a recording shows: length l and mass ratio μ = m r²/J of the first slosh mode,
-//! its damping ratio, and the inertia J that turns with the hub without the mass m of this mode. The FMU takes them as a table of
-//! modes. Diameter d and filling height h of the tank and inertia I of the hub are computed from draws of the unknowns:
+//! The unknowns of the search are the quantities that a recording determines: pendulum length l and mass ratio μ = m r²/J of the
+//! first slosh mode, its damping ratio, and the inertia J that turns with the hub without the mass m of this mode. The FMU
+//! receives them as a table of modes. Diameter d and filling height h of the tank and inertia I of the hub are computed from
+//! draws of the unknowns:
 //!
 //! ```text
 //! m = μ J/r²,  d⁴ = 8ξ²(ξ² − 1) l m/(π ρ),  T = d/(2ξ l) = tanh(2ξ h/d),  I = J − r² (ρ π d² h/4 − m)
 //! ```
 //!
-//! They are not the unknowns themselves because the likelihood has a long bent valley in d, h and I: in a deep tank T hardly
+//! d, h and I themselves are not the unknowns, because the likelihood has a long bent valley in them: in a deep tank T hardly
 //! depends on h. However, if tank, hub or modes are set or known, the FMU's own parameters are the unknowns.
 
 use std::borrow::Cow;
@@ -30,10 +31,10 @@ use crate::input::recording::Recording;
 pub enum Target {
     Parameter(String),
     Initial(usize, String),
-    /// Length l of the first mode's pendulum, m.
+    /// Length l of the pendulum that is equivalent to the first mode, m.
     Length,
     MassRatio,
-    /// Inertia J that turns with the hub without the first mode's mass, kg·m².
+    /// Inertia J that turns with the hub, without the mass of the first mode, kg·m².
     Inertia,
     Zeta,
     Delay,
@@ -42,12 +43,12 @@ pub enum Target {
     GyroLag,
     FrictionDrift,
     GyroScale,
-    /// Bias of the gyro: its reading at rest, rad/s.
+    /// Bias of the gyro, rad/s: its reading at rest.
     GyroBias,
-    /// Offset of the encoder: its reading at the hub's angle 0, rad.
+    /// Offset of the encoder, rad: its reading at the hub angle 0.
     AngleOffset,
-    /// Asymmetry of the dry friction of a hub that turns only one way. The search has the friction c and d in this direction; the
-    /// asymmetry converts them to the mean of both directions.
+    /// Asymmetry of the dry friction of a hub that turns only one way. The search determines the friction c and d in this
+    /// direction; the asymmetry converts them to the mean of both directions.
     Asymmetry,
     /// Scale of the torque: the acting torque divided by the recorded torque.
     Torque,
@@ -56,17 +57,17 @@ pub enum Target {
     Gravity,
     Arm,
     Density,
-    /// Difference between the largest torque command and the torque at which the actuator
-    /// saturates, over the largest command.
+    /// Relative difference of the largest torque command and the torque at which the actuator saturates:
+    /// 1 − saturation/largest command.
     Limit,
-    /// Compliance of the bearing, rad/(N·m): the elastic twist over the torque before it slips.
+    /// Compliance of the bearing, rad/(N·m): the elastic twist divided by the torque, before it slips.
     Compliance,
     SecondMode,
-    Besides(usize),
+    ProportionalTorque(usize),
 }
 
 pub struct Row {
-    /// Time from the recording's first row, s.
+    /// Time since the first row of the recording, s.
     pub time: f64,
     pub torque: f64,
     pub angle: f64,
@@ -74,31 +75,35 @@ pub struct Row {
     pub slosh_angle: f64,
 }
 
-/// A torque that is proportional to a quantity of the motion, with the unit of its factor.
-pub struct Besides {
+/// An additional torque that is proportional to a quantity of the motion, with the unit of its factor.
+pub struct ProportionalTorque {
     pub follows: &'static str,
     pub unit: &'static str,
-    /// The torque in one row of the recording if its factor is 1.
+    /// The torque in one row of the recording for a factor of 1.
     pub torque: fn(&Row) -> f64,
 }
 
-/// Torques that may act on a bench and that the models lack.
-pub const BESIDES: [Besides; 7] = [
-    Besides { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
-    Besides {
+/// Additional torques that may act on a bench and that the FMU does not model.
+pub const ADDITIONAL_TORQUES: [ProportionalTorque; 7] = [
+    ProportionalTorque { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
+    ProportionalTorque {
         follows: "the rate's square against the motion",
         unit: "N.m.s2/rad2",
         torque: |row| row.rate * row.rate.abs(),
     },
-    Besides { follows: "the angle", unit: "N.m/rad", torque: |row| row.angle },
-    Besides {
+    ProportionalTorque { follows: "the angle", unit: "N.m/rad", torque: |row| row.angle },
+    ProportionalTorque {
         follows: "the angle's square",
         unit: "N.m/rad2",
         torque: |row| row.angle * row.angle,
     },
-    Besides { follows: "the slosh angle", unit: "N.m/rad", torque: |row| row.slosh_angle },
-    Besides { follows: "time", unit: "N.m/s", torque: |row| row.time },
-    Besides {
+    ProportionalTorque {
+        follows: "the slosh angle",
+        unit: "N.m/rad",
+        torque: |row| row.slosh_angle,
+    },
+    ProportionalTorque { follows: "time", unit: "N.m/s", torque: |row| row.time },
+    ProportionalTorque {
         follows: "the commanded torque's square with its sign",
         unit: "1/(N.m)",
         torque: |row| row.torque * row.torque.abs(),
@@ -118,11 +123,11 @@ pub struct BenchSystem<'a> {
     pub base: OnceLock<Vec<Motion>>,
 }
 
-/// Largest T = tanh(2ξ h/d) from which a filling height is computed: the liquid is then 1.7 diameters deep.
+/// Largest T = tanh(2ξ h/d) from which a filling height is computed. The height is then 1.7 diameters.
 const DEEPEST: f64 = 0.999_99;
 
-/// Returns the diameter d and the fill h of the tank and the inertia I of the hub that have this first mode and this
-/// total inertia J; `None` if there is no such tank and hub.
+/// Returns the diameter d and filling height h of the tank and the inertia I of the hub for this first mode and this total
+/// inertia J; `None` if no tank and hub have these properties.
 fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3]> {
     let xi = XI[0];
     let d = diameter(length, mass, bench);
@@ -132,7 +137,7 @@ fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3
     (hub > 0.0).then_some([d, h, hub])
 }
 
-/// Returns the diameter d of a tank whose first mode has this length and mass, m.
+/// Returns the diameter d, m, of a tank whose first mode has this pendulum length and mass.
 fn diameter(length: f64, mass: f64, bench: Bench) -> f64 {
     let xi = XI[0];
     (8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (PI * bench.density)).powf(0.25)
@@ -149,7 +154,7 @@ impl BenchSystem<'_> {
         Bench { arm: arm * of(&Target::Arm), density: density * of(&Target::Density), gravity }
     }
 
-    /// Returns length (m) and mass (kg) of the first mode, and the inertia J (kg·m²), if they are unknowns.
+    /// Returns the pendulum length (m) and mass (kg) of the first mode, and the inertia J (kg·m²), if they are unknowns.
     fn mode(&self, values: &[f64]) -> Option<[f64; 3]> {
         let of = |target: Target| self.value(values, &target);
         let (length, ratio) = of(Target::Length).zip(of(Target::MassRatio))?;
@@ -157,11 +162,11 @@ impl BenchSystem<'_> {
         Some([length, ratio * inertia / self.bench(values).inertia(1.0), inertia])
     }
 
-    /// Returns the torques of [`BESIDES`] that are not 0, summed, in each row of a recording, N·m; `None` if all are 0.
-    fn besides(&self, values: &[f64], recording: usize) -> Option<Vec<f64>> {
+    /// Returns the sum of the additional torques ([`ADDITIONAL_TORQUES`]) in each row of a recording, N·m; `None` if all are 0.
+    fn additional_torque(&self, values: &[f64], recording: usize) -> Option<Vec<f64>> {
         let base = self.base.get()?;
         let size = |(target, value): (&Target, &f64)| match target {
-            Target::Besides(kind) if *value != 0.0 => Some((*kind, *value)),
+            Target::ProportionalTorque(kind) if *value != 0.0 => Some((*kind, *value)),
             _ => None,
         };
         let sizes: Vec<_> = self.targets.iter().zip(values).filter_map(size).collect();
@@ -177,7 +182,7 @@ impl BenchSystem<'_> {
                 rate: motion.outputs[0][k],
                 slosh_angle: motion.others[0][k],
             };
-            sizes.iter().map(|(kind, size)| size * (BESIDES[*kind].torque)(&row)).sum()
+            sizes.iter().map(|(kind, size)| size * (ADDITIONAL_TORQUES[*kind].torque)(&row)).sum()
         };
         Some((0..recorded.time.len()).map(torque).collect())
     }
@@ -203,7 +208,7 @@ impl System for BenchSystem<'_> {
             set(slosh::MODES, "2");
         }
         if let Some([length, mass, inertia]) = self.mode(values) {
-            // of a deep cylinder the second mode's mass is 3 % of the first's
+            // the second mode's mass in a deep cylinder is 3 % of the first mode's
             let other = second * 0.03 * mass;
             set(slosh::SOURCE, SloshSource::Table.name());
             let modes = [(1, length, mass), (2, length * XI[0] / XI[1], other)];
@@ -237,8 +242,8 @@ impl System for BenchSystem<'_> {
                 _ => {}
             }
         }
-        let besides = self.besides(values, recording);
-        effects.torque = besides.as_deref();
+        let additional = self.additional_torque(values, recording);
+        effects.torque = additional.as_deref();
         let torque = of(Target::Torque, 1.0);
         let (clock, gravity) = (of(Target::Clock, 1.0), of(Target::Gravity, 1.0));
         let all = &self.recordings[recording];

@@ -1,4 +1,4 @@
-//! Writes the verdict on a bench: sentences on slosh model, friction, fit and estimates.
+//! Writes the verdict on a bench: sentences about slosh model, friction, fit and estimates.
 
 use std::collections::BTreeMap;
 
@@ -22,10 +22,10 @@ pub struct Question<'a> {
 pub struct Findings {
     pub torque: Option<String>,
     pub tests: Vec<Tests>,
-    /// True if the residual shows that effects are missing which were not estimated.
+    /// True if the residual shows an effect that was not estimated.
     pub asks: bool,
     pub alike: Vec<String>,
-    /// The torque that the model lacks, if it is the cause.
+    /// The additional torque that the model lacks, if it is the cause of a misfit.
     pub missing: Vec<Missing>,
     pub cause: Option<Cause>,
     pub doubts: Vec<String>,
@@ -38,8 +38,8 @@ impl Findings {
     }
 }
 
-/// Returns the sentences of the verdict. Each answers one question: which slosh model, which friction, whether it fits, which
-/// estimates are determined and which are not.
+/// Returns the sentences of the verdict: the slosh model, the friction, whether the model fits, and
+/// which estimates are determined.
 pub fn words(
     question: &Question,
     findings: &Findings,
@@ -57,7 +57,7 @@ pub fn words(
         reasons.extend(findings.missing.iter().map(Missing::words));
         reasons.extend(findings.doubts.iter().cloned());
         if reasons.is_empty() {
-            reasons.push("it asks for an effect that is not estimated".into());
+            reasons.push("it shows an effect that is not estimated".into());
         }
         lines.push(format!(
             "{DOES_NOT_FIT}: no model leaves only the gyro's noise as residual ({}). Values and intervals are those of the \
@@ -109,7 +109,8 @@ pub fn words(
     lines
 }
 
-/// Returns the sentence about a misfit without a known cause: where it is, and which effects the recording cannot distinguish.
+/// Returns the sentence about a misfit with an unknown cause: where the residual is large, and which effects
+/// the recording cannot distinguish.
 fn unknown_cause(findings: &Findings, fit: &ModelFit) -> String {
     let worst = |test: fn(&Tests) -> (f64, f64)| {
         let all = fit.tests.iter().map(test);
@@ -165,7 +166,7 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
                     other.friction, first.friction
                 )
             }
-            // what the other has more counts ln N a parameter; without that they are alike
+            // BIC counts ln N for each further unknown; without this term both laws are equally good
             _ if first.deviance - other.deviance > -DECIDES => format!(
                 "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is used.",
                 other.friction, first.friction
@@ -179,8 +180,8 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
     laws[1..].iter().map(one).collect()
 }
 
-/// Returns the probabilities of models with these information criteria, if all are equally probable beforehand: exp(−BIC/2) over
-/// the sum of these (Kass and Raftery 1995).
+/// Returns the probabilities of models with these values of BIC, if all are equally probable beforehand: exp(−BIC/2) divided by
+/// the sum over all models (Kass and Raftery 1995).
 pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let least = bic.clone().fold(f64::INFINITY, f64::min);
     let weights: Vec<f64> = bic.map(|b| (-(b - least) / 2.0).exp()).collect();

@@ -246,7 +246,7 @@ impl Fit<'_> {
 
 impl Derived {
     /// Returns true if there are enough draws for quantiles.
-    pub fn is_told(&self) -> bool {
+    pub fn has_enough_draws(&self) -> bool {
         self.columns.first().is_some_and(|column| column.len() >= FEWEST)
     }
 

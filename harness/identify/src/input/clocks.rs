@@ -1,19 +1,19 @@
-//! Signals that are sampled by different clocks, in one table: which rows have a measured value of a signal, and what fills the other rows.
+//! Signals with different sampling clocks in one table: marks the rows in which a signal was measured, and interpolates its
+//! values in the other rows.
 //!
-//! The rows of a recording are all instants at which something was measured. Where a sensor has no value, it is not compared with the
-//! model; a torque without a value is interpolated between its own samples. The filled-in values are used only for spectra and plots.
+//! The rows of a recording are all the instants at which any signal was measured. In rows without a value of a sensor, the fit
+//! does not compare the model with this sensor; a missing torque is interpolated between its own samples. Interpolated values of
+//! sensors are used only for spectra and plots.
 
 use std::f64::consts::PI;
 
 use crate::tuning::{FINE_TORQUE, KERNEL_HALF, LOST_SPACING, UNEVEN};
 
-/// Values of a signal at all rows, and for each row whether the value was measured there; `None` if
-/// all were.
+/// Values of a signal at all rows, and for each row whether the value was measured there; `None` if every value was measured.
 pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
 
-/// Completes values that are NaN in rows without a value.
-///
-/// A missing value is taken from the cubic through the four nearest values or, if some of these were lost, from a line.
+/// Replaces the NaN values of rows in which the signal was not measured. A missing value is taken from the cubic through the four
+/// nearest values or, if samples among these were lost, from a straight line.
 pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     let there: Vec<bool> = values.iter().map(|v| !v.is_nan()).collect();
     if there.iter().all(|there| *there) {
@@ -45,7 +45,7 @@ pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     (filled.collect(), Some(there))
 }
 
-/// Returns the median of the times between rows, s.
+/// Returns the median time between rows, s.
 pub fn usual(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len().saturating_sub(1) / 2;
@@ -56,14 +56,14 @@ pub fn usual(time: &[f64]) -> f64 {
     }
 }
 
-/// Returns true if all times between rows equal their mean within a small tolerance.
+/// Returns true if the times are evenly spaced within a small tolerance.
 pub fn is_even(time: &[f64]) -> bool {
     let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     time.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < UNEVEN * step)
 }
 
-/// Returns a signal at a time, on the line between two rows. `row` is the row before this time; it only grows from call to call,
-/// so that the times must grow.
+/// Returns a signal at time `t` by linear interpolation. `row` is the row before `t`, which the function only increases, so that
+/// successive calls need increasing times.
 pub fn on_line(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
     while *row + 2 < time.len() && time[*row + 1] <= t {
         *row += 1;
@@ -86,9 +86,9 @@ fn through(nodes: &[usize], time: &[f64], values: &[f64], at: f64) -> f64 {
     weights(&times, at).iter().zip(nodes).map(|(weight, k)| weight * values[*k]).sum()
 }
 
-/// Returns instants and values of a band-limited torque that are close enough to be joined by lines: the samples themselves
-/// unless they are coarse. Evenly spaced samples are interpolated by a windowed sinc, with samples beyond the ends mirrored at
-/// the end points; unevenly spaced samples are interpolated by cubics.
+/// Returns instants and values of a band-limited torque at a spacing at which linear interpolation is accurate; samples that are
+/// dense enough are returned unchanged. Coarse, evenly spaced samples are interpolated by a windowed sinc, with samples beyond
+/// the ends mirrored at the end points; unevenly spaced samples are interpolated by cubics.
 pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
@@ -128,8 +128,8 @@ pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (fine_time, fine)
 }
 
-/// Returns the interpolation kernel at a distance of `x` samples: the sinc function times a Kaiser
-/// window with side lobes of −80 dB.
+/// Returns the interpolation kernel at a distance of `x` samples: the sinc function times a Kaiser window whose side lobes
+/// are at −80 dB.
 fn kernel(x: f64) -> f64 {
     let shape = 0.1102 * (80.0 - 8.7);
     let bessel = |z: f64| {
@@ -151,8 +151,8 @@ fn kernel(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A gyro gives a reading in every third row; the other rows are NaN. These rows are interpolated, and rows with
-    /// readings are marked.
+    /// The gyro has a value in every third row and NaN in the others. The NaN values are interpolated, and the rows with
+    /// measured values are marked.
     #[test]
     fn readings_of_a_slow_gyro_are_interpolated_and_measured_rows_are_marked() {
         let time: Vec<f64> = (0..2000).map(|k| 0.02 * f64::from(k)).collect();
@@ -175,7 +175,7 @@ mod tests {
         let (fine, found) = refined(&time, &time.iter().map(|t| sine(*t)).collect::<Vec<_>>());
         assert_eq!(fine.len(), 5 * 599 + 1);
         let off = fine.iter().zip(&found).map(|(t, y)| (t, (y - sine(*t)).abs()));
-        // but for the ends, where the kernel has only half its samples
+        // without the ends, where the kernel has samples on one side only
         let inner = off.filter(|(t, _)| (3.0..56.0).contains(*t));
         assert!(inner.map(|(_, off)| off).fold(0.0, f64::max) < 1e-3);
     }

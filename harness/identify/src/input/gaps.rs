@@ -1,11 +1,11 @@
-//! Gaps in which no torque was recorded. A gap is filled if the torque around it predicts it; otherwise the recording is cut
-//! there.
+//! Gaps in which no torque was recorded. A gap is filled if the torque around it predicts the missing samples; otherwise the
+//! recording is cut there.
 //!
-//! A torque of limited bandwidth that is sampled often is predictable over a gap: an autoregressive model of the samples on
-//! either side, forwards and backwards, gives the missing samples by least squares (Janssen, Veldhuis & Vries, IEEE Trans. ASSP
-//! 34, 1986). Trials show whether the prediction is good enough: the same number of samples is removed in places where all are
-//! known, and filled. An error of the torque is a kick of the hub, ∫Δτ dt/I, which rings in the liquid for a thousand rows; it
-//! must be small against the gyro's noise.
+//! A band-limited torque that is sampled densely is predictable over a gap: an autoregressive model is fitted to the samples on
+//! both sides, and its forward and backward equations give the missing samples by least squares (Janssen, Veldhuis & Vries, IEEE
+//! Trans. ASSP 34, 1986). The accuracy is estimated by trials: as many known samples are removed at other places, and predicted.
+//! An error Δτ of the torque changes the rate of the hub by ∫Δτ dt/I, and the liquid then oscillates for a thousand rows;
+//! therefore this change must be small against the gyro's noise.
 
 use std::collections::BTreeMap;
 
@@ -23,8 +23,8 @@ use crate::tuning::{
 /// the missing samples is fitted.
 const GAP_SIDE: usize = 8 * GAP_ORDER;
 
-/// Fills the gaps that can be filled, and returns the rows before the other gaps, after which the recording has to be cut. `done`
-/// receives a sentence on each change.
+/// Fills the gaps whose torque can be predicted. Returns the last row before each other gap, where the recording has to be cut.
+/// `done` receives a sentence about each change.
 pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<usize>) {
     let knots = all.commands();
     let time: Vec<f64> = knots.iter().map(|k| all.time[*k]).collect();
@@ -59,13 +59,13 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
         let count: usize = filled.iter().map(|(_, values)| values.len()).sum();
         let longest = filled.iter().map(|(n, _)| span(*n)).fold(0.0, f64::max);
         done(format!(
-            "{}: {count} samples of tau_cmd are missing in {} gaps of up to {longest:.2} s; the others foretell them well enough \
-             (trial fillings elsewhere), and omega is not fitted there",
+            "{}: {count} samples of tau_cmd are missing in {} gaps of up to {longest:.2} s; the other samples predict them well enough \
+             (tested at other places), and omega is not fitted there",
             all.name,
             filled.len()
         ));
     }
-    // where the recording is cut: parts must be long enough, or the gap too long for a line
+    // the recording is cut at a gap if the parts are long enough, or if the gap is too long for a straight line
     let mut cuts = Vec::new();
     let few = left.len() <= FEW_GAPS;
     let end = time[time.len() - 1];
@@ -82,7 +82,7 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     let joined = left.iter().filter(|n| !cuts.contains(n)).count();
     if joined > 0 && is_even {
         done(format!(
-            "{}: tau_cmd is missing for up to {LONGEST_LINE} s in {joined} places and cannot be foretold; lines join it, which may \
+            "{}: tau_cmd is missing for up to {LONGEST_LINE} s in {joined} places and cannot be predicted; it is interpolated linearly, which may \
              be wrong",
             all.name
         ));
@@ -91,8 +91,8 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     with_rows(all, &knots, filled, cuts)
 }
 
-/// Returns the samples of the torque before gap `n`, from the gap before it on, at most [`GAP_SIDE`]; `after` returns the samples
-/// on the other side.
+/// Returns at most [`GAP_SIDE`] samples of the torque before gap `n`, but none before the preceding gap; `after` returns the
+/// samples on the other side.
 fn before<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     let from = gaps.iter().filter(|gap| **gap < n).max().map_or(0, |gap| gap + 1);
     &values[from.max((n + 1).saturating_sub(GAP_SIDE))..=n]
@@ -103,8 +103,8 @@ fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     &values[n + 1..to.min(n + 1 + GAP_SIDE)]
 }
 
-/// Estimates the error of filling a gap of `lost` samples by trials: known samples in other places are removed and filled, and the result
-/// is the root mean square of their summed errors. It is infinite if no trial is possible.
+/// Estimates the error of filling a gap of `lost` samples by trials: known samples in other places are removed and predicted.
+/// Returns the root mean square of the summed errors, infinite if no trial is possible.
 fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     let side = 4 * GAP_ORDER;
     let room = values.len().saturating_sub(2 * side + lost);
@@ -113,7 +113,7 @@ fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
         let from = side + (trial * 2 + 1) * room / (8 * GAP_TRIALS);
         let (first, to) =
             (from.saturating_sub(GAP_SIDE), (from + lost + GAP_SIDE).min(values.len()));
-        // gap g is between g and g + 1
+        // gap g is between the samples g and g + 1
         if squares.len() >= GAP_TRIALS && trial % 4 != 0 {
             continue;
         }
@@ -135,8 +135,8 @@ fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     if squares.len() < GAP_TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
 }
 
-/// Predicts the `lost` samples of the torque between the samples on the `left` and on the `right`;
-/// `None` if these are too few.
+/// Predicts the `lost` samples of the torque between the samples on the `left` and on the `right`; `None` if these
+/// samples are too few.
 fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     let order = GAP_ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
     if order < 4 {
@@ -151,12 +151,12 @@ fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     let count = windows.len();
     let regressors = DMatrix::from_fn(count, order, |k, i| windows[k][i + 1] / size);
     let target = DVector::from_fn(count, |k, _| windows[k][0] / size);
-    // the samples of a smooth torque are nearly dependent: normal equations with a little weight on small coefficients
+    // regularised slightly, because the samples of a smooth torque are nearly linearly dependent
     let weight = 1e-9 * count as f64;
     let mut normal = regressors.tr_mul(&regressors);
     (0..order).for_each(|i| normal[(i, i)] += weight);
     let a = normal.cholesky()?.solve(&regressors.tr_mul(&target));
-    // equations that contain lost samples, all linear in these: forwards and backwards
+    // forward and backward equations that contain lost samples, in which they are linear
     let (n, p) = (lost, order);
     let known = [&left[left.len() - p..], &vec![0.0; n], &right[..p]].concat();
     let mut matrix = DMatrix::<f64>::zeros(2 * (n + p), n);
@@ -202,7 +202,7 @@ fn with_rows(
         let part = (to - from) / (values.len() + 1) as f64;
         for (j, value) in values.into_iter().enumerate() {
             let time = from + (j + 1) as f64 * part;
-            // a sensor may have gone on
+            // rows that another sensor recorded within the gap
             let near = all.time.partition_point(|row| *row < time - 0.01 * part);
             match all.time.get(near).filter(|row| (**row - time).abs() < 0.01 * part) {
                 Some(_) => rows[near].filled = Some(value),
@@ -224,10 +224,9 @@ mod tests {
         0.1 * (std::f64::consts::TAU * (1.5 + 0.005 * t) * t).sin()
     }
 
-    /// Gaps of 1, 10 and 50 samples in a sweep are filled from the samples on both sides, within 1e-4 of the amplitude;
-    /// gaps in noise are not.
+    /// Gaps of 1, 10 and 50 samples in a sweep are predicted within 1e-4 of the amplitude. Gaps in white noise are not filled.
     #[test]
-    fn lost_samples_of_a_sweep_are_predicted() {
+    fn lost_samples_of_a_sweep_are_predicted_and_those_of_noise_are_not() {
         let values: Vec<f64> = (0..4000).map(|k| sweep(100.0 + 0.02 * f64::from(k))).collect();
         for lost in [1, 10, 50] {
             let found = fill(&values[1000..1250], &values[1250 + lost..1500 + lost], lost).unwrap();
@@ -236,7 +235,7 @@ mod tests {
             assert!(worst < 1e-3 * 0.1, "{lost}: {worst:e}");
         }
         assert!(tried_out(&values, &[], 10) < 1e-4);
-        // one that jumps from row to row is not
+        // a torque that jumps from row to row is not predictable
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..4000).map(|_| 0.1 * random.normal()).collect();
         assert!(tried_out(&noise, &[], 10) > 0.1);

@@ -1,4 +1,4 @@
-//! First stage: recordings, questions and tolerances, read and checked before any FMU runs.
+//! Reads and checks recordings, questions and tolerances, before any FMU is simulated.
 
 pub mod clocks;
 pub mod gaps;

@@ -1,4 +1,5 @@
-/// Returns the items between commas. A comma in brackets separates nothing: `a,inertia[1,2]` has two items.
+/// Returns the items of a comma-separated list. A comma in brackets does not separate items:
+/// `a,inertia[1,2]` has two items.
 pub fn list(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0i32;
     let items = text.split(move |c| {

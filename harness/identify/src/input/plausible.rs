@@ -1,5 +1,5 @@
-//! Checks whether a recording is plausible for this bench: an inertia that only a wrong unit explains, and what additional columns show,
-//! for example the wheel's speed or rates about other axes.
+//! Checks whether a recording is plausible for this bench. Refuses an inertia that only a wrong unit explains, and evaluates
+//! additional columns, for example the wheel's speed or rates about other axes.
 
 use anyhow::{Result, bail};
 
@@ -8,10 +8,10 @@ use crate::tuning::WHEEL_WINDOW;
 use analysis::innovations;
 use analysis::statistics::{deviation, mean, median, noise_level};
 
-/// Returns true if an estimated inertia differs from the nominal one by less than a factor of 8. A
-/// larger factor means that a column was read in a wrong unit.
+/// Returns true if an estimated inertia differs from the nominal one by less than a factor of 8. A larger factor means that a
+/// column has a wrong unit.
 pub fn is_size(inertia: f64, nominal: f64) -> bool {
-    // revolutions per minute are a factor of 9.5
+    // the smallest factor of a wrong unit is 9.5, of revolutions per minute
     (0.125..8.0).contains(&(nominal / inertia))
 }
 
@@ -43,7 +43,8 @@ pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
     )
 }
 
-/// Returns what the wheel's speed and the rates about other axes show: notes for the reader, and doubts that no fit can remove.
+/// Evaluates the wheel's speed and the rates about other axes. Returns notes for the reader, and doubts, which are faults of the
+/// bench that no fit can correct.
 pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
     let (mut notes, mut doubts) = (Vec::new(), Vec::new());
     if let Some(speed) = &recording.wheel_speed {
@@ -53,7 +54,7 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
                 recording.name
             )),
             Actuator { inertia, missing: Some((from, seconds)) } => doubts.push(format!(
-                "{}: the wheel's speed (wheel.I = {inertia:.3e} kg·m²) does not go with tau_cmd for {seconds:.1} s, first \
+                "{}: the wheel's speed (wheel.I = {inertia:.3e} kg·m²) does not follow tau_cmd for {seconds:.1} s, first \
                  at {from:.1} s: the wheel did not give the commanded torque",
                 recording.name
             )),
@@ -83,13 +84,13 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
 
 struct Actuator {
     inertia: f64,
-    /// First time at which the speed does not follow the torque, s, and total duration of these times, s.
+    /// First time at which the wheel's speed does not follow the torque, and total duration of all these times, s.
     missing: Option<(f64, f64)>,
 }
 
 /// Compares the wheel's speed Ω with the torque τ over windows, in which I_w ΔΩ = −∫τ dt. The wheel's inertia I_w is the median
-/// over windows with a large change of speed. The torque is missing in windows that are off by more than a tenth of the largest
-/// change plus six standard deviations of the speed's noise.
+/// over windows with a large change of speed. The torque counts as missing in a window in which this equation is violated by more
+/// than a tenth of the largest change plus six standard deviations of the speed's noise.
 fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
     let width = ((WHEEL_WINDOW / recording.step()) as usize).max(2);
     let noise = noise_level(speed);
@@ -99,7 +100,7 @@ fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
         let areas = (0..width).map(|i| 0.5 * (torque[i] + torque[i + 1]) * (time[i + 1] - time[i]));
         pairs.push((recording.time[k], areas.sum::<f64>(), speed[k] - speed[k + width]));
     }
-    // the median of the ratios of large windows: a saturated part does not move it
+    // median over large windows, so that a part with a saturated wheel does not change it
     let largest = pairs.iter().map(|p| p.2.abs()).fold(0.0, f64::max);
     let ratios: Vec<f64> = pairs
         .iter()
@@ -132,10 +133,10 @@ mod tests {
         Recording { wheel_speed: Some(speed), ..Recording::of("a", time, torque, rate) }
     }
 
-    /// The recorded acceleration of the wheel times its inertia equals the commanded torque, or only 5 % of the torque. In
-    /// the first case a note states the inertia, in the second case a warning says that the wheel did not give the torque.
+    /// In the first recording the wheel's acceleration times its inertia equals the commanded torque, and a note states the
+    /// inertia. In the second it equals 5 % of the torque, and a doubt says that the wheel did not give the torque.
     #[test]
-    fn a_wheel_that_gives_its_torque_shows_its_inertia_and_one_that_does_not_is_doubted() {
+    fn the_inertia_of_a_wheel_is_reported_if_it_gives_its_torque_and_otherwise_a_doubt() {
         let (notes, doubts) = columns(&wheel(1.0));
         assert!(notes[0].contains("wheel.I = 2.25") && doubts.is_empty(), "{notes:?} {doubts:?}");
         let (notes, doubts) = columns(&wheel(0.05));

@@ -1,4 +1,5 @@
-//! Input of an FMU's identification, as text and with the FMU's own names, units and bounds.
+//! The question of an FMU's identification: unknowns, priors, sensors and settings, read from text, with the FMU's own
+//! names, units and bounds.
 
 use std::str::FromStr;
 
@@ -13,15 +14,15 @@ use crate::input::tolerance::part;
 /// Suffix of the name of an unknown that has a separate value in each recording.
 pub const EACH: &str = "@each";
 
-/// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised, or the error of
-/// a scale, `scale(NAME)`.
+/// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: an unknown. It is a Real of the FMU that is set before
+/// initialisation, or a scale error, `scale(NAME)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
     pub name: String,
     /// True if the unknown has a separate value in each recording, for example an initial value.
     pub each: bool,
     pub start: f64,
-    /// Bounds; `None`: the FMU's min and max.
+    /// Bounds; `None` for the FMU's min and max.
     pub bounds: Option<(f64, f64)>,
 }
 
@@ -67,8 +68,8 @@ impl FromStr for Prior {
     }
 }
 
-/// `NAME=PART`, `NAME=PART%` or `NAME=NUMBER UNIT`: the standard deviation of a value that is known but not exact. PART is relative
-/// to the value, NUMBER is in the unit; `±NUMBER` is in the variable's own unit.
+/// `NAME=FRACTION`, `NAME=FRACTION%` or `NAME=NUMBER UNIT`: the standard deviation of a value that is known but not exact.
+/// FRACTION is relative to the value, NUMBER is in the unit; `±NUMBER` is in the variable's own unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
     /// Name of a variable, for all recordings or for one of them (`NAME@2`), or of a scale (`scale(NAME)`, see [`scaled`]).
@@ -98,17 +99,17 @@ impl FromStr for Tolerance {
     }
 }
 
-/// Returns the input, output or `time` whose scale an unknown of this name is: `scale(NAME)`.
+/// Returns the NAME of `scale(NAME)`: the input, output or `time` whose scale error is unknown. Returns `None` for other names.
 pub fn scaled(name: &str) -> Option<&str> {
     name.strip_prefix("scale(")?.strip_suffix(')')
 }
 
-/// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias that differs from recording to recording. STD is the standard deviation of its
-/// prior about 0; without it there is no prior.
+/// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias that differs from recording to recording. STD is the standard deviation of the
+/// bias, whose prior mean is 0; without STD the bias has no prior.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bias {
     pub output: String,
-    /// Standard deviation of the prior about 0; `None` without a prior.
+    /// Standard deviation of the bias, whose prior mean is 0; `None` without a prior.
     pub std: Option<f64>,
 }
 
@@ -128,9 +129,9 @@ impl FromStr for Bias {
     }
 }
 
-/// `A,B,C=SCALE:ANGLE`: three outputs ω_j read by one instrument with three axes. Its readings are y_i = Σ (δ_ij + M_ij) ω_j.
-/// SCALE is the standard deviation of the errors of scale, M_ii; ANGLE (rad) is the standard deviation of the misalignments,
-/// M_ij.
+/// `A,B,C=SCALE:ANGLE`: three outputs ω_j that are measured by one three-axis instrument with the readings y_i = Σ
+/// (δ_ij + M_ij) ω_j. SCALE is the standard deviation of the scale errors M_ii; ANGLE (rad) is the standard deviation
+/// of the misalignments M_ij.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triad {
     pub outputs: [String; 3],
@@ -156,11 +157,11 @@ impl FromStr for Triad {
     }
 }
 
-/// `NAME=VALUE` or, for the second recording only, `NAME@2=VALUE`.
+/// A setting `NAME=VALUE` or, for the second recording only, `NAME@2=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     pub name: String,
-    /// The recording, from 0; `None`: all.
+    /// Index of the recording; `None` for all recordings.
     pub recording: Option<usize>,
     pub value: String,
 }
@@ -184,8 +185,8 @@ impl FromStr for Setting {
 }
 
 impl Setting {
-    /// Returns the name and the value. The name has the number of the recording if the setting is for one recording only
-    /// (`NAME@2`).
+    /// Returns the name and the value. If the setting is for one recording only, the name includes the number
+    /// of the recording (`NAME@2`).
     pub fn named(&self) -> (String, String) {
         let name = match self.recording {
             None => self.name.clone(),
@@ -198,7 +199,7 @@ impl Setting {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
     Own,
-    /// The solver of the host integrates the FMU (Model Exchange) with this relative tolerance.
+    /// The host's solver integrates the FMU (Model Exchange) with this relative tolerance.
     Host(f64),
 }
 
@@ -206,27 +207,27 @@ pub enum Solver {
 pub struct Question {
     pub free: Vec<Free>,
     pub priors: Vec<Prior>,
-    /// Tolerances of known values: they are unknowns with a prior, but are not reported as estimates.
+    /// Tolerances of known values. In the fit these values are unknowns with a prior, but they are not reported as estimates.
     pub tolerances: Vec<Tolerance>,
     pub settings: Vec<Setting>,
     pub inputs: Vec<String>,
     pub held: Vec<String>,
     pub outputs: Vec<String>,
-    /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
+    /// Sensors that measure quantities that are no outputs of the FMU, for example a wave gauge or a camera.
     pub sensors: Vec<Sensor>,
     pub biases: Vec<Bias>,
     pub triads: Vec<Triad>,
     pub drift: bool,
     pub solver: Solver,
-    /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.
+    /// Relative tolerance for the FMU's own solver; `None` leaves the choice to the FMU.
     pub tolerance: Option<f64>,
-    /// Largest number of start points of the search. The first one is given by the user; further ones are drawn at
-    /// random within the bounds if the search from the first one does not end at a good fit.
+    /// Largest number of start points of the search. The first one is given by the user. If the search from it does not end at a
+    /// good fit, further ones are drawn at random within the bounds.
     pub starts: usize,
 }
 
 impl Question {
-    /// Returns the sensor of a column, its quantity and the number of the channel; `None` if no sensor has this column.
+    /// Returns the sensor of a column, its quantity and its channel number; `None` if no sensor has this column.
     ///
     /// # Errors
     /// If the FMU lacks the quantity that the sensor measures.

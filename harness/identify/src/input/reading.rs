@@ -1,6 +1,7 @@
 //! Reads recordings of a bench, refuses recordings that no fit can use, and cuts them at gaps.
 //!
-//! If torque is missing and cannot be predicted, the recording is cut there ([`crate::input::gaps`]), and each part has a start of its own.
+//! If torque is missing and cannot be predicted, the recording is cut there ([`crate::input::gaps`]), and each part gets initial
+//! values of its own.
 
 use std::path::Path;
 
@@ -17,18 +18,18 @@ use crate::input::{gaps, spikes};
 use crate::tuning::{DECAY_ROWS, LATE_SENSOR, LONG_RECORDING, MOVING_SPREAD, SHORTEST_RECORDING};
 
 pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
-/// Columns of a recording that are read if the file has them.
+/// Optional columns of a recording.
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
 
 #[derive(Clone, Debug)]
 pub struct Source {
     pub columns: Columns,
-    /// First and last time, s, of the rows that are read; `None` for all rows.
+    /// Times of the first and last row that are used, s; `None` for all rows.
     pub trim: Option<(f64, f64)>,
 }
 
-/// Reads a file with the signals [`REQUIRED`] and [`OPTIONAL`]. Rows outside `trim` are left out; rows may be `coarsest` (s)
-/// apart. `done` receives a sentence on each change.
+/// Reads the signals [`REQUIRED`] and, if present, [`OPTIONAL`] from a file. Rows outside `trim` are left out. The mean time
+/// between rows may be at most `coarsest`, s. `done` receives a sentence about each change.
 pub fn read(
     path: &Path,
     source: &Source,
@@ -51,8 +52,8 @@ pub fn read(
     prepare(trimmed(all, source.trim, done), coarsest, done)
 }
 
-/// Returns the rows in which a torque, a rate or an angle was recorded, from the first to the last value of the torque. Each
-/// signal keeps its own clock.
+/// Returns the rows in which a torque, a rate or an angle was recorded, from the first to the last value of the torque. Signals
+/// may be sampled at different rows.
 fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<Recording> {
     let column = |name: &str| table.column(name);
     let (time, torque) = (column("time"), column("tau_cmd"));
@@ -74,13 +75,14 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
             let held: Vec<f64> =
                 (0..at.len()).filter(|k| !values[*k].is_nan()).map(|k| at[k]).collect();
             done(format!(
-                "{name} has a value in {there} of {} rows, {:.4} s apart mostly; {}",
+                "{name} has a value in {there} of {} rows, usually every {:.4} s; {}",
                 rows.len(),
                 clocks::usual(&held),
                 match name {
-                    "tau_cmd" => "the others are between its samples",
-                    "omega" | "theta" => "the others drive the model and are not fitted to it",
-                    _ => "lines join them",
+                    "tau_cmd" => "in the other rows it is interpolated",
+                    "omega" | "theta" =>
+                        "the other rows drive the model, but are not compared with this signal",
+                    _ => "in the other rows it is interpolated",
                 }
             ));
         }
@@ -106,8 +108,8 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
 /// Signals of a free decay, in the order of preference.
 pub const DECAYING: [&str; 4] = ["wave_height", "force", "theta", "omega"];
 
-/// Reads a free decay, which is one signal of [`DECAYING`] without a torque: the signal that `source.columns` names, otherwise
-/// the first that the file has. Returns the signal's name, and a recording that has its values in place of the rate.
+/// Reads a free decay: one signal of [`DECAYING`], without torque. The signal is the one that `source.columns` names, otherwise
+/// the first that the file contains. Returns the signal's name, and a recording with the signal in place of the rate.
 pub fn read_decay(
     path: &Path,
     source: &Source,
@@ -141,7 +143,7 @@ pub fn read_decay(
     );
     all.check()?;
     let seconds = all.duration();
-    // the last row stands for a step too
+    // the last row also lasts one step
     ensure!(
         seconds + all.step() >= SHORTEST_RECORDING * (1.0 - 1e-9),
         "{name}: {seconds:.2} s are too few (allowed: at least {SHORTEST_RECORDING} s)"
@@ -158,7 +160,8 @@ fn trimmed(all: Recording, trim: Option<(f64, f64)>, done: &mut dyn FnMut(String
     part
 }
 
-/// Checks a recording, whose rows may be `coarsest` (s) apart, and cuts it where a gap of the torque cannot be filled.
+/// Checks a recording, and cuts it at gaps of the torque that cannot be filled. The mean time between rows may be
+/// at most `coarsest`, s.
 pub fn prepare(
     all: Recording,
     coarsest: f64,
@@ -167,7 +170,7 @@ pub fn prepare(
     let name = all.name.clone();
     check_time(&all, coarsest)?;
     let (all, gaps) = gaps::bridged(all, done);
-    // each part begins and ends with a torque
+    // each part begins and ends with a recorded torque
     let mut cuts: Vec<(usize, usize)> = Vec::new();
     let mut from = 0;
     for row in gaps {
@@ -175,7 +178,7 @@ pub fn prepare(
         let Some(next) = (row + 1..all.time.len()).find(is_commanded) else { break };
         let gap = all.time[next] - all.time[row];
         done(format!(
-            "{name}: cut at {:.2} s, where tau_cmd is missing for {gap:.2} s and cannot be foretold",
+            "{name}: cut at {:.2} s, where tau_cmd is missing for {gap:.2} s and cannot be predicted",
             all.time[row]
         ));
         cuts.push((from, row + 1));
@@ -217,7 +220,7 @@ pub fn prepare(
         if let (Some(fresh), true) = (&part.fresh, repeats) {
             let new = fresh.iter().filter(|new| **new).count();
             done(format!(
-                "{}: omega has a new value in {new} of {} rows; those are fitted",
+                "{}: omega has a new value in {new} of {} rows; only these rows are fitted",
                 part.name,
                 fresh.len()
             ));
@@ -245,12 +248,12 @@ pub fn prepare(
     Ok(parts)
 }
 
-/// Removes values that the sensor did not measure, for example saturated or frozen ones, from a part of the recording. `done` receives a
+/// Marks values that the sensor did not measure, for example saturated or frozen ones, as not to be fitted. `done` receives a
 /// message that names them.
 fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     let rows = part.time.len();
     let Recording { name, time, torque, rate, angle, fresh, angle_fresh, .. } = part;
-    // without torque at its beginning a hub rests
+    // a hub without torque at the beginning is at rest
     let rest = (torque[0] == 0.0).then_some(rate[0]);
     let sensors = [
         ("omega", Some(rate), fresh, Rest::Rate(rest)),
@@ -265,7 +268,7 @@ fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
         found.words.iter().for_each(|words| done(format!("{name}: {words}")));
         found.rows.iter().for_each(|k| take_out(mask, places[*k], rows));
         if let (Some(mask), false) = (&*mask, found.rows.is_empty()) {
-            // what stands there serves spectra and plots
+            // interpolated values for spectra and plots
             let known =
                 mask.iter().zip(whole.iter()).map(|(new, v)| if *new { *v } else { f64::NAN });
             let known = known.collect();
@@ -274,7 +277,7 @@ fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     }
 }
 
-/// Removes single values that belong to no motion (spikes) from a part of the recording. `done` receives a message that names them.
+/// Marks spikes, which are single values that no motion explains, as not to be fitted. `done` receives a message that names them.
 fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
     let found = spikes::find(&part.time, &part.rate, &part.torque, part.fresh.as_deref());
     let Some(largest) = found.iter().map(|(k, y)| (part.rate[*k] - y).abs()).reduce(f64::max)
@@ -350,15 +353,16 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if rate and torque allow a start at rest: neither exceeds what noise, bias and the first moment of motion
-/// explain. (If both pass zero by chance in the middle of a motion, the answer is wrong, and the residual tests show it.)
+/// Returns true if rate and torque allow a start at rest: neither exceeds the values that noise, bias and the first
+/// moment of motion explain. If both cross zero by chance in the middle of a motion, the answer is wrong, and the tests
+/// of the residual detect it.
 fn starts_at_rest(part: &Recording) -> bool {
     let rate = part.first_rate();
     let moves = deviation(&part.rate);
-    // what is not the bias: up to 3 % of the signal, or 5 times the noise
+    // motion besides the bias: more than 3 % of the signal plus 5 times the noise
     let is_slow = |rate: f64| rate.abs() < 5.0 * part.rate_noise() + 0.03 * moves;
     let bias = mean_reading(part);
-    // a hub that begins as it is on average rests, unless it turns on faster than it moves
+    // a hub that begins at its mean rate is at rest, unless this mean exceeds the changes of the rate
     let rests = is_slow(rate) || bias.abs() < moves && is_slow(rate - bias);
     rests && part.torque[0].abs() < 0.1 * deviation(&part.torque)
 }
@@ -381,13 +385,13 @@ fn check_signals(part: &Recording) -> Result<()> {
         part.torque[0]
     );
     ensure!(deviation(&part.rate) > 0.0, "{name}: omega is constant ({} rad/s)", part.rate[0]);
-    // An inertia: torque goes with the rate's derivative, so torque leads the rate by 90 degrees.
+    // The torque of an inertia is proportional to the derivative of the rate, so it leads the rate by 90 degrees.
     let (torque, rate) = smoothed(part)?;
     let slope = |x: &[f64]| -> Vec<f64> { (1..x.len() - 1).map(|k| x[k + 1] - x[k - 1]).collect() };
     let inner = |x: &[f64]| x[1..x.len() - 1].to_vec();
     let leading = correlation(&inner(&torque), &slope(&rate));
     if leading < -0.3 {
-        // which one is the other's integral? The ratio of rate to torque falls with frequency
+        // the smoother signal is the integral of the other: the ratio of rate to torque falls with frequency
         let rough = |x: &[f64]| deviation(&slope(x)) / deviation(x);
         let swapped = rough(&torque) < rough(&rate);
         let fault = if swapped {
@@ -402,7 +406,7 @@ fn check_signals(part: &Recording) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if the rate is noise that shows no effect of the torque.
+/// Returns true if the rate is only noise, without any effect of the torque.
 fn is_stuck(part: &Recording) -> bool {
     let (mean, noise) = (mean(&part.rate), noise_level(&part.rate));
     let unit: Vec<f64> = part.rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
@@ -440,13 +444,13 @@ mod tests {
         Recording { from_rest: false, ..Recording::of("a.csv", time, torque, rate) }
     }
 
-    /// A gyro reads its bias at rest. If the bias were taken for a motion, the rate at the start would be an unknown that the
+    /// A gyro at rest reads its bias. If the bias were taken for a motion, the initial rate would be an unknown that the
     /// recording does not determine, because dry friction stops the hub at once.
     #[test]
     fn a_constant_reading_is_a_bias_and_a_hub_that_turns_is_not_at_rest() {
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
-        // friction takes the mean rate away that the first push gives
+        // friction removes the mean rate that the first torque causes
         let first = rigid().rate[0];
         let from_rest = |offset: f64| {
             let mut all = rigid();
@@ -456,14 +460,14 @@ mod tests {
             all
         };
         assert!([0.0, 8e-3, -1e-2].iter().all(|bias| starts_at_rest(&from_rest(*bias))));
-        // an encoder tells a bias from a hub that turns on
+        // an encoder distinguishes a bias from a hub that keeps turning
         let with_encoder = |turns: f64| {
             let all = from_rest(8e-3);
             let angle = all.time.iter().map(|t| 0.6 + turns * t).collect();
             Recording { angle: Some(angle), ..all }
         };
         assert!(starts_at_rest(&with_encoder(0.0)) && !starts_at_rest(&with_encoder(8e-3)));
-        // faster than it moves, and in the middle of a motion
+        // a mean rate above the changes of the rate, and a beginning in the middle of a motion
         assert!(!starts_at_rest(&from_rest(0.5)));
         let later = from_rest(8e-3);
         let zero = (5_000..).find(|k| later.torque[*k] * later.torque[k + 1] < 0.0).unwrap();
@@ -481,8 +485,6 @@ mod tests {
         assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);
     }
 
-    /// A recording with a fault, such as swapped columns or a constant torque, gives an error that
-    /// names this fault.
     #[test]
     fn each_fault_has_a_sentence_of_its_own() {
         type Change = fn(&mut Recording);
@@ -515,7 +517,7 @@ mod tests {
             let expected: Vec<f64> = x.windows(width).map(mean).collect();
             let found = running_mean(&x, width);
             assert_eq!(found.len(), expected.len());
-            // sums of 50 whole numbers are exact
+            // sums of 50 integers are exact
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{width}");
         }
     }
@@ -540,7 +542,8 @@ mod tests {
         }
     }
 
-    /// Gaps of 10 and 50 rows in the recorded torque: a sweep can be predicted from the rows around a gap, noise cannot.
+    /// The recorded torque has gaps of 10 and 50 rows. In a sweep the lost rows are predicted from the rows around a gap; in
+    /// noise they are not.
     #[test]
     fn lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording() {
         let mut random = analysis::random::Random::new(1, 0);
@@ -562,20 +565,20 @@ mod tests {
             said[0].contains("60 samples of tau_cmd are missing in 2 gaps of up to 1.02 s"),
             "{said:?}"
         );
-        // a torque that nothing foretells
+        // an unpredictable torque
         let mut jumps = sweep.clone();
         jumps.torque.iter_mut().for_each(|t| *t += 0.05 * random.normal());
         said.clear();
         let parts = prepare(without(&jumps, &lost), COARSEST, &mut |line| said.push(line)).unwrap();
         assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [3_000, 3_990, 7_950]);
         assert!(
-            said[0].contains("tau_cmd is missing for 0.22 s and cannot be foretold"),
+            said[0].contains("tau_cmd is missing for 0.22 s and cannot be predicted"),
             "{said:?}"
         );
         assert!(!parts[1].from_rest);
     }
 
-    /// A slow gyro leaves cells empty; these rows still drive the model with their torque.
+    /// Rows in which a slow gyro has no value still drive the model with their torque.
     #[test]
     fn rows_without_a_sensor_keep_their_torque() {
         let directory = tempfile::tempdir().unwrap();
@@ -596,32 +599,32 @@ mod tests {
         let (rate, angle) =
             (parts[0].fresh.as_ref().unwrap(), parts[0].angle_fresh.as_ref().unwrap());
         let count = |mask: &[bool]| mask.iter().filter(|new| **new).count();
-        // less those of the first 0.1 s, for it begins in motion
+        // without the first 0.1 s, because the recording begins in motion
         assert_eq!((count(rate), count(angle)), (2_999, 7_497));
         assert!(
             said.iter().any(|line| line
-                .contains("omega has a value in 3000 of 15000 rows, 0.1000 s apart mostly")),
+                .contains("omega has a value in 3000 of 15000 rows, usually every 0.1000 s")),
             "{said:?}"
         );
     }
 
-    /// A rate that repeats each value three times comes from a gyro at a third of the row rate.
+    /// A rate that repeats each value three times comes from a gyro with a third of the sampling rate of the rows.
     #[test]
     fn a_gyro_slower_than_the_rows_is_seen_by_its_repeats() {
         let mut random = analysis::random::Random::new(1, 0);
         let mut noisy = rigid();
         noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
         assert!(fresh(&noisy.rate).is_none());
-        // every third row new, from row 2 on
+        // a new value in every third row, from row 2 on
         let held: Vec<f64> =
             (0..noisy.rate.len()).map(|k| noisy.rate[((k + 1) / 3 * 3).min(14_999)]).collect();
         let found = fresh(&held).unwrap();
         assert_eq!(found.iter().filter(|new| **new).count(), held.len() / 3);
         assert!(found[2] && !found[3] && !found[4]);
-        // a coarse gyro repeats itself by chance
+        // a gyro with a coarse resolution repeats values by chance
         let coarse: Vec<f64> = noisy.rate.iter().map(|w| (w / 1e-3).round() * 1e-3).collect();
         assert!(fresh(&coarse).is_none());
-        // one with a clock of its own
+        // a gyro with a clock of its own
         let other: Vec<f64> =
             (0..noisy.rate.len()).map(|k| noisy.rate[(k as f64 / 1.37) as usize]).collect();
         let new = fresh(&other).unwrap().iter().filter(|new| **new).count();

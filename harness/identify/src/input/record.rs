@@ -16,7 +16,7 @@ pub struct Record {
     pub name: String,
     pub time: Vec<f64>,
     pub inputs: Vec<Vec<f64>>,
-    /// Each output at the rows; NaN where it was not read.
+    /// Values of each output at the rows; NaN in rows without a measured value.
     pub outputs: Vec<Vec<f64>>,
 }
 
@@ -76,7 +76,7 @@ impl Record {
             check_values(name, values.iter().copied())?;
         }
         let outputs = question.outputs.iter().zip(&self.outputs);
-        // NaN: not read
+        // NaN means that the output was not measured in this row
         let read = |y: &f64| if y.is_nan() { 0.0 } else { *y };
         outputs.into_iter().try_for_each(|(name, y)| check_values(name, y.iter().map(read)))
     }
@@ -89,15 +89,15 @@ impl Record {
         self.outputs[output].iter().copied().filter(|y| !y.is_nan()).collect()
     }
 
-    /// Returns the standard deviation of an output's values. If all values are equal, it is their
-    /// magnitude, at least 1.
+    /// Returns the standard deviation of an output's values. If all values are equal, returns their absolute
+    /// value, but at least 1.
     pub fn spread(&self, output: usize) -> f64 {
         let values = self.values(output);
         let spread = deviation(&values);
         if spread > 0.0 { spread } else { peak(&values).max(1.0) }
     }
 
-    /// Returns the standard deviation of the noise that an output shows from row to row.
+    /// Returns the standard deviation of the noise between neighbouring rows of an output.
     pub fn noise(&self, output: usize) -> f64 {
         noise_level(&self.values(output))
     }

@@ -1,8 +1,8 @@
-//! A recording of a bench: torque command and hub rate against time, in SI units.
+//! A recording of a bench: torque command and hub rate over time, in SI units.
 //!
-//! It is not resampled: the FMU is stepped to the very instants of the rows. Each signal has its own clock: a row without a value
-//! of a sensor is not compared with this sensor, but still drives the FMU ([`crate::input::clocks`]). [`crate::input::reading`]
-//! reads files.
+//! A recording is not resampled: the FMU is stepped exactly to the instants of the rows. Signals may have different sampling
+//! clocks: a row without a value of a sensor is not compared with this sensor, but still drives the FMU
+//! ([`crate::input::clocks`]). [`crate::input::reading`] reads recordings from files.
 
 use std::borrow::Cow;
 
@@ -21,31 +21,30 @@ pub struct Recording {
     pub torque: Vec<f64>,
     /// Hub rate as measured, rad/s.
     pub rate: Vec<f64>,
-    /// Hub angle of an encoder, rad, if there is one. It is fitted together with the rate.
+    /// Hub angle from an encoder, rad, if it was recorded. It is fitted together with the rate.
     pub angle: Option<Vec<f64>>,
-    /// Specific force along the tank's axis, m/s², if it was recorded: an input like the torque.
+    /// Specific force along the tank's axis, m/s², if it was recorded. It is an input of the model like the torque.
     pub gravity: Option<Vec<f64>>,
-    /// Speed of the reaction wheel, rad/s, which shows whether the wheel gave the commanded torque.
+    /// Speed of the reaction wheel, rad/s. It shows whether the wheel gave the commanded torque.
     pub wheel_speed: Option<Vec<f64>>,
-    /// Rates about the hub's x and y axes, rad/s, about which the model does not turn.
+    /// Rates about the hub's x and y axes, rad/s. The model turns only about the z axis.
     pub off_axis: [Option<Vec<f64>>; 2],
     /// True if the recording begins at rest; otherwise the initial state is unknown.
     pub from_rest: bool,
-    /// True for rows with a new value of the gyro that is no fault of the sensor. Only these rows are fitted. `None`: all.
+    /// True for rows in which the gyro has a new value without a sensor fault. Only these rows are fitted. `None`: all rows.
     pub fresh: Option<Vec<bool>>,
-    /// True for rows with a new value of the encoder that is no fault of the sensor. `None`: all.
+    /// True for rows in which the encoder has a new value without a sensor fault. `None`: all rows.
     pub angle_fresh: Option<Vec<bool>>,
-    /// True for rows with a value of the torque. In the other rows the torque is interpolated. `None`: all.
+    /// True for rows in which the torque was recorded. In the other rows it is interpolated. `None`: all rows.
     pub commanded: Option<Vec<bool>>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     pub time: f64,
-    /// Index of this row in the recording; `None` for a row that is added between the recording's
-    /// rows.
+    /// Index of this row in the original recording; `None` for an added row.
     pub own: Option<usize>,
-    /// Torque that replaces a missing torque in this row, N·m.
+    /// Value for a missing torque in this row, N·m.
     pub filled: Option<f64>,
 }
 
@@ -92,8 +91,7 @@ impl Recording {
         }
     }
 
-    /// Returns the rows `from..to` as a recording, whose initial state is unknown because it begins
-    /// within a motion.
+    /// Returns the rows `from..to` as a recording. Its initial state is unknown, because it begins in the middle of a motion.
     pub(crate) fn rows(&self, from: usize, to: usize) -> Recording {
         let part = self.mapped(|x| x[from..to].to_vec(), |mask| Some(mask[from..to].to_vec()));
         Recording { from_rest: false, ..part }
@@ -108,8 +106,7 @@ impl Recording {
         (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
     }
 
-    /// Returns the recording on other rows. If a signal has no value in such a row, its value is
-    /// interpolated.
+    /// Returns the recording at these rows. Signals without a value in a row are interpolated there.
     pub fn with_rows(&self, rows: &[Row]) -> Recording {
         let time: Vec<f64> = rows.iter().map(|row| row.time).collect();
         let of = |values: &[f64], mask: Option<&[bool]>| {
@@ -147,7 +144,7 @@ impl Recording {
         masked(values, self.angle_fresh.as_deref())
     }
 
-    /// Returns the gyro's first reading, rad/s: the mean of its first two values.
+    /// Returns the mean of the gyro's first two values, rad/s.
     pub fn first_rate(&self) -> f64 {
         let first: Vec<f64> = self.of_fresh(&self.rate).into_iter().take(2).collect();
         mean(&first)
@@ -175,8 +172,8 @@ impl Recording {
         }
     }
 
-    /// Marks the rows in which a gyro that is slower than the recording has a new value. Returns false if the gyro has a new
-    /// value in every row.
+    /// Finds the rows with new values of a gyro that is slower than the recording, and marks them. Returns false if the gyro has
+    /// a new value in every row.
     pub(crate) fn with_repeats(&mut self) -> bool {
         let Some(new) = fresh(&self.of_fresh(&self.rate)) else { return false };
         let rows = self.time.len();
@@ -198,12 +195,12 @@ impl Recording {
         self.first_rows(rows.min(self.time.len()))
     }
 
-    /// Returns a recording of the first `rows` rows, which begins at rest if this recording does.
+    /// Returns a recording of the first `rows` rows. It begins at rest if this recording does.
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
         Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
     }
 
-    /// Returns the usual step from row to row, s.
+    /// Checks times and values. Returns the usual step from row to row, s.
     ///
     /// # Errors
     /// If times or values are out of range.
@@ -231,8 +228,7 @@ impl Recording {
         Ok(step)
     }
 
-    /// Returns the mean step (s), and torque and rate interpolated linearly onto an even grid with this step. They serve only
-    /// spectra.
+    /// Returns the mean step (s), and torque and rate interpolated linearly onto an even grid with this step, for spectra.
     ///
     /// # Errors
     /// If times or values are out of range.
@@ -240,7 +236,7 @@ impl Recording {
         self.of_gyro().even_rows()
     }
 
-    /// Returns the rows with a value of the gyro if it is slower than the recording; otherwise all rows.
+    /// Returns only the rows with a new value of the gyro if the gyro is slower than the recording; otherwise all rows.
     pub fn of_gyro(&self) -> Cow<'_, Recording> {
         let rows = places(&self.fresh, self.time.len());
         if rows.len() as f64 > SLOW_GYRO * self.time.len() as f64 || rows.len() < 3 {
@@ -261,7 +257,8 @@ impl Recording {
     }
 }
 
-/// Fails unless times are finite and grow, and their span is a reasonable number of the usual steps. Returns that step, s.
+/// Fails unless times are finite and increasing, and their range is a reasonable number of usual steps. Returns
+/// the usual step, s.
 pub fn check_times(time: &[f64]) -> Result<f64> {
     ensure!(time.len() > 1, "there are {} rows (allowed: at least 2)", time.len());
     if let Some(row) = time.iter().position(|t| !t.is_finite()) {
@@ -287,9 +284,9 @@ pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()>
     Ok(())
 }
 
-/// Returns the rows with a new value if most rows only repeat the one before, as with a gyro that is slower than the recording. A
-/// coarse gyro may repeat values by chance, so the changes must come every n-th row. If the gyro is fine (two values are seldom
-/// equal), every repeat counts.
+/// Returns the rows with a new value if the rows between them only repeat values, as with a gyro that is slower than the
+/// recording. A gyro with a coarse resolution may repeat values by chance; then only changes in every n-th row count as a slower
+/// clock. If the resolution is fine, so that two values are seldom equal, every repeated value counts.
 pub(crate) fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
     let changes: Vec<usize> = (1..rate.len()).filter(|&k| rate[k] != rate[k - 1]).collect();
     if changes.len() < 10 || changes.len() > 9 * rate.len() / 10 {

@@ -1,4 +1,4 @@
-//! The frequency response that a recording shows.
+//! The frequency response that is estimated from a recording.
 
 use analysis::welch::{self, Spectra};
 use analysis::{FrequencyResponse, logarithmic_grid, spa};
@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::input::recording::Recording;
 
-/// Returns the frequencies between which the torque has 98 % of its power, Hz.
+/// Returns the lowest and highest frequency, Hz, between which the torque has 98 % of its power.
 pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
     let spectra = Spectra::estimate(step, torque, rate, welch::Segments::Seconds(60.0));
     let total: f64 = spectra.input.iter().skip(1).sum();

@@ -1,5 +1,5 @@
-//! Finds values of a sensor that do not show the motion, because the logger repeated them, or because the sensor was clipped at
-//! the end of its range or frozen. They are reported and not fitted.
+//! Finds values of a sensor that do not show the motion: repeated by the logger, clipped at the end of the sensor's range, or
+//! frozen. They are reported and not fitted.
 
 use analysis::innovations::LIMIT;
 use analysis::statistics::{mean, median, noise_level, peak};
@@ -15,25 +15,25 @@ pub struct Faults {
     pub words: Vec<String>,
 }
 
-/// Value that a sensor reads while the hub rests.
+/// The value of a sensor while the hub is at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rest {
-    /// A rate reads this value (the gyro's bias), if it is known.
+    /// A rate is at this value (the gyro's bias), if it is known.
     Rate(Option<f64>),
-    /// An angle may have any value. When the hub begins to turn, the angle leaves this value with zero rate.
+    /// An angle may have any value. When the hub begins to turn, the angle starts with zero rate.
     Angle,
 }
 
 impl Rest {
-    /// Returns the jump from row k to the next row by which a value ends that was clipped or frozen; `None` if the hub rested at
-    /// this value. The smooth motion of an angle that leaves its rest is subtracted.
+    /// Returns the size of the jump from row k to the next row, which ends a run of clipped or frozen values. Returns `None` if
+    /// the hub was at rest during the run. For an angle, the part of the jump that is a smooth start of motion is subtracted.
     fn jump(self, values: &[f64], k: usize) -> Option<f64> {
         let step = (values.get(k + 1)? - values[k]).abs();
         match self {
             Rest::Rate(rest) if rest == Some(values[k]) => None,
             Rest::Rate(_) => Some(step),
             Rest::Angle => {
-                // the rate starts at zero and the acceleration does not fall: the second increment is three times the first
+                // a motion from rest with constant acceleration has increments of 1 : 3
                 let second = values.get(k + 2).map_or(0.0, |next| (next - values[k + 1]).abs());
                 Some(step - second / 3.0)
             }
@@ -41,7 +41,8 @@ impl Rest {
     }
 }
 
-/// Finds the faults in the values of the sensor `name` at growing times, s. Equal values while the hub rests are no fault.
+/// Finds the faults in the values of the sensor `name` at increasing times, s. Equal values while the hub is at
+/// rest are no fault.
 pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let mut found = Faults::default();
     if values.len() < 100 {
@@ -52,7 +53,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let at = |k: usize| format!("{:.2} s", time[k]);
     let ends = [("upper", 1.0), ("lower", -1.0)];
     let resolution = resolution(values);
-    // the ends of a gyro's range are opposite; those of a motion from rest are not
+    // the two ends of a gyro's range are opposite numbers; the extreme values of a motion from rest are not
     let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let opposite = match rest {
         Rest::Rate(_) if is_opposite(values) => held(&sizes, 1.0, (noise, resolution)),
@@ -64,7 +65,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     });
     let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
     let steps = |jump: &Option<f64>| jump.is_some_and(|jump| jump > FAULT_STEPS * resolution);
-    // a hub rests at one end of its rates at most
+    // a hub can be at rest at only one of the two extreme rates
     let both = rest != Rest::Angle && jumps.iter().all(steps);
     for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
         if !both && jump.is_none_or(|jump| jump <= LIMIT * noise) {
@@ -80,7 +81,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
             ));
         }
         for k in rows {
-            // close to the limit noise is cut on one side
+            // noise is cut on one side near the end of the range
             (k.saturating_sub(1)..=(k + 1).min(values.len() - 1)).for_each(|k| out[k] = true);
         }
     }
@@ -88,7 +89,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     if let Some((first, _)) = runs.first() {
         let longest = runs.iter().map(|(a, b)| time[*b] - time[*a]).fold(0.0, f64::max);
         found.words.push(format!(
-            "{name} is frozen {} times for up to {longest:.2} s, first at {}; those values are not fitted",
+            "{name} is frozen {} times for up to {longest:.2} s, first at {}; these values are not fitted",
             runs.len(),
             at(*first)
         ));
@@ -97,7 +98,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let repeats = repeated(time, values, &out, noise, rest);
     if !repeats.is_empty() {
         found.words.push(format!(
-            "{} of {} values of {name} only repeat the one before, though it moves; they are not fitted",
+            "{} of {} values of {name} repeat the value before although the hub moves; they are not fitted",
             repeats.len(),
             values.len()
         ));
@@ -107,8 +108,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     found
 }
 
-/// Returns true if the largest and the smallest value are opposite numbers, like the ends of a
-/// sensor's range.
+/// Returns true if the largest and the smallest value are opposite numbers, as the ends of a sensor's range are.
 fn is_opposite(values: &[f64]) -> bool {
     let ends = values
         .iter()
@@ -116,13 +116,13 @@ fn is_opposite(values: &[f64]) -> bool {
     (ends.0 + ends.1).abs() <= SENSOR_ROUNDING * peak(values)
 }
 
-/// Returns the rows with the largest value (or the smallest, if `sign` is −1), if they are many and
-/// adjacent, because the sensor is clipped there, or the hub rests.
+/// Returns the rows with the largest value (with the smallest, if `sign` is −1), if they are numerous and adjacent. The sensor is
+/// then clipped, or the hub is at rest.
 fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
     let beside = |v: &&f64| (end - CLIPPED_INSIDE * noise..end).contains(&(sign * **v));
-    // as many as one value of the sensor has of those just inside
+    // expected number of equal values, from the values just inside the end
     let share = (resolution / (CLIPPED_INSIDE * noise)).min(1.0);
     let usual = share * values.iter().filter(beside).count() as f64;
     let is_run = |k: &&usize| {
@@ -134,8 +134,8 @@ fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize
     if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
 }
 
-/// Returns the median of the jumps by which the values leave the end of the sensor's range that
-/// they have in `rows`.
+/// Returns the median of the jumps with which the values leave the end of the sensor's range. `rows` are the rows
+/// with this end value.
 fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
     let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
     let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();
@@ -150,9 +150,10 @@ fn resolution(values: &[f64]) -> f64 {
     steps.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the first and last rows of runs of equal values in which the sensor is frozen: they are too long for chance, off the
-/// mean (a hub at rest reads its gyro's bias, which is near the mean), and end in a jump. If the sensor freezes once, its other
-/// runs need only one of the two signs, because a rate may freeze near its mean, or come back near the frozen value.
+/// Returns the first and last rows of the runs of equal values in which the sensor is frozen. Such a run is too long to be
+/// chance. In addition, its value is away from the mean (the value of a hub at rest is the gyro's bias, which is near the mean), and
+/// it ends in a jump. After one run with both signs, one of the two is enough for the other runs, because a rate may freeze near
+/// its mean, or come back near the frozen value.
 fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let runs = runs(values);
     let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= FROZEN_RUN;
@@ -172,7 +173,7 @@ fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, u
     if !runs.iter().any(|run| sign(run) == (true, true)) {
         return Vec::new();
     }
-    // an angle at rest is off its mean
+    // an angle away from its mean may be at rest
     let is_frozen = |run: &(usize, usize)| {
         let (jump, moves) = sign(run);
         jump || moves && rest != Rest::Angle
@@ -192,8 +193,8 @@ fn runs(values: &[f64]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// Returns the rows that repeat the value before them although the signal moves there. A long run of an angle that ends without a
-/// jump is no fault, because the hub rests.
+/// Returns the rows that repeat the value before them although the signal is changing. A long run of equal angles that ends
+/// without a jump is no fault, because the hub is at rest.
 fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<usize> {
     let moves = |(a, b): &(usize, usize)| {
         let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > LIMIT * noise);
@@ -206,7 +207,7 @@ fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) 
     }
     let off = spikes::off_neighbours(time, values);
     let squares: Vec<f64> = off.iter().map(|e| e * e).collect();
-    // the median of a χ² with one degree of freedom is 0.4549
+    // 0.4549 is the median of χ² with one degree of freedom
     let usual = median(&squares).unwrap_or(0.0) / 0.4549;
     let usual = usual.max((SENSOR_ROUNDING * peak(values)).powi(2));
     let of_repeats = repeats.iter().map(|k| squares[*k]).sum::<f64>() / repeats.len() as f64;
@@ -220,7 +221,7 @@ mod tests {
 
     const LEAST: f64 = 1.5e-4;
 
-    /// 200 s at 50 Hz of a motion of 2 Hz whose amplitude grows, read by a gyro that rounds.
+    /// Returns 200 s at 50 Hz of a motion of 2 Hz with growing amplitude, measured by a gyro with a finite resolution.
     fn gyro() -> (Vec<f64>, Vec<f64>) {
         let mut random = Random::new(5, 0);
         let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
@@ -241,17 +242,17 @@ mod tests {
     fn a_sound_gyro_has_no_faults() {
         let (time, mut rate) = gyro();
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
-        // a hub that rests for 20 s under a gyro that is coarser than its noise
+        // a hub at rest for 20 s, with a gyro whose resolution is coarser than its noise
         rate[..1000].fill(3e-4);
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
-        // a coarse gyro
+        // a gyro with a coarse resolution
         rate.iter_mut().for_each(|w| *w = (*w / 5e-3).round() * 5e-3);
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
     }
 
     #[test]
     fn a_hub_at_rest_is_no_fault() {
-        // at rest, half a turn in 10 s, at rest, back under constant acceleration to another rest, and on
+        // at rest, half a turn in 10 s, at rest, back with constant acceleration, at rest, and on
         let course = |t: f64| match t {
             _ if t < 20.0 => 0.0,
             _ if t < 30.0 => 0.016 * (t - 20.0).powi(2),
@@ -260,7 +261,7 @@ mod tests {
             _ if t < 80.0 => 3.2 - 0.005 * (t - 60.0).powi(2),
             _ => 1.2 - 0.005 * (100.0 - t).powi(2),
         };
-        // the torque acts between two rows
+        // the torque begins between two rows
         let time: Vec<f64> = (0..5000).map(|k| 0.02 * f64::from(k) + 0.007).collect();
         for step in [1e-12, 1.7e-6] {
             let angle: Vec<f64> = time.iter().map(|t| (course(*t) / step).round() * step).collect();
@@ -269,7 +270,7 @@ mod tests {
             let said = find("theta", &time, &clipped, Rest::Angle).words;
             assert!(said.len() == 1 && said[0].contains("theta is clipped"), "{step}: {said:?}");
         }
-        // a rate without noise that is least while the hub rests
+        // a noiseless rate that is smallest while the hub is at rest
         let pushed =
             |t: f64| 0.05 * (t - 20.0).clamp(0.0, 5.0) - 0.02 * (t - 25.0).clamp(0.0, 12.5);
         let rate: Vec<f64> = time.iter().map(|t| 0.002 + pushed(*t % 50.0)).collect();
@@ -280,8 +281,8 @@ mod tests {
         assert!(!is_clipped(Some(rate[0])));
     }
 
-    /// A gyro with a bias reaches one end of its range in each cycle, and the other end in few cycles. Its first
-    /// reading after each end differs from the end by less than five standard deviations of its noise.
+    /// The biased gyro reaches one end of its range in each cycle, and the other end in few cycles. Its first value after each
+    /// end differs from the end by less than five standard deviations of its noise.
     #[test]
     fn clipping_at_one_end_of_the_range_is_also_assumed_at_the_other_end() {
         let mut random = Random::new(5, 0);
@@ -304,9 +305,9 @@ mod tests {
         let clipped: Vec<f64> = rate.iter().map(|w| w.clamp(-0.06, 0.06)).collect();
         let (rows, said) = words(&time, &clipped);
         assert!(said.contains("omega is clipped") && said.contains("the upper end"), "{said}");
-        // 42 % of the rows from 120 s on, and a neighbour on each side of 320 runs
+        // 42 % of the rows from 120 s on, and one neighbour on each side of 320 runs
         assert!((2250..2450).contains(&rows), "{rows}");
-        // at 100 Hz a gyro comes back from both ends by less than five standard deviations of its noise
+        // at 100 Hz the gyro leaves both ends of its range by less than five standard deviations of its noise
         let half: Vec<f64> = clipped.iter().map(|w| 0.2 * w.clamp(-0.04, 0.04)).collect();
         let mut random = Random::new(6, 0);
         let slow = |k: usize| (half[k / 2] + half[k.div_ceil(2)]) / 2.0 + 4e-4 * random.normal();
@@ -329,7 +330,8 @@ mod tests {
             "{said}"
         );
         assert_eq!(rows, 58);
-        // another time near the mean, and a last time for a cycle, after which it comes back near the frozen value
+        // frozen a third time near the mean, and a last time for a whole cycle, after which the motion is back
+        // near the frozen value
         let is_near_mean = |k: &usize| rate[*k].abs() < 1e-3 && rate[*k + 30].abs() > 0.01;
         let is_met = |k: &usize| (rate[*k] - rate[*k + 25]).abs() < 1e-3 && rate[*k].abs() > 0.01;
         let near_mean = (4000..4900).find(is_near_mean).unwrap();
@@ -344,6 +346,6 @@ mod tests {
         let mut repeats = rate.clone();
         (1..500).for_each(|k| repeats[20 * k] = repeats[20 * k - 1]);
         let (rows, said) = words(&time, &repeats);
-        assert!(said.contains("only repeat the one before") && rows > 499, "{rows} {said}");
+        assert!(said.contains("repeat the value before although") && rows > 499, "{rows} {said}");
     }
 }

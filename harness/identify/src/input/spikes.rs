@@ -1,16 +1,16 @@
-//! Finds single values of the gyro that belong to no motion, such as transmission errors and flipped bits.
+//! Finds spikes: single values of the gyro that no motion explains, such as transmission errors and flipped bits.
 //!
-//! A value is compared with the cubic through its two neighbours on either side. At even rows the difference is
+//! A value is compared with the cubic through its two neighbours on either side. In evenly spaced rows the difference is
 //!
 //! ```text
 //! r_k = y_k − (−y_{k−2} + 4 y_{k−1} + 4 y_{k+1} − y_{k+2})/6
 //! ```
 //!
-//! White noise of standard deviation σ gives r a standard deviation of √(1 + 34/36) σ = 1.39 σ; a motion of a few hertz gives
-//! next to nothing, and a step of the torque gives a kink. At uneven rows r is scaled to the same noise. The limit of r grows
-//! with the values of r around a row, because a resonance that is sampled slowly makes all of them large. The largest spike is
-//! taken out first, because a spike spoils the cubic of its neighbours. The rows of spikes are left out of the fit, because a
-//! value so far out should have no weight (a robust loss such as Hampel's does the same).
+//! White noise with standard deviation σ gives r a standard deviation of √(1 + 34/36) σ = 1.39 σ; a motion of a few hertz changes
+//! r hardly at all, and a step of the torque changes it by a kink. In unevenly spaced rows r is scaled to the same noise. The
+//! limit of r grows with the values of r in the neighbourhood, because the coarse samples of a resonance make all of them large.
+//! The largest spike is removed first, because a spike also changes r of its neighbours. The rows of spikes are left out of the
+//! fit, because such a value should have no weight (a robust loss such as Hampel's has the same effect).
 
 use std::collections::{BTreeSet, BinaryHeap};
 
@@ -20,14 +20,14 @@ use analysis::statistics::{median, noise_level, peak};
 use crate::input::clocks::weights;
 use crate::tuning::{SPIKE_AROUND, SPIKE_NEAR_STEP, SPIKE_SHARE, TORQUE_STEP};
 
-/// Returns the ratio of the standard deviation of the difference r (see the module's head) to the
-/// standard deviation σ of white noise in the values.
+/// Returns the ratio of the standard deviation of the difference r (defined at the top of this file) to the standard deviation σ
+/// of white noise in the values.
 fn gain() -> f64 {
     (1.0_f64 + 34.0 / 36.0).sqrt()
 }
 
-/// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
-/// The differences are 0 at the ends.
+/// Returns the difference of each value from the cubic through its neighbours, scaled to the noise of evenly spaced rows, and 0
+/// at the ends. `time` must increase.
 pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
     let inner = 2..y.len().saturating_sub(2);
     let one = |k: usize| match inner.contains(&k) {
@@ -37,8 +37,8 @@ pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
     (0..y.len()).map(one).collect()
 }
 
-/// Returns the rows of a rate whose value is a spike, in order, each with the rate of the cubic. If `fresh` is given, only its
-/// rows are used. The result is empty if there are no spikes, or so many that they are noise of another kind.
+/// Returns the rows in which a rate has a spike, in ascending order, each with the value of the cubic. If `fresh` is given, only
+/// its rows are used. Returns nothing if there are so many deviating values that they are noise of another kind.
 pub fn find(
     time: &[f64],
     rate: &[f64],
@@ -52,11 +52,11 @@ pub fn find(
     }
     let residuals: Vec<f64> =
         off_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
-    // the median of |r| is 0.6745 σ for noise, and more where friction's kinks are in many rows
+    // the median of |r| is 0.6745 σ for noise, and larger if friction causes kinks in many rows
     let typical = |residuals: &[f64]| median(residuals).map_or(0.0, |m| m / 0.6745);
     let around: Vec<f64> = residuals.chunks(SPIKE_AROUND).map(typical).collect();
     let usual = typical(&residuals).max(gain() * noise_level(&y));
-    // in 10¹⁴ recordings of 135,000 rows of noise no value is ten standard deviations out
+    // one of 10¹⁴ recordings with 135,000 rows of noise exceeds ten standard deviations
     let limit = |k: usize| {
         let chunk = (k.max(2) - 2) / SPIKE_AROUND;
         let near = chunk.saturating_sub(1)..(chunk + 2).min(around.len());
@@ -67,14 +67,14 @@ pub fn find(
         .filter(|&k| residuals[k - 2] > limit(k) && !near_step(torque, rows[k], step))
         .collect();
     let most = (SPIKE_SHARE * y.len() as f64) as usize;
-    // a spike is in the cubics of four neighbours
+    // a spike affects the cubics of four neighbours
     if suspects.is_empty() || suspects.len() > 5 * most {
         return Vec::new();
     }
     let mut sound: BTreeSet<usize> = (0..y.len()).collect();
     let off_sound = |sound: &BTreeSet<usize>, k: usize| off((&t, &y), &near(sound, k), k);
-    // by |r| and row; the bits of numbers that are not negative sort as the numbers do. An entry is out of date if the
-    // row's |r| has changed since.
+    // Sorted by |r| and row; the bits of non-negative numbers sort like the numbers. An entry is outdated if |r| of its
+    // row has changed since.
     let mut by_size: BinaryHeap<(u64, usize)> =
         suspects.iter().map(|&k| (residuals[k - 2].to_bits(), k)).collect();
     let mut taken: Vec<usize> = Vec::new();
@@ -90,7 +90,7 @@ pub fn find(
         let suspected = near(&sound, k).into_iter().filter(|j| suspects.binary_search(j).is_ok());
         by_size.extend(suspected.map(|j| (off_sound(&sound, j).0.abs().to_bits(), j)));
     }
-    // put back neighbours of spikes that were taken by mistake
+    // neighbours of spikes that were removed by mistake are restored
     for k in taken.iter().copied() {
         if off_sound(&sound, k).0.abs() < limit(k) {
             sound.insert(k);
@@ -108,8 +108,8 @@ fn near(sound: &BTreeSet<usize>, k: usize) -> Vec<usize> {
     sound.range(..k).rev().take(2).chain(sound.range(k + 1..).take(2)).copied().collect()
 }
 
-/// Returns the difference of the value in row `k` from the cubic through the rows `nodes`, scaled
-/// so that its noise is that of evenly spaced rows, and the cubic's value in row `k`.
+/// Returns the difference of the value in row `k` from the cubic through the rows `nodes`, scaled to the noise of evenly spaced
+/// rows, and the cubic's value in row `k`.
 fn off((time, y): (&[f64], &[f64]), nodes: &[usize], k: usize) -> (f64, f64) {
     let times: Vec<f64> = nodes.iter().map(|j| time[*j]).collect();
     let weights = weights(&times, time[k]);
@@ -118,8 +118,7 @@ fn off((time, y): (&[f64], &[f64]), nodes: &[usize], k: usize) -> (f64, f64) {
     ((y[k] - cubic) * gain() / own.max(gain()), cubic)
 }
 
-/// Returns true if the torque changes by more than `step`, N·m, from one row to the next in the
-/// neighbourhood of `row`.
+/// Returns true if the torque changes by more than `step`, N·m, between neighbouring rows close to `row`.
 fn near_step(torque: &[f64], row: usize, step: f64) -> bool {
     let near = row.saturating_sub(SPIKE_NEAR_STEP)..(row + SPIKE_NEAR_STEP).min(torque.len() - 1);
     near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)
@@ -130,7 +129,7 @@ mod tests {
     use super::*;
     use analysis::random::Random;
 
-    /// Time, torque and rate: 300 s of a sine of 2.4 Hz in noise of 0.4 mrad/s, with spikes at rows.
+    /// Returns time, torque and rate: 300 s of a sine of 2.4 Hz with noise of 0.4 mrad/s and these spikes.
     fn with(spikes: &[(usize, f64)]) -> [Vec<f64>; 3] {
         let mut random = Random::new(7, 0);
         let time: Vec<f64> = (0..15_000).map(|k| 0.02 * f64::from(k)).collect();
@@ -147,21 +146,21 @@ mod tests {
         find(&time, &rate, &torque, None)
     }
 
-    /// Single and pairs of wrong values of 0.01 to 3 rad/s in a recorded rate are found and replaced; a recording with
-    /// noise only has no spikes.
+    /// Single wrong values and pairs of them, of 0.01 to 3 rad/s, are found and replaced. A recording with noise
+    /// only has no spikes.
     #[test]
     fn single_and_adjacent_spikes_are_found_and_noise_is_not_a_spike() {
         assert_eq!(found(&[]), []);
         let spikes = [(300, 0.02), (4000, -0.5), (4001, -0.4), (9000, 3.0), (9002, 0.01)];
         let found = found(&spikes);
         assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), spikes.map(|s| s.0));
-        // within 4 deviations of the cubic through noise, and the curve's own fourth order of 5 % of 20 mrad/s
+        // within 4 standard deviations of the cubic through noise, plus its fourth-order error, 5 % of 20 mrad/s
         let [_, _, clean] = with(&[]);
         found.iter().for_each(|(k, y)| assert!((y - clean[*k]).abs() < 3.3e-3, "{k} {y}"));
     }
 
     #[test]
-    fn more_than_one_value_in_a_hundred_is_no_spike() {
+    fn deviating_values_are_no_spikes_if_they_are_more_than_one_in_a_hundred() {
         let many: Vec<(usize, f64)> = (10..14_000).step_by(60).map(|k| (k, 0.1)).collect();
         assert!(many.len() > 150);
         assert_eq!(found(&many), []);
@@ -169,7 +168,7 @@ mod tests {
 
     #[test]
     fn a_long_burst_of_noise_is_not_treated_as_spikes_and_is_searched_in_linear_time() {
-        // 15,000 rows of noise a thousand times as large: to look at all of them for each took minutes
+        // 15,000 rows with a thousand times the noise: a search that looks at all of them for each row took minutes
         let mut random = Random::new(9, 0);
         let burst = |k: usize| (100_000..115_000).contains(&k);
         let mut rate = || -> Vec<f64> {
@@ -180,20 +179,20 @@ mod tests {
         assert_eq!(find(&time, &rate(), &vec![0.0; 400_000], None), []);
     }
 
-    /// The torque alternates between 2 and −2 N·m; the kinks of the rate are not removed as spikes.
+    /// The torque alternates between 2 and −2 N·m. The kinks of the rate are not removed as spikes.
     #[test]
     fn a_step_of_the_torque_makes_no_spike() {
         let [time, mut torque, mut rate] = with(&[]);
         for (k, t) in time.iter().enumerate() {
             torque[k] = if (k / 1000) % 2 == 0 { 2.0 } else { -2.0 };
-            // a triangle of 4 N·m/0.3 kg·m²: its kinks are 0.09 rad/s
+            // a triangle wave of 4 N·m/0.3 kg·m², with kinks of 0.09 rad/s
             let part = (t / 20.0).fract() - 0.5;
             rate[k] += 13.0 * 20.0 * (0.5 - part.abs()) / 2.0;
         }
         assert_eq!(find(&time, &rate, &torque, None), []);
     }
 
-    /// Tests a resonance that a slow gyro samples three times in each period, and rows at irregular times.
+    /// One recording has three samples per period of a resonance, the other one irregular times.
     #[test]
     fn a_motion_that_is_sampled_coarsely_or_unevenly_has_no_spikes() {
         let mut random = Random::new(9, 0);

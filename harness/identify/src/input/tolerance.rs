@@ -1,16 +1,15 @@
-//! Tolerances of known values, such as the torque's scale, that are not estimated: relative
-//! standard deviations.
+//! Tolerances of known values that are not estimated, such as the scale of the torque,
+//! as relative standard deviations.
 
 use anyhow::{Context, Result, ensure};
 use names::hubslosh::{G_AXIAL, fluid, tank};
 
 use crate::tuning::TOLD_SHARE;
 
-/// Relative standard deviations of numbers that the recording cannot show.
+/// Relative standard deviations of values that the recording does not determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
-    /// Relative standard deviation of the torque's scale, the ratio of the acting torque to the
-    /// recorded torque.
+    /// Relative standard deviation of the ratio of the acting torque to the recorded torque.
     pub torque: f64,
     pub clock: f64,
     pub gravity: f64,
@@ -21,9 +20,9 @@ pub struct Tolerances {
 pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
-    /// Tolerances of a bench with a calibrated wheel, a quartz clock, a rule and a thermometer: 1 %
-    /// for the torque, 0.01 % for the clock, 0.1 % for gravity (the latitude is known, the axis is
-    /// upright to 2.5°), 0.4 % for the arm (1 mm) and 0.3 % for the density (some 10 K).
+    /// Tolerances of a bench with a calibrated wheel, a quartz clock, a rule and a thermometer: 1 % for the
+    /// torque, 0.01 % for the clock, 0.1 % for gravity (the latitude is known, and the axis is vertical to
+    /// 2.5°), 0.4 % for the arm (1 mm) and 0.3 % for the density (about 10 K).
     fn default() -> Self {
         Tolerances { torque: 0.01, clock: 1e-4, gravity: 1e-3, arm: 4e-3, density: 3e-3 }
     }
@@ -50,8 +49,8 @@ pub struct Share {
     pub most: String,
 }
 
-/// Returns the sentence that names the estimates whose uncertainty comes more from tolerances than
-/// from the recording. `known` describes the tolerances in words.
+/// Returns a sentence that names the estimates whose uncertainty comes mostly from tolerances. `known`
+/// describes the tolerances in words. Returns `None` if there is no such estimate.
 pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
     let large = shares.iter().filter(|share| share.share > TOLD_SHARE);
     let large: Vec<String> = large
@@ -75,7 +74,7 @@ impl Tolerances {
         [self.torque, self.clock, self.gravity, self.arm, self.density]
     }
 
-    /// Returns these tolerances with those replaced that a text names, for example
+    /// Returns these tolerances, in which the text replaces the named ones, for example
     /// `torque=1%,tank.r=0.002`.
     pub fn with(mut self, text: &str) -> Result<Self> {
         for item in text.split(',') {

@@ -1,5 +1,5 @@
-//! Frequency and damping from free decays ([`analysis::free_decay`]): records without torque of a wave height, a force,
-//! an angle or a rate, of a tank that was shaken once or of a hub that was pushed.
+//! Frequency and damping from free decays ([`analysis::free_decay`]): recordings without torque of a wave height, a force, an
+//! angle or a rate, after a tank was shaken once or a hub was pushed.
 
 use analysis::free_decay::{self, LEAST_PERIODS, Record, Start};
 use analysis::statistics::noise_level;
@@ -19,14 +19,14 @@ use crate::news::News;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::failed;
 
-/// Ratio of the amplitude of another oscillation in the residual to the amplitude of the decaying
-/// oscillation, above which the verdict names the other one.
+/// Amplitude of another oscillation in the residual, relative to the decaying oscillation, above which
+/// the verdict mentions it.
 const NAMED: f64 = 0.02;
 /// Prior of the drift of a wave probe. Its width is large because almost nothing is known about this drift.
 const DRIFT: Drift = Drift { size: 0.3, time: 1.0, width: 3.0 };
 
-/// Result of a free decay. Its `measurement` has the frequency f, the damping ratio ζ, the growth
-/// of ζ with the amplitude, ζ_A, and the hardening κ.
+/// Result of a free decay. Its `measurement` contains the frequency f, the damping ratio ζ, the increase ζ_A of ζ with the
+/// amplitude, and the hardening κ.
 pub type Found = Identified<Details>;
 
 #[derive(Clone, Debug, Serialize)]
@@ -34,16 +34,16 @@ pub struct Details {
     pub signal: String,
     pub amplitudes: Vec<[f64; 2]>,
     pub periods: Vec<f64>,
-    /// Damping ratio ζ if it is taken as constant over the amplitude.
+    /// Damping ratio ζ if ζ is assumed not to depend on the amplitude.
     pub zeta_constant: f64,
     pub residual: f64,
-    /// Root mean square of the residual if ζ is taken as constant, in the signal's unit.
+    /// Root mean square of the residual if ζ is assumed not to depend on the amplitude, in the signal's unit.
     pub residual_constant: f64,
     pub noise: f64,
 }
 
 pub struct FreeDecay {
-    /// Name of the signal that the recordings hold in place of the rate.
+    /// Name of the recorded signal.
     pub signal: &'static str,
     pub clock: f64,
 }
@@ -93,7 +93,7 @@ fn problem<'a>(
     };
     let size = starts.iter().map(|start| start.amplitude).fold(0.0, f64::max);
     let longest = starts.iter().map(|start| start.periods).fold(0.0, f64::max);
-    // what shows over a record is a part of a turn, or of the amplitude
+    // smallest visible change over a recording: a fraction of a turn of the phase, or of the amplitude
     let small = 0.1 / longest;
     let all = Role::Run(None);
     let linear = |name: &str, unit: &str, role, start: (f64, f64)| {
@@ -137,7 +137,7 @@ fn problem<'a>(
     };
     let first: Vec<f64> = unknowns.iter().map(|u| u.start).collect();
     let mut constant = first.clone();
-    // no growth of the damping with the amplitude
+    // damping that does not depend on the amplitude
     constant[2] = 0.0;
     Problem {
         system,
@@ -208,7 +208,7 @@ impl Method for FreeDecay {
         for (k, unit) in [(1, "1"), (2, inverse), (3, squared)] {
             answer.measurement.insert(COMMON[k].into(), Estimated::normal(z[k], std(k), unit));
         }
-        // a damping ratio does not depend on the clock
+        // an error of the clock changes f, but not the damping ratio
         let estimated = Estimated::normal(z[0], std(0).hypot(self.clock * z[0]), "Hz");
         let frequency = Estimated { std_noise: std(0), ..estimated };
         let plus = |e: &Estimated| format!("{:.5} ± {:.5}", e.value, 1.96 * e.std);
@@ -308,7 +308,7 @@ mod tests {
     }
 
     /// Integrates an oscillator with linear and quadratic damping and a cubic spring by a Runge–Kutta method, independently of
-    /// the closed form that is fitted.
+    /// the closed form that the method fits.
     fn oscillator(
         zeta: f64,
         quadratic: f64,
@@ -346,8 +346,8 @@ mod tests {
 
     #[test]
     fn damping_that_grows_with_the_amplitude_is_found_as_averaging_predicts_it() {
-        // x'' + ... + q x'|x'|: averaging gives ζ_A = 4 q/(3π) (Nayfeh and Mook 1979, 3.3.3), and a cubic spring gives
-        // κ = 3 α/8. Both hold to first order in the amplitude squared: 0.2² α q below 1 %
+        // x'' + ... + q x'|x'|: averaging gives ζ_A = 4 q/(3π) (Nayfeh and Mook 1979, 3.3.3), and a cubic spring gives κ = 3
+        // α/8. Both are of first order in the squared amplitude; the error, 0.2² α q, is below 1 %.
         let (q, alpha) = (0.02, -0.05);
         let (time, signal) = oscillator(0.004, q, alpha, 0.3, 60.0);
         let answer = found(time, signal);
@@ -369,11 +369,10 @@ mod tests {
         assert!(residual < 1e-3 * 0.3 && residual_constant > 10.0 * residual);
     }
 
-    /// 95 % intervals of frequency and damping from 60 simulated free decays, with white and with correlated noise.
     #[test]
     fn intervals_contain_the_true_value_in_white_and_in_coloured_noise() {
-        // 60 records of 25 s each. The 95 % interval covers 57 on average with a scatter of 1.7;
-        // the limit is three below
+        // 60 simulated recordings of 25 s each. On average 57 of the 95 % intervals contain the true value, with a standard
+        // deviation of 1.7; the limit is three standard deviations lower.
         for (colour, least) in [(0.0, 52), (0.9, 52)] {
             let (mut held, mut fits) = ([0; 3], 0);
             for seed in 0..60 {

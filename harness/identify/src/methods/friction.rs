@@ -1,5 +1,5 @@
-//! Friction and inertia from runs in which the liquid does not move, by [`output_error`] with a rigid liquid. The measured
-//! friction over the rate and the deceleration over the hub's angle (thesis 5.2 to 5.4) are added.
+//! Friction and inertia from recordings in which the liquid does not move, fitted by [`output_error`] with a rigid liquid. Two
+//! results of the thesis (5.2 to 5.4) are added: the measured friction over the rate, and the deceleration over the hub's angle.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -29,7 +29,7 @@ use crate::tuning::{
 use crate::words::page::Sections;
 
 pub struct Friction {
-    /// Options of the fit; its slosh models and friction laws are not used.
+    /// Options of the fit. Their slosh models and friction laws are not used.
     pub options: Options,
 }
 
@@ -57,10 +57,11 @@ impl Method for Friction {
     }
 }
 
-/// Fits friction and inertia. The tank is empty unless the settings state how much liquid is in it; the verdict says so.
+/// Fits friction and inertia. Unless the settings state the fill of the tank, the tank is assumed to be empty, and
+/// the verdict says so.
 ///
 /// # Errors
-/// If the recordings do not show friction, with what to record.
+/// If the recordings do not show friction. The message says what to record.
 pub fn identify(
     fmu: &Fmu,
     recordings: &[Recording],
@@ -120,8 +121,8 @@ pub fn identify(
     Ok(found)
 }
 
-/// Returns the settings of a bench without liquid: the smallest density that the FMU accepts, with
-/// which the bench's tank has 2e-9 kg of liquid.
+/// Returns the settings of a bench without liquid: the smallest density that the FMU accepts, with which the bench's
+/// tank contains 2e-9 kg.
 pub fn empty() -> [(String, String); 1] {
     [(fluid::RHO.into(), "1e-6".into())]
 }
@@ -155,14 +156,14 @@ fn check(recordings: &[Recording]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the measured friction over the rate, averaged over rows of similar rate in which the hub turns. `inertia` is the
-/// inertia of hub and liquid, kg·m².
+/// Returns the measured friction over the rate: averages over rows of similar rate in which the hub turns. `inertia` is the
+/// inertia of hub and liquid together, kg·m².
 fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Vec<FrictionPoint> {
     let (count, fewest) = FRICTION_BINS;
     let mut all: Vec<(f64, f64)> = Vec::new();
     for (recording, bias) in recordings.iter().zip(biases) {
         let own = recording.of_gyro();
-        // differences over blocks of rows, so that fast sampling does not drown them in noise
+        // averaged over blocks of rows, because differences between neighbouring fast samples would be mostly noise
         let block = ((BLOCK / own.step() * (1.0 + 1e-9)) as usize).max(1);
         let means = |signal: &[f64]| -> Vec<f64> { signal.chunks_exact(block).map(mean).collect() };
         let [t, rate, torque] = [&own.time, &own.rate, &own.torque].map(|signal| means(signal));
@@ -177,7 +178,7 @@ fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Ve
         }
     }
     let most = all.iter().map(|(w, _)| w.abs()).fold(f64::MIN_POSITIVE, f64::max);
-    // finer near zero, where friction changes most
+    // intervals are narrower near zero, where friction changes most
     let bin = |w: f64| (w.signum() * (w.abs() / most).sqrt() * count as f64 / 2.0).round() as i64;
     let mut bins: BTreeMap<i64, (f64, f64, usize)> = BTreeMap::new();
     for (w, torque) in all {
@@ -192,11 +193,11 @@ fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Ve
     bins.into_values().filter(|bin| bin.2 >= fewest).map(point).collect()
 }
 
-/// Smallest number of stretches, parts of a decay within one revolution, from whose scatter the
-/// uncertainty of the five coefficients of [`Braking`] is computed.
+/// Smallest number of stretches (parts of a decay within one revolution). The uncertainty of the five coefficients of [`Braking`]
+/// is computed from the scatter between stretches.
 pub const LEAST_STRETCHES: usize = 10;
 
-/// Fits [`Braking`] in both directions; a direction with too few rows is left out.
+/// Fits [`Braking`] separately for both directions. A direction with too few rows is left out.
 fn brakings(recordings: &[Recording], biases: &[f64]) -> Vec<Braking> {
     let mut free: [Vec<FreeRow>; 2] = Default::default();
     let mut stretch = 0;
@@ -238,13 +239,12 @@ struct FreeRow {
     angle: f64,
     speed: f64,
     acceleration: f64,
-    /// Number of the stretch to which the row belongs: a part of one decay within one revolution of
-    /// the hub.
+    /// Number of the stretch to which the row belongs. A stretch is a part of one decay within one revolution of the hub.
     stretch: usize,
 }
 
-/// Fits the deceleration in one direction of rotation by least squares, as harmonics of the angle plus a parabola in the
-/// difference from `speed`, rad/s. The result is the deceleration at that speed.
+/// Fits the deceleration in one direction of rotation by least squares: harmonics of the angle plus a parabola in the difference
+/// of the rate from `speed`, rad/s. The result is the deceleration at `speed`.
 fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Braking> {
     let (harmonics, count) = (2, rows.len());
     let (width, all) = (2 * harmonics + 1, 2 * harmonics + 3);
@@ -312,7 +312,7 @@ fn friction_curve(found: &Identification) -> Markup {
         ];
         let label = "friction torque, N·m";
         let mut chart = axis_chart(title, "rate, rad/s", label, lines, false);
-        // the curve rises to the corner of the legend
+        // headroom, because the curve rises into the corner with the legend
         let torques = || within.iter().map(|p| p.torque);
         let top = 1.6 * torques().fold(0.0, f64::max);
         chart.y = Axis::linear(label, torques().chain([top]), 0.0, 5);
@@ -339,8 +339,8 @@ fn braking_chart(all: &[Braking]) -> Markup {
 mod tests {
     use super::*;
 
-    /// Twelve decays in one direction from 6 rad/s, under viscous and dry friction. The dry friction varies with the angle by the
-    /// share `cosine`; the gyro has noise.
+    /// Simulates twelve decays in one direction from 6 rad/s, with viscous and dry friction and noise of the gyro. The dry
+    /// friction varies with the cosine of the angle by the fraction `cosine`.
     fn decays(random: &mut analysis::random::Random, way: f64, cosine: f64) -> Vec<Recording> {
         (0..12)
             .map(|_| {
@@ -375,7 +375,7 @@ mod tests {
             .collect()
     }
 
-    /// Returns true if the difference between the two directions leaves its 95 % band at some angle.
+    /// Returns true if the difference between the two directions leaves its 95 % band at any angle.
     fn differ(seed: u64, cosine: f64) -> bool {
         let mut random = analysis::random::Random::new(seed, 0);
         let all = [decays(&mut random, 1.0, cosine), decays(&mut random, -1.0, 0.0)].concat();
@@ -387,12 +387,11 @@ mod tests {
         })
     }
 
-    /// Friction that varies with the hub's angle by 10 % is detected in at least 95 of 100 simulated recordings; random
-    /// scatter is reported in at most 12 of 100.
     #[test]
-    fn scatter_of_decays_is_not_a_preferential_direction_and_ten_per_cent_of_friction_is() {
+    fn noise_of_decays_shows_no_preferential_direction_and_friction_that_varies_by_10_per_cent_does()
+     {
         let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
-        // 95 % for the whole curve: 5 of 100 expected, 12 are three standard deviations more
+        // the 95 % band holds for the whole curve: 5 of 100 are expected, and 12 are three standard deviations more
         assert!(of(0.0) <= 12, "{}", of(0.0));
         assert!(of(0.1) >= 95, "{}", of(0.1));
     }

@@ -1,4 +1,4 @@
-//! Methods of identification, one in each file, and the types of their inputs and results.
+//! Methods of identification, each in a file of its own, and the types of their inputs and results.
 
 pub mod free_decay;
 pub mod friction;

@@ -1,5 +1,4 @@
-//! Output-error fit of the FMU in the time domain: the whole way from recordings to parameters with their uncertainty and to the
-//! verdict.
+//! Output-error fit of the FMU in the time domain: from recordings to parameters with their uncertainty and a verdict.
 
 mod page;
 
@@ -88,8 +87,8 @@ pub fn identify(
     Ok(found)
 }
 
-/// Returns a sentence that says up to which time a model fits a recording, if one fits its
-/// beginning but not the whole; `None` if no model fits a beginning.
+/// Returns a sentence that says up to which time a model fits a recording, if a model fits its beginning but not the whole.
+/// Returns `None` if no model fits a beginning.
 fn fitting_beginning(
     fmu: &Fmu,
     recording: &Recording,
@@ -142,17 +141,17 @@ fn identify_whole(
         doubts.extend(found);
     }
     let (response, starts) = start::from_data(recordings, &nominal)?;
-    // the response is that of a hub with slosh
+    // there is a response only if the data show a hub with slosh
     if let (Some(found), true) = (&response, options.models.iter().any(|m| *m != Frozen.name())) {
         plausible::check_size(found.inertia, nominal.inertia)?;
     }
     let said = response.as_ref().map(Response::line);
-    tell(News::Step(said.unwrap_or("frequency response: no slosh in it".into())));
+    tell(News::Step(said.unwrap_or("frequency response: it shows no slosh".into())));
     for (number, start) in starts.iter().enumerate() {
         let line = format!("start {}: {}", number + 1, start.line());
         tell(if number == 0 { News::Step(line) } else { News::Detail(line) });
     }
-    // the slosh models with the first friction law, then other laws
+    // all slosh models with the first friction law, then the other laws with the best slosh model
     let first = options.friction.first().map_or(FrictionModel::Stribeck.name(), String::as_str);
     let laws = std::iter::once(first).chain(options.friction.iter().skip(1).map(String::as_str));
     let is_asked = |model: &&str| options.models.iter().any(|other| other == model);
@@ -224,7 +223,7 @@ fn identify_whole(
     let laws: Vec<ModelFit> =
         fitted.first().into_iter().chain(&others).map(|f| f.fit.clone()).collect();
     let mut models: Vec<ModelFit> = fitted.iter().chain(&others).map(|f| f.fit.clone()).collect();
-    // a law must be better than the first by what decides
+    // another law replaces the first only if it is clearly better
     let other = others.iter().position(|f| f.fit.bic < fitted[0].fit.bic - DECIDES);
     let probabilities = verdict::probabilities(fitted[..near].iter().map(|f| f.fit.bic));
     let question =
@@ -251,8 +250,8 @@ fn identify_whole(
     Ok(found)
 }
 
-/// Returns a start of the search for `problem` at the minimum that was found for another model.
-/// Unknowns that the other model lacks keep the start that the problem has for them.
+/// Returns a start for `problem` from the minimum of another model. Unknowns that the other model lacks keep
+/// the problem's own start.
 fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
     let values = from.solution.fit.values(&from.solution.minimum.point.z);
     let mut start = problem.starts[0].clone();
@@ -264,8 +263,8 @@ fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
     start
 }
 
-/// Sorts the models by the information criterion; among equal ones the simplest comes first. Returns how many models are not
-/// clearly worse than the first, and the number of models.
+/// Sorts the models by the Bayesian information criterion; among equal ones the simplest comes first. Returns the number of
+/// models that are not clearly worse than the first, and the number of all models.
 fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
     let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();

@@ -1,5 +1,4 @@
-//! Second stage of an identification: the unknowns, and the outputs that the FMU computes for their
-//! values.
+//! The unknowns of an identification, and the simulation of the FMU with given values of the unknowns.
 
 pub mod overridden;
 pub mod simulate;

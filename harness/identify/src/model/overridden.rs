@@ -1,4 +1,5 @@
-//! Parameters whose value another parameter replaces, from the FMU's warnings: "slosh.zeta has no effect: …".
+//! Parameters that have no effect because another parameter replaces them. The FMU's warnings name them:
+//! "slosh.zeta has no effect: …".
 
 use anyhow::{Result, bail};
 
@@ -21,8 +22,8 @@ pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Returns a value close to `start`, but different from it, within the bounds. It is needed because
-/// the FMU does not warn about a parameter that keeps its default.
+/// Returns a value close to `start` within the bounds, but different from `start`, because an FMU does not
+/// warn about a parameter that is set to its default.
 pub fn near(start: f64, (low, high): (f64, f64), reach: f64) -> f64 {
     let by = 1e-6 * reach;
     if start + by <= high { start + by } else { (start - by).max(low) }

@@ -1,4 +1,4 @@
-//! An FMU's outputs at the rows of a recording, by its own solver or by the host's.
+//! Simulates an FMU at the rows of a recording, with the FMU's own solver (Co-Simulation) or with the host's (Model Exchange).
 
 use std::path::Path;
 
@@ -19,8 +19,8 @@ use crate::tuning::{
     SLOPE_PROBES,
 };
 
-/// Returns the value of `solver.max_steps` for runs over these instants, s; `None` if the FMU has
-/// no such parameter, the settings set it, or its default is smaller.
+/// Returns the value for the FMU's parameter `solver.max_steps` in runs over these instants, s. Returns `None` if the FMU has no
+/// such parameter, if the settings set it, or if its default is smaller.
 pub fn most_steps<'n>(
     description: &ModelDescription,
     mut set: impl Iterator<Item = &'n str>,
@@ -60,12 +60,12 @@ impl Model {
         self.fmu().description()
     }
 
-    /// Returns true if the FMU steps itself, but also offers Model Exchange.
+    /// Returns true if Co-Simulation is used, but the FMU also supports Model Exchange.
     pub fn offers_exchange(&self) -> bool {
         matches!(self, Model::Own(fmu) if fmu.description().model_exchange.is_some())
     }
 
-    /// Returns the process-wide settings that loading the FMU's binary has changed.
+    /// Returns the names of process-wide settings, such as the rounding mode, that loading the FMU's binary has changed.
     pub fn changed(&self) -> &[&'static str] {
         self.fmu().changed()
     }
@@ -78,13 +78,13 @@ fn interpolates(description: &ModelDescription) -> bool {
 #[derive(Clone, Debug)]
 pub struct Setup {
     settings: Vec<Setting>,
-    /// Value references of the inputs, and whether each is held from row to row.
+    /// Value references of the inputs, and for each whether it is held constant from row to row.
     inputs: Vec<u32>,
     held: Vec<bool>,
     outputs: Vec<Output>,
     reads: Vec<u32>,
     tolerance: Option<f64>,
-    /// Communication steps from one row to the next, of an FMU that steps itself.
+    /// Number of communication steps from one row to the next (Co-Simulation).
     substeps: usize,
     /// Largest number of steps that the host's solver may take from one row to the next.
     most_steps: usize,
@@ -92,7 +92,7 @@ pub struct Setup {
 
 pub struct Finer {
     pub setup: Setup,
-    /// The FMU, opened again for another solver; `None` if the solver stays the same.
+    /// The FMU, opened again for another solver; `None` if the solver does not change.
     pub model: Option<Model>,
 }
 
@@ -113,8 +113,7 @@ impl Output {
     }
 }
 
-/// An instance of the FMU that is ready for its first step, for the FMU's own solver or for the
-/// host's.
+/// An initialised instance of the FMU, for Co-Simulation or for the host's solver.
 enum Initialised<'m> {
     Own(Instance<'m>),
     Host(exchange::Run<Box<Instance<'m>>>),
@@ -123,11 +122,11 @@ enum Initialised<'m> {
 pub type Value = (u32, f64);
 
 impl Setup {
-    /// Returns what runs for a question need: the value references of its variables and the
+    /// Returns the setup of the simulations for a question: the value references of the question's variables and the
     /// settings of the solver.
     ///
     /// # Errors
-    /// If the FMU lacks a variable of the question; the message lists all such names.
+    /// If the FMU lacks a variable of the question; the message lists all these names.
     pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
         let mut problems = Vec::new();
         let references = |names: &[String], problems: &mut Vec<String>| -> Vec<u32> {
@@ -181,10 +180,9 @@ impl Setup {
         })
     }
 
-    /// Returns setups for the same runs with smaller errors of the solver: with a finer tolerance,
-    /// with shorter communication steps, and with the host's solver if it can integrate the FMU
-    /// ([`Setup::can_exchange`]). The FMU may refuse or ignore a finer tolerance and shorter steps.
-    /// The host's solver refuses runs that would take long.
+    /// Returns setups for the same simulations with smaller errors of the solver: with a smaller tolerance, with shorter
+    /// communication steps, and with the host's solver if it can integrate the FMU ([`Setup::can_exchange`]). The FMU may refuse
+    /// or ignore a smaller tolerance and shorter steps. The host's solver refuses simulations that would take long.
     pub fn finer(&self, model: &Model) -> Vec<Finer> {
         let setup = |setup: Setup| Finer { setup, model: None };
         let Model::Own(fmu) = model else {
@@ -218,8 +216,9 @@ impl Setup {
         model.offers_exchange() && !self.slopes_act(model.fmu()).is_ok_and(|act| act)
     }
 
-    /// Returns true if the slope of an input changes an output at once, as the slope of the wheels' angular momentum is a torque
-    /// on a spacecraft. Model Exchange hands over no slopes: the host's solver would integrate another motion.
+    /// Returns true if an output depends directly on the time derivative (slope) of an input. For example, the slope of the
+    /// wheels' angular momentum is a torque on a spacecraft. Model Exchange passes no slopes, so the host's solver would
+    /// then integrate another motion.
     fn slopes_act(&self, fmu: &Fmu) -> Result<bool> {
         let description = fmu.description();
         if !interpolates(description) {
@@ -253,7 +252,7 @@ impl Setup {
         if reads(&mut instance)? != without {
             return Ok(true);
         }
-        // an FMU 3.0 hears of slopes within steps alone: what acts at once does not shrink with the step
+        // FMI 3.0 takes slopes only during a step: a direct dependence does not shrink with the step
         let after = |step: f64, slope: f64| -> Result<Vec<f64>> {
             let mut instance = begun()?;
             let mut values = vec![0.0; self.inputs.len()];
@@ -364,8 +363,8 @@ impl Setup {
     }
 
     /// Simulates with the FMU's own solver: at each row it sets the inputs (with slopes if the FMU takes them), reads the outputs
-    /// and steps to the next row. Where the FMU takes no slopes, inputs that follow lines are held over [`HELD_STEPS`] parts of
-    /// the way, each at its value in the middle of the part.
+    /// and steps to the next row. If the FMU takes no slopes, the way from row to row is divided into [`HELD_STEPS`] steps, and
+    /// linear inputs are held at their value in the middle of each step.
     fn step(
         &self,
         instance: &mut Instance,
@@ -379,7 +378,7 @@ impl Setup {
             if !values.is_empty() {
                 instance.set_real(&self.inputs, &values)?;
             }
-            // an output may follow an input's slope, which changes here: what is read is that of the row onwards
+            // an output may depend on the slope of an input, which changes at this row; the slope after the row counts
             if is_sloped {
                 instance.set_slopes(&self.inputs, &slopes)?;
             }
@@ -424,8 +423,8 @@ impl Setup {
         Ok(())
     }
 
-    /// Delays the outputs of sensors with a delay: the reading in a row is the output of the row that is earlier by the delay, or
-    /// 0 before the first reading has arrived.
+    /// Applies the delays of sensors: the reading in a row is the output of the row that is earlier by the delay, and 0 as long
+    /// as this row would be before the recording.
     fn late(&self, record: &Record, mut read: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
         for (number, (output, column)) in self.outputs.iter().zip(&mut read).enumerate() {
             let Some(sensor) = output.sensor.as_ref().filter(|s| s.errors().delay > 0.0) else {
@@ -434,7 +433,7 @@ impl Setup {
             let (delay, truth) = (sensor.errors().delay, column.clone());
             for (row, value) in column.iter_mut().enumerate() {
                 let then = record.time[row] - delay;
-                // a row within a billionth of the time
+                // two times that differ by less than a billionth are the same row
                 let slack = 1e-9 * (1.0 + record.time[row].abs());
                 let at = record.time.partition_point(|t| *t < then - slack);
                 let there = record.time[at] <= then + slack;

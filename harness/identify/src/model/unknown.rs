@@ -1,4 +1,4 @@
-//! Unknowns of a question, with names, units, bounds and priors.
+//! Unknowns of an identification, with names, units, bounds and priors.
 
 use anyhow::{Context, Result, bail, ensure};
 use host::causality::{Causality, Variability};
@@ -9,13 +9,13 @@ use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad,
 use crate::input::record::Record;
 use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 
-/// Quantity of the FMU's run that an unknown changes.
+/// Quantity of the simulation that an unknown changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     Parameter(u32),
-    /// Relative error x of an input's recorded values: the values times 1 + x act on the FMU.
+    /// Relative error x of an input's recorded values: the FMU receives the recorded values times 1 + x.
     Scale(usize),
-    /// Error x of the clock's rate: true intervals are the recorded intervals times 1 + x.
+    /// Relative error x of the recording's clock: true time intervals are the recorded intervals times 1 + x.
     Clock,
     Reading,
 }
@@ -174,7 +174,7 @@ impl Question {
         }
     }
 
-    /// Returns the relative error of the scale of an input, an output or the clock as an unknown.
+    /// Returns the unknown for the relative scale error of an input, an output or the clock.
     fn scale(&self, of: &str, recording: Option<usize>) -> Result<Targeted> {
         let input = self.inputs.iter().position(|name| name == of);
         let output = self.outputs.iter().position(|name| name == of);
@@ -248,8 +248,8 @@ impl Question {
         known(parameter(&free, description, recording)?, value, std).with_context(|| flag)
     }
 
-    /// Returns the value that a variable has in a recording: the value of `--set` if there is one,
-    /// otherwise the start value in the model description.
+    /// Returns the value of a variable in a recording: the value from `--set` if it sets the variable, otherwise the
+    /// start value in the model description.
     fn set_value(
         &self,
         variable: &Variable,
@@ -279,7 +279,8 @@ fn known((unknown, target): Targeted, mean: f64, std: f64) -> Result<Targeted> {
 
 const CLOCK: &str = "time";
 
-/// Returns the least and largest value that the model description declares for a variable; infinite if it declares none.
+/// Returns the smallest and largest value that the model description declares for a variable, infinite
+/// if it declares none.
 pub fn range(variable: &Variable) -> [f64; 2] {
     let attributes = variable.attributes();
     let number = |text: &Option<String>, otherwise: f64| {
@@ -294,13 +295,12 @@ fn deviation(variable: &Variable, description: &ModelDescription, text: &str) ->
         _ => bail!("{} is not a Real", variable.name),
     };
     let is_of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
-    // a unit may have an offset, as °C has
+    // zero in the same unit, because a unit such as °C has an offset
     let zero = format!("0{}", text.trim_start_matches(is_of_number));
     Ok(number(text)? - number(&zero)?)
 }
 
-/// Returns the name of an unknown. If only one recording has it, the number of this recording is
-/// added: `bias(w)@2`.
+/// Returns the name of an unknown. If it acts in only one recording, the number of the recording is added: `bias(w)@2`.
 fn numbered(name: &str, recording: Option<usize>) -> String {
     recording.map_or(name.into(), |k| format!("{name}@{}", k + 1))
 }

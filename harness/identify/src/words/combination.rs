@@ -2,7 +2,7 @@ use serde::Serialize;
 
 use crate::estimate::prose;
 
-/// Two unknowns of which only a sum or a product is known.
+/// Two unknowns of which the recordings determine only a sum or a product.
 #[derive(Clone, Debug, Serialize)]
 pub struct Combination {
     pub name: String,

@@ -5,17 +5,17 @@ use serde::Serialize;
 
 use crate::estimate::Estimated;
 
-/// Result of every method; `D` has the results that only this method has.
+/// Result of every method of identification; `D` contains the results that only one method has.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identified<D> {
     pub parameters: BTreeMap<String, Estimated>,
-    /// Other estimates: delay, gyro scale and bias, poles and zeros.
+    /// Estimates other than parameters of the FMU: delay, scale and bias of the gyro, poles and zeros.
     pub measurement: BTreeMap<String, Estimated>,
     pub settings: BTreeMap<String, String>,
     pub correlations: (Vec<String>, Vec<Vec<f64>>),
     pub converged: bool,
-    /// True if the model fits, because the residual is the gyro's noise. If false, no interval can
-    /// be trusted. `None` if the method does not test it.
+    /// True if the model fits, that is, if the residual is noise of the gyro. If false, no interval is valid.
+    /// `None` if the method does not test it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fits: Option<bool>,
     pub verdict: Vec<String>,

@@ -1,4 +1,4 @@
-//! Fifth stage of an identification: the results in words, as a page and as JSON.
+//! Writes the results of an identification: sentences of the verdict, an HTML page and JSON.
 
 pub mod combination;
 pub mod identified;

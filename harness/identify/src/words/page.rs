@@ -1,5 +1,5 @@
-//! The page on an identification, which all methods share: verdict, estimates, the method's own sections, residuals over time
-//! with their spectrum and autocorrelation, frequency responses of measurement and model, correlations.
+//! The HTML page about an identification, which all methods share: verdict, estimates, sections of the method, residuals over
+//! time with their spectrum and autocorrelation, frequency responses of measurement and model, correlations.
 
 use analysis::rest;
 use analysis::statistics::{about_mean, variance};
@@ -106,8 +106,8 @@ fn parameters<D>(found: &Identified<D>, combinations: &[Combination]) -> Markup 
     html! { h2 { "Parameters" } (table(head, rows)) }
 }
 
-/// Draws the largest measured and modelled value, and the root mean square of the residual, in each
-/// of [`PAGE_POINTS`] windows of time.
+/// Draws the largest measured and modelled value and the root mean square of the residual in each of [`PAGE_POINTS`] time
+/// windows.
 fn envelope(signals: &Residual) -> Chart {
     let width = (signals.time.len() / PAGE_POINTS).max(1);
     let windows = |of: &dyn Fn(usize) -> f64, mean: bool| -> Vec<(f64, f64)> {
@@ -131,7 +131,7 @@ fn envelope(signals: &Residual) -> Chart {
     axis_chart("Measurement, model and residual", "time, s", &signals.label, lines, true)
 }
 
-/// Draws the 8 s around the fastest motion, measured and modelled, row by row.
+/// Draws measured and modelled values in every row of the 8 s around the fastest motion.
 fn stretch(signals: &Residual) -> Chart {
     let fastest = (0..signals.measured.len())
         .max_by(|a, b| signals.measured[*a].abs().total_cmp(&signals.measured[*b].abs()))
@@ -153,7 +153,7 @@ fn spectrum(signals: &Residual) -> Chart {
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
     let spectra =
         Spectra::estimate(step, &signals.residual, &signals.measured, Segments::Seconds(20.0));
-    // the spectra's unit is arbitrary: Parseval's theorem fixes it
+    // scaled so that the integral is the mean square (Parseval's theorem)
     let density = |bins: &[f64], total: f64| -> Vec<(f64, f64)> {
         let sum = bins.iter().sum::<f64>() * spectra.resolution;
         let each = bins.iter().enumerate().skip(1).step_by((bins.len() / PAGE_POINTS).max(1));
@@ -177,8 +177,7 @@ fn spectrum(signals: &Residual) -> Chart {
     axis_chart("Amplitude density", "frequency, Hz", &format!("{}/√Hz", signals.label), lines, true)
 }
 
-/// Draws the residual over time, thinned out so that the chart has at most 2 [`PAGE_POINTS`]
-/// points.
+/// Draws the residual over time, with at most 2 [`PAGE_POINTS`] points.
 fn residual(signals: &Residual) -> Chart {
     let every = signals.time.len().div_ceil(2 * PAGE_POINTS);
     let rows = (0..signals.time.len()).step_by(every);
@@ -207,8 +206,8 @@ fn autocorrelation(signals: &Residual) -> Chart {
     axis_chart(title, "lag, s", "autocorrelation", lines, false)
 }
 
-/// Draws gain and phase from torque to rate, estimated in the same way from measurement and model;
-/// `None` without a torque that excites a band.
+/// Draws the gain and phase from torque to rate, estimated from measurement and model by the same method. Returns `None` if
+/// the recordings have no torque that excites a frequency band.
 fn bode(signals: &Residual) -> Option<[Chart; 2]> {
     let simulated = signals.measured.iter().zip(&signals.residual).map(|(y, e)| y - e).collect();
     let of = |rate: Vec<f64>| {
@@ -224,7 +223,7 @@ fn bode(signals: &Residual) -> Option<[Chart; 2]> {
         let mut last = None;
         let values = response.frequency.iter().zip(&response.response).map(|(f, h)| {
             let now = h.arg().to_degrees();
-            // without jumps of a whole turn
+            // unwrapped
             let phase = last.map_or(now, |last: f64| now + 360.0 * ((last - now) / 360.0).round());
             last = Some(phase);
             (*f, phase)
@@ -247,7 +246,7 @@ fn bode(signals: &Residual) -> Option<[Chart; 2]> {
 
 fn correlations<D>(found: &Identified<D>, condition: Option<f64>) -> Markup {
     let (names, matrix) = &found.correlations;
-    // the ink grows with the correlation
+    // the colour is stronger for a larger correlation
     let style = |value: f64| {
         let (share, color) = ((value.abs() * 60.0) as i32, if value < 0.0 { "b" } else { "a" });
         format!("background:color-mix(in srgb,var(--{color}) {share}%,transparent)")
@@ -258,7 +257,7 @@ fn correlations<D>(found: &Identified<D>, condition: Option<f64>) -> Markup {
             p { (format!("Condition number of the sensitivities: {condition:.0}.")) }
         }
         div class="scroll" {
-            // the columns have the rows' numbers: names would make it wider than a screen
+            // columns have numbers instead of names, because names would make the table wider than a screen
             table .numbered {
                 tr { th {} @for number in 1..=names.len() { th { (number) } } }
                 @for (number, (name, row)) in (1..).zip(names.iter().zip(matrix)) {

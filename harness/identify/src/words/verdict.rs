@@ -3,13 +3,12 @@ use analysis::innovations::{self, Tests};
 pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
 pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
-/// Beginning of the verdict's sentence that the solver's errors are too large for a judgement of
-/// the fit.
+/// Beginning of a verdict if the solver's errors are too large to judge the fit.
 pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
-/// Beginnings of those sentences of a verdict that say that the numbers cannot be trusted.
+/// Beginnings of verdicts whose estimates are not reliable.
 pub const DOUBTS: [&str; 3] = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED];
 
-/// Returns a phrase for each test that a residual fails, with the size of the failure in standard deviations of chance; `input`
+/// Returns a phrase for each test that a residual fails, with the size of the failure in standard deviations of chance. `input`
 /// is the name of the signal with which the residual may be correlated.
 pub fn failed(tests: &Tests, input: &str) -> Vec<String> {
     let (time, frequency) = (tests.in_time, tests.in_frequency);

@@ -1,4 +1,4 @@
-//! Sections of the page on an output-error fit: the models that were tried.
+//! Sections of the page about an output-error fit: the models that were tried.
 
 use maud::{Markup, html};
 use report::page::table;
