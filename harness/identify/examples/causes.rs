@@ -1,11 +1,11 @@
-//! Is the cause of a misfit named? Recordings of a bench with an effect that was not fitted, in ten ways, each with benches of its
-//! own. Prints the cause that the verdict names, and counts the right ones and the wrong ones.
+//! Tests whether the verdict names the cause of a misfit. Identifies recordings of benches that differ from the fitted models in
+//! one of ten ways. Prints the cause that each verdict names, and counts the right and the wrong ones.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example causes -- [KEY=VALUE ...]
-//!   seeds=1-3           benches of each way
-//!   ways=lag,…          the ways, see [`WAYS`]
-//!   say=false           true: the search of every bench
+//!   seeds=1-3           random benches of each way
+//!   ways=lag,…          the ways in which benches differ, see [`WAYS`]
+//!   say=false           true: prints the messages of every search
 //! ```
 
 #[path = "fmu_twin/mod.rs"]
@@ -23,17 +23,16 @@ use identify::input::reading::prepare;
 use identify::input::recording::Recording;
 use identify::methods::output_error::identify;
 
-/// A way in which a simulated bench differs from every fitted model, for example by a lagging
-/// actuator.
+/// One way in which a simulated bench differs from every fitted model, for example by a lag of the actuator.
 struct Way {
     name: &'static str,
     effects: &'static [Unmodelled],
     settings: &'static [(&'static str, &'static str)],
-    /// Name of the torque under which the difference from the models shows.
+    /// Torque profile with which the difference becomes visible.
     torque: &'static str,
-    /// Change of the gyro's readings, if the effect is a fault of the gyro.
+    /// Changes the rates of the recording, for a fault of the gyro.
     gyro: fn(&mut Recording),
-    /// Words by which the verdict or the notes must name the effect.
+    /// Words with which the verdict or the notes must name the effect.
     named: &'static str,
 }
 

@@ -1,25 +1,25 @@
-//! Do the estimates keep what they state? Identifies many recordings of the FMU with different gyro noise, without priors and
-//! starts. Prints the root-mean-square error over the stated standard deviation, how often the 95 % interval contains the true value,
-//! which models were chosen, and how often no model fitted.
+//! Coverage of the intervals: identifies many recordings of the FMU with different noise of the gyro, without priors and start
+//! values. Prints the root-mean-square error divided by the reported standard deviation, how often the 95 % interval contains the
+//! true value, which models were chosen, and how often no model fitted.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example coverage -- [KEY=VALUE ...]
-//!   seeds=1-50          gyro noises
+//!   seeds=1-50          seeds of the gyro's noise
 //!   torque=PROFILE      as for hubslosh run, or multisine:PEAK,SECONDS
-//!   twin=linear         slosh model of the twin
-//!   set=NAME:VALUE      a setting of the twin (repeatedly); its truth is what the estimates are compared with
-//!   told=NAME:VALUE     a setting of the fit (repeatedly)
+//!   twin=linear         slosh model of the simulated bench (twin)
+//!   set=NAME:VALUE      a setting of the twin (repeatedly), with which its estimate is compared
+//!   fit_set=NAME:VALUE  a setting of the fit (repeatedly)
 //!   models=linear,…     as for hubslosh identify --model
 //!   friction=stribeck,… as for hubslosh identify --friction
-//!   starts=data         or far: all starts 40 % off, up or down by the seed's bits
-//!   perfect=true        no delay, bias, asymmetry, gyro scale is estimated (false: all are)
-//!   sensor_errors=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
+//!   starts=data         or far: start values 40 % above or below the true values, by the bits of the seed
+//!   perfect=true        false: delay, bias, asymmetry and gyro scale are estimated
+//!   sensor_errors=false true: the twin has a delay of 5 ms, a gyro scale of 1.01, a bias of 2 mrad/s and an asymmetry of 0.1
 //!   unmodelled=         tilt, nutation, warming, clipping, drag, with + between several
 //!   rate=50             rows a second
-//!   gyro=50             values of the gyro a second, where it is slower than the rows
-//!   encoder=NUMBER      standard deviation of an encoder's angle, rad; without it there is none
-//!   intersample=linear  of the twin's torque: linear, held, smooth
-//!   say=false           true: the verdict of every seed
+//!   gyro=50             values of the gyro a second, if it is slower than the rows
+//!   encoder=NUMBER      standard deviation of an encoder's angle, rad; without it the twin has no encoder
+//!   intersample=linear  intersample behaviour of the twin's torque: linear, held, smooth
+//!   say=false           true: prints the verdict of every seed
 //! ```
 
 #[path = "fmu_twin/mod.rs"]
@@ -87,7 +87,7 @@ fn arguments() -> Result<Arguments> {
             "torque" => asked.torque = value.into(),
             "twin" => asked.twin.settings.push(("slosh.model".into(), value.into())),
             "set" => asked.twin.settings.push(pair()?),
-            "told" => asked.options.settings.push(pair()?),
+            "fit_set" => asked.options.settings.push(pair()?),
             "models" => asked.options.models = list(value),
             "friction" => asked.options.friction = list(value),
             "starts" => asked.far = value == "far",

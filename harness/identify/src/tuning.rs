@@ -40,7 +40,7 @@ pub const FEW_GAPS: usize = 5;
 pub const WHEEL_WINDOW: f64 = 0.1;
 
 // Reading: `input/reading.rs`.
-// Tests: `each_fault_has_a_sentence_of_its_own`, `twenty_spikes_are_reported_and_left_out`.
+// Tests: `each_fault_of_a_recording_is_named_in_its_error`, `twenty_spikes_are_reported_and_left_out`.
 /// Time at the beginning of a part of a recording in which no sensor is fitted, s, if the hub is already moving there: a sensor
 /// with a delay shows the motion before the part's first torque.
 pub const LATE_SENSOR: f64 = 0.1;
@@ -57,7 +57,7 @@ pub const MOVING_SPREAD: f64 = 2.0;
 pub const FEWEST_VALUES: usize = 10;
 
 // Recordings of the bench: `input/recording.rs`.
-// Tests: `each_fault_has_a_sentence_of_its_own`, `a_gyro_slower_than_the_rows_is_seen_by_its_repeats`, `no_method_hangs_or_panics_on_values_out_of_range`.
+// Tests: `each_fault_of_a_recording_is_named_in_its_error`, `a_gyro_slower_than_the_rows_is_recognised_by_repeated_values`, `no_method_hangs_or_panics_on_values_out_of_range`.
 /// Shortest recording that is accepted, s: about fifty periods of slosh at 2.4 Hz.
 pub const SHORTEST_RECORDING: f64 = 20.0;
 /// Length of a recording above which the verdict does not call it short, s. The half-power width of the slosh resonance of the
@@ -76,7 +76,7 @@ pub const ON_CLOCK: f64 = 0.98;
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
-// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`, `clipping_at_one_end_of_the_range_is_also_assumed_at_the_other_end`.
+// Tests: `each_fault_of_a_sensor_is_reported`, `no_fault_is_found_in_a_sound_gyro`, `a_hub_at_rest_is_no_fault`, `clipping_at_one_end_of_the_range_is_also_assumed_at_the_other_end`.
 /// Smallest number of equal values at an end of the sensor's range that count as clipped, and the smallest ratio of this number
 /// to the number of equal values just inside the range.
 pub const CLIPPED: (usize, f64) = (20, 4.0);
@@ -109,12 +109,12 @@ pub const TORQUE_STEP: f64 = 0.5;
 pub const SPIKE_AROUND: usize = 50;
 
 // Tolerances: `input/tolerance.rs`.
-// Tests: `a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals`.
+// Tests: `intervals_contain_the_true_values_if_the_torque_is_wrong_within_its_tolerance`.
 /// Share of a known value's tolerance in the variance of an estimate above which the verdict mentions the tolerance.
 pub const TOLD_SHARE: f64 = 0.2;
 
 // Unknowns of any FMU: `model/unknown.rs`.
-// Tests: `known_values_count_with_their_tolerances`.
+// Tests: `tolerances_of_known_values_widen_the_intervals`.
 /// Plausible size of a scale error if neither bounds nor a prior state it.
 pub const SCALE_REACH: f64 = 0.1;
 /// Plausible distance of a known value from its mean, standard deviations. It is so large that the effect of a finite difference
@@ -143,12 +143,12 @@ pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
 
 // The bench as it is set up: `bench/nominal.rs`.
-// Tests: `each_fault_has_a_sentence_of_its_own`.
+// Tests: `each_fault_of_a_recording_is_named_in_its_error`.
 /// Largest mean time between rows of a recording from the ground, s: slosh at 2.4 Hz needs more than two rows a period.
 pub const COARSEST: f64 = 0.2;
 
 // Runs of the bench: `bench/simulate.rs`.
-// Tests: `the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque`, `a_run_that_would_not_end_is_refused`.
+// Tests: `the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque`, `a_simulation_that_would_take_too_long_is_refused`.
 /// Two instants closer than this, s, count as the same.
 pub const SAME_INSTANT: f64 = 1e-9;
 /// Largest number of internal steps of our FMUs in a communication step: the first number, plus the second number for each second
@@ -190,7 +190,7 @@ pub const PAGE_POINTS: usize = 700;
 pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
 // Friction runs: `methods/friction.rs`.
-// Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `noise_of_decays_shows_no_preferential_direction_and_friction_that_varies_by_10_per_cent_does`.
+// Tests: `friction_fits_of_three_sets_of_runs_end_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_advice`, `noise_of_decays_shows_no_preferential_direction_and_friction_that_varies_by_10_per_cent_does`.
 /// Length of the blocks of rows that are averaged for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
 /// Smallest number of blocks in the recording of a friction run.

@@ -1,6 +1,6 @@
-//! Logs of a simulated day of tests, on a bench whose equations are independent of the FMU: friction runs, free decays, a gyro at rest and
-//! sine sweeps, as a logger writes them. The gyro has three axes with bias, noise and quantisation; the platform tilts with the hub's
-//! motion.
+//! Writes the logs of a simulated day of tests, on a bench whose equations are independent of the FMU: friction runs, free
+//! decays, a gyro at rest and sine sweeps, in the format of a logger. The gyro has three axes with bias, noise and quantisation;
+//! the platform tilts with the hub's motion.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -13,12 +13,12 @@ use crate::bench::{Bearing, Bench, Drive, Liquid};
 
 const STEP: f64 = 0.02;
 const LEAD_IN: f64 = 5.0;
-/// Standard deviation of the gyro's noise and its quantisation, rad/s (thesis 5.5: N = 5.75e-5 rad/s/√Hz at 50 Hz).
+/// Standard deviation of the gyro's noise, and its quantisation step, rad/s (thesis 5.5: N = 5.75e-5 rad/s/√Hz at 50 Hz).
 pub const GYRO: (f64, f64) = (4.066e-4, 1.527e-4);
-/// Fraction by which the dry friction of the bearing is larger when the hub turns forwards and
-/// smaller when it turns backwards.
+/// Asymmetry of the bearing's dry friction: the friction forwards is (1 + asymmetry) times, and the friction backwards (1 −
+/// asymmetry) times the mean.
 pub const ASYMMETRY: f64 = 0.15;
-/// Ratios of the platform's rates about x and y, with which it tilts, to the hub's rate about z.
+/// Rates about x and y with which the platform tilts, relative to the hub's rate about z.
 const TILT: [f64; 2] = [0.03, 0.02];
 const EMPTY: f64 = 1e-9;
 
@@ -39,7 +39,7 @@ pub struct Day<'a> {
     pub rest: f64,
     pub friction: bool,
     pub models: &'a str,
-    /// Relative error of the recorder's clock: true times are the times of the logs multiplied by 1 − clock.
+    /// Relative error of the logger's clock: true time = logged time · (1 − clock).
     pub clock: f64,
     pub lost: f64,
 }
@@ -110,8 +110,7 @@ impl Day<'_> {
         std::fs::write(directory.join("day.toml"), manifest)
     }
 
-    /// Returns the text of one log. `torque` is the torque, N·m, as a function of the time since
-    /// the end of the lead-in at rest.
+    /// Returns the text of one log. `torque`, N·m, is a function of the time since the end of the initial rest.
     fn log(&self, number: u64, bench: &Bench, torque: &dyn Fn(f64) -> f64, seconds: f64) -> String {
         let rows = ((LEAD_IN + seconds) / STEP).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| STEP * k as f64).collect();
@@ -139,8 +138,7 @@ impl Day<'_> {
     }
 }
 
-/// The thesis's sweep from 1.25 to 3.5 Hz, whose frequency grows exponentially: its sine at the
-/// time `t` of `duration`, s.
+/// Returns the sine of the thesis's exponential sweep from 1.25 to 3.5 Hz, at time `t` of `duration`, s.
 fn chirp(t: f64, duration: f64) -> f64 {
     let (from, ratio): (f64, f64) = (1.25, 3.5 / 1.25);
     (TAU * from * duration / ratio.ln() * (ratio.powf(t / duration) - 1.0)).sin()

@@ -1,4 +1,5 @@
-//! Writes the logs of a day at the bench that is not the FMU, for `hubslosh analyse --bench-day`.
+//! Writes the logs of a simulated day on a bench whose equations are independent of the FMU, as input
+//! of `hubslosh analyse --bench-day`.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example bench_day -- target/day          # 22 sweeps of 45 minutes

@@ -1,5 +1,5 @@
-//! Recordings that the FMU computes in place of a bench, with the noise of its gyro. Identification is tried on these recordings, and they
-//! show what a planned experiment would record.
+//! Recordings that the FMU simulates in place of a real bench, with noise of the gyro. They test the identification, and predict
+//! what a planned experiment would record.
 
 use analysis::random::Random;
 use analysis::statistics::peak;
@@ -14,8 +14,8 @@ use identify::bench::simulate::ADDITIONAL_TORQUE;
 use identify::engine::Hold;
 use identify::input::recording::Recording;
 
-/// Errors of gyro and data link in addition to the FMU's own noise: the delay from torque to rate (s; exact if it is a multiple of the
-/// sampling time), the gyro's scale (reading over rate) and its bias (rad/s).
+/// Errors of the gyro and of the data link in addition to the noise that the FMU simulates: the delay from torque to rate (s;
+/// exact if it is a multiple of the sampling time), the gyro's scale (its reading divided by the rate) and its bias (rad/s).
 #[derive(Clone, Copy, Debug)]
 pub struct SensorErrors {
     pub delay: f64,
@@ -29,16 +29,16 @@ impl Default for SensorErrors {
     }
 }
 
-/// Effects of a simulated bench that none of the fitted models has.
+/// Effects of a simulated bench that no fitted model contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unmodelled {
-    /// The bearing's axis leans by 1°: gravity turns hub and liquid back to where they began.
+    /// The bearing's axis is tilted by 1°, so that gravity turns hub and liquid back to their initial angle.
     Tilt,
-    /// The hub rocks at [`ROCKING`] under the wheel's torque, and the gyro sees some of it.
+    /// The hub nutates at [`ROCKING`] under the wheel's torque, and the gyro measures a part of this motion.
     Nutation,
     /// The bearing warms up: its friction falls by [`WARM`] with a time constant of 600 s.
     Warming,
-    /// The wheel gives at most nine tenths of the largest torque that is commanded.
+    /// The wheel's torque saturates at nine tenths of the largest command.
     Clipping,
     /// Air brakes the hub with the torque [`AIR`] ω|ω|, N·m, at the rate ω, rad/s.
     Drag,
@@ -50,16 +50,15 @@ pub enum Unmodelled {
 
 const ROCKING: f64 = 4.1;
 const ROCKING_DAMPING: f64 = 0.01;
-/// Rate of the rocking that the gyro reads, relative to the hub's rate, at frequencies far below
-/// the frequency of rocking.
+/// Rate of the nutation as read by the gyro, relative to the hub's rate, at frequencies far below the nutation frequency.
 const ROCKING_SEEN: f64 = 0.01;
-/// Fraction by which the friction of a warm bearing is smaller than that of a cold one.
+/// Relative decrease of the bearing's friction from cold to warm.
 const WARM: f64 = 0.3;
-/// Coefficient of the air's drag torque, which is quadratic in the rate, N·m·s².
+/// Coefficient of the aerodynamic drag torque, which is quadratic in the rate, N·m·s².
 const AIR: f64 = 0.02;
-/// Time constant of the lagging wheel or of the gyro's filter, s.
+/// Time constant of the actuator's lag or of the gyro's filter, s.
 const LAG: f64 = 0.03;
-/// Number of parts of the time from row to row in which the lagging torque is computed.
+/// Number of steps from row to row in which the lagging torque is computed.
 const LAG_PARTS: usize = 8;
 const WARMING: f64 = 600.0;
 
@@ -80,8 +79,7 @@ impl Unmodelled {
     }
 }
 
-/// A torque by name: `multisine:PEAK,SECONDS` (1.25 to 3.5 Hz, periods of 100 s) or a profile of
-/// `hubslosh run`.
+/// Returns a torque by name: `multisine:PEAK,SECONDS` (1.25 to 3.5 Hz, periods of 100 s) or a profile of `hubslosh run`.
 pub fn torque(text: &str) -> Result<Torque> {
     let Some(numbers) = text.strip_prefix("multisine:") else {
         return Ok(Torque::Profile(text.parse::<Profile>()?));
@@ -89,15 +87,15 @@ pub fn torque(text: &str) -> Result<Torque> {
     let numbers: Vec<f64> = numbers.split(',').map(str::parse).collect::<Result<_, _>>()?;
     ensure!(numbers.len() == 2, "a multisine is multisine:PEAK,SECONDS, not {text}");
     let sine = Multisine::new(100.0, (1.25, 3.5), numbers[0], 1)?;
-    // rows close enough that lines between them are the curve: (2π 3.5 Hz 5 ms)²/8 = 0.15 %
+    // dense enough for linear interpolation: (2π 3.5 Hz 5 ms)²/8 = 0.15 %
     let time: Vec<f64> = (0..=(numbers[1] / 0.005) as u32).map(|k| 0.005 * f64::from(k)).collect();
     let tau: Vec<f64> = time.iter().map(|t| sine.at(*t)).collect();
     Torque::rows(&time, &tau, None, false)
 }
 
-/// A simulated bench (twin) that the FMU computes: its settings, the rows per second (`rate`), the gyro's values per second if they are
-/// fewer (`gyro`), the torque between rows (`intersample`), sensor errors, the standard deviation of an encoder's angle (rad, `None`
-/// without encoder), and effects that the fitted models do not have.
+/// A bench that the FMU simulates (twin): its settings, the rows per second (`rate`), the values of the gyro per second if they
+/// are fewer (`gyro`), the intersample behaviour of the torque, errors of sensors, the standard deviation of an encoder's angle
+/// (rad, `None` without encoder), and effects that no fitted model contains.
 #[derive(Clone, Debug)]
 pub struct Twin {
     pub settings: Vec<(String, String)>,
@@ -124,7 +122,7 @@ impl Default for Twin {
 }
 
 impl Twin {
-    /// Returns the settings of the FMU, with the settings that cause the unmodelled effect added.
+    /// Returns the settings of the FMU, including those that cause the unmodelled effects.
     fn settings(&self, torque: &[f64], seed: Option<u32>) -> Vec<(String, String)> {
         let mut all = self.settings.clone();
         let mut set = |name: &str, value: String| all.push((name.into(), value));
@@ -143,15 +141,14 @@ impl Twin {
         all
     }
 
-    /// Records the simulated bench under a torque. `seed` is the seed of the gyro's noise; without
-    /// it there is no noise.
+    /// Records the simulated bench under a torque. `seed` is the seed of the gyro's noise; `None` switches the noise off.
     pub fn record(&self, fmu: &Fmu, torque: &Torque, seed: Option<u32>) -> Result<Recording> {
         let (start, stop) = torque.span();
         let (step, late) = (1.0 / self.rate, self.sensor_errors.delay);
         let rows = ((stop - start) * self.rate).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.torque_at(t)).collect();
-        // the FMU hears the recorded torque late: its knots are shifted, there is no torque before the first
+        // the delayed torque: its knots are shifted, and it is 0 before the first knot
         let held = self.intersample == Hold::ZeroOrderHold;
         let heard = if self.intersample == Hold::BandLimited {
             torque.clone()
@@ -166,14 +163,14 @@ impl Twin {
         let is = |effect: Unmodelled| self.unmodelled.contains(&effect);
         let lags = is(Unmodelled::ActuatorLag) || is(Unmodelled::GyroLag);
         let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time)? } else { heard };
-        // steps that meet the knots, or are short against a smooth torque's cycle
+        // steps that end at the knots, or are short against the period of a smooth torque
         let parts = match (self.intersample, late == 0.0) {
             (Hold::BandLimited, _) => (step / 1e-3).ceil() as usize,
             (_, true) => 1,
             (_, false) => 4,
         };
         let drags = self.unmodelled.contains(&Unmodelled::Drag);
-        // the drag is held over a step of 1 ms: 0.4° of a cycle at 2.4 Hz
+        // the drag torque is held for 1 ms, which delays it by 0.4° at 2.4 Hz
         let parts = if lags { LAG_PARTS } else { parts };
         let parts = if drags { parts.max((step / 1e-3).ceil() as usize) } else { parts };
         let run = Run {
@@ -228,7 +225,7 @@ impl Twin {
                     instance.set_real(&friction, &warm)?;
                 }
             }
-            // the last part ends where the next row begins, to the last bit: the FMU's clock adds them up
+            // the last step ends exactly at the next row, because the FMU adds up the step sizes
             let next = match part + 1 {
                 end if end == parts => time[row + 1],
                 end => time[row] + end as f64 * run.step,
@@ -254,7 +251,7 @@ impl Twin {
     }
 }
 
-/// A first-order lag, y' = (u − y)/[`LAG`], which starts at rest.
+/// A first-order lag, y' = (u − y)/[`LAG`], which starts at 0.
 #[derive(Default)]
 struct Lag {
     y: f64,
@@ -262,8 +259,8 @@ struct Lag {
 }
 
 impl Lag {
-    /// Returns the output y of the lag after `step`, s, during which its input changes linearly
-    /// from its last value to `u`, by the trapezoidal rule.
+    /// Advances by `step`, s, while the input changes linearly from its last value to `u`, by the trapezoidal rule.
+    /// Returns the output y.
     fn step(&mut self, u: f64, step: f64) -> f64 {
         let half = 0.5 * step / LAG;
         self.y = ((1.0 - half) * self.y + half * (self.u + u)) / (1.0 + half);
@@ -272,8 +269,7 @@ impl Lag {
     }
 }
 
-/// Returns the torque of an actuator that lags the command `torque`, at [`LAG_PARTS`] instants from
-/// row to row.
+/// Returns the torque of an actuator that lags the command `torque`, at [`LAG_PARTS`] instants from row to row.
 fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     let mut lag = Lag::default();
     let (mut time, mut tau) = (vec![rows[0]], vec![0.0]);
@@ -281,7 +277,7 @@ fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
         let h = (ends[1] - ends[0]) / LAG_PARTS as f64;
         for part in 1..=LAG_PARTS {
             let t = if part == LAG_PARTS { ends[1] } else { ends[0] + part as f64 * h };
-            // just before a step of a held torque
+            // the value of a held torque just before its change
             tau.push(lag.step(torque.torque_at(t - 1e-9), h));
             time.push(t);
         }
@@ -289,8 +285,8 @@ fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     Torque::rows(&time, &tau, None, false)
 }
 
-/// Rocking of the hub by the angle φ: φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt, so that far below the frequency Ω the angle follows
-/// the hub's rate.
+/// Nutation of the hub by the angle φ: φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt with the hub's acceleration a. Far below the frequency Ω the
+/// angle φ is therefore proportional to the hub's rate.
 #[derive(Default)]
 struct Rocking {
     phi: f64,
@@ -299,7 +295,7 @@ struct Rocking {
 }
 
 impl Rocking {
-    /// Returns φ after a step under acceleration a (rad/s²), by the semi-implicit Euler method in parts of 1 ms or less.
+    /// Returns φ after a step with the acceleration a (rad/s²), by the semi-implicit Euler method in steps of 1 ms or less.
     fn step(&mut self, a: f64, step: f64) -> f64 {
         let w = std::f64::consts::TAU * ROCKING;
         let parts = (step / 1e-3).ceil();
@@ -314,8 +310,7 @@ impl Rocking {
     }
 }
 
-/// Records the FMU under a torque at 50 Hz. `seed` is the seed of the gyro's noise; without it
-/// there is no noise.
+/// Records the FMU under a torque at 50 Hz. `seed` is the seed of the gyro's noise; `None` switches the noise off.
 pub fn record(
     fmu: &Fmu,
     settings: &[(&str, &str)],

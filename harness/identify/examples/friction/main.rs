@@ -1,9 +1,10 @@
-//! Does the friction fit end at its minimum? Ramps, steps and sweeps of [`bench`], in three sets, with the parameters of Rubaga's thesis.
+//! Tests whether the friction fit ends at its minimum: ramps, steps and sweeps of [`bench`] in three sets, with the
+//! parameters of Rubaga's thesis.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example friction -- [KEY=VALUE ...]
-//!   seeds=1-8               noise seeds
-//!   asymmetry=0.15          of the bearing
+//!   seeds=1-8               seeds of the noise
+//!   asymmetry=0.15          asymmetry of the bearing's dry friction
 //!   write=DIR               also writes the recordings of the first seed as CSV
 //! ```
 
@@ -98,7 +99,7 @@ fn main() -> Result<()> {
             if let (Some(folder), true) = (&folder, seed == *seeds.start()) {
                 write(&recordings, &Path::new(folder).join(set.name.replace([' ', ','], "_")))?;
             }
-            // the rate only: the encoder of these recordings has no noise
+            // only the rate, because the encoder of these recordings has no noise
             let rates: Vec<Recording> =
                 recordings.into_iter().map(|r| Recording { angle: None, ..r }).collect();
             let answer = fit(&fmu, &rates)?;

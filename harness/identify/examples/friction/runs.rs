@@ -1,5 +1,5 @@
-//! Runs for the identification of friction and inertia, on a bench whose equations are independent of the FMU: a ramp, a step and a sweep
-//! with a rigid liquid, with the gyro of Rubaga's thesis and the encoder's angle.
+//! Recordings for the identification of friction and inertia, on a bench whose equations are independent of the FMU: a ramp, a
+//! step and a sweep with a rigid liquid, with the gyro of Rubaga's thesis and an encoder.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use identify::input::recording::Recording;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
-/// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, and the gyro's least step, rad/s.
+/// Standard deviation of the noise in one row of the thesis's gyro at 50 Hz, and the resolution of this gyro, rad/s.
 const GYRO: (f64, f64) = (4.066e-4, 1.53e-4);
 
 /// Torque of a test run, N·m, as a function of time, s.
@@ -21,8 +21,7 @@ pub struct Set {
     pub courses: [Course; 3],
 }
 
-/// Returns at the time `t`, s, a sine whose frequency goes linearly `from` one value `to` another,
-/// Hz, within `seconds`.
+/// Returns a sweep that is linear in frequency, `from` one value `to` another, Hz, within `seconds`, at the time `t`, s.
 fn sweep(t: f64, (from, to): (f64, f64), seconds: f64) -> f64 {
     (TAU * (from * t + (to - from) / (2.0 * seconds) * t * t)).sin()
 }
@@ -32,7 +31,7 @@ pub const SETS: [Set; 3] = [
         name: "two minutes",
         seconds: 120,
         courses: [
-            // up to 0.12 N·m and back through zero to the same torque backwards
+            // up to 0.12 N·m, then down through zero to −0.12 N·m
             |t| if t < 60.0 { 0.002 * t } else { 0.12 - 0.004 * (t - 60.0) },
             |t| if (5.0..65.0).contains(&t) { 0.05 } else { 0.0 },
             |t| 0.1 * sweep(t, (1.25, 3.5), 120.0),
@@ -43,7 +42,7 @@ pub const SETS: [Set; 3] = [
         seconds: 240,
         courses: [
             |t| 0.06 * (1.0 - (2.0 * t / 240.0 - 0.5).abs() * 2.0),
-            // a step forwards and one backwards
+            // a step forwards, then one backwards
             |t| match t {
                 _ if (5.0..65.0).contains(&t) => 0.03,
                 _ if (125.0..185.0).contains(&t) => -0.03,

@@ -1,13 +1,13 @@
-//! The thesis's method in the time domain (6.1.1 and 6.1.2), for comparison with ours. It computes a known friction from the
-//! *measured* rate, adds it to the torque, and fits a linear model without friction.
+//! The thesis's identification in the time domain (6.1.1 and 6.1.2), for comparison with ours. It computes a known friction
+//! from the *measured* rate, adds it to the torque, and fits a linear model without friction.
 //!
 //! ```text
 //! τ_act = τ_cmd + τ_f(ω_measured),   ω ≈ linear bench(d, h, ζ) driven by τ_act
 //! ```
 //!
-//! It fails because only the slosh loses energy in this model. Noise near ω = 0, a gyro's bias and slightly different friction
-//! all make errors of τ_act. A hub without friction integrates them, and the simulated rate drifts off. In the FMU the same
-//! errors die out within seconds.
+//! It fails because in this model only the slosh dissipates energy. Noise near ω = 0, a gyro's bias and slightly wrong friction
+//! all cause errors of τ_act. A hub without friction integrates these errors, and the simulated rate drifts away. In the FMU,
+//! which has friction, the effect of the same errors decays within seconds.
 
 use std::f64::consts::PI;
 
@@ -20,14 +20,14 @@ use analysis::least_squares::{differences, minimise};
 use identify::bench::nominal::Bench;
 use identify::input::recording::Recording;
 
-/// Friction of the bearing that the method assumes to be known; SI units.
+/// Friction of the bearing, which the method assumes to be known; SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct Friction {
     pub b: f64,
     pub c: f64,
     pub d: f64,
     pub omega_s: f64,
-    /// Speed below which the dry part is left out, rad/s (the thesis's dead band); 0: none.
+    /// Speed below which the dry friction is left out, rad/s (the thesis's dead band); 0 for no dead band.
     pub dead_band: f64,
 }
 
@@ -49,8 +49,8 @@ fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Li
     Linear { inertia, arm: bench.arm, modes, ..Linear::default() }
 }
 
-/// Fits tank diameter d, filling height h and damping ratio ζ from a start, with known inertia of the hub and friction. Returns
-/// them with the fit of the simulated rate ŷ to the measured rate y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
+/// Fits tank diameter d, filling height h and damping ratio ζ from start values, with known inertia of the hub and friction.
+/// Also returns the fit of the simulated rate ŷ to the measured rate y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
 pub fn identify(
     recording: &Recording,
     friction: Friction,

@@ -1,15 +1,14 @@
-//! The thesis's way to tank parameters in the time domain compared with ours, on the same recordings of the FMU:
-//! friction outside of the equations (`compensation.rs`) against friction inside
-//! (`hubslosh identify`).
+//! Compares the thesis's estimates of tank parameters in the time domain with ours, on the same recordings of the FMU: the thesis
+//! adds a known friction torque to the command (`compensation.rs`), `hubslosh identify` simulates the friction in the model.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example thesis_route -- [duration of the sweep, s]
 //! ```
 //!
-//! The thesis reports fits of 71.1 % for clean synthetic data, 46.28 % with noise and −520.9 % for experiments (6.1.2). A fit
-//! with the friction inside took four to five hours, so the thesis gave it up. Here the experiment is a twin with 10 % asymmetric
-//! friction, a gyro bias of 2 mrad/s and a delay of 5 ms. Neither method knows these three values. The compensated way knows
-//! everything else exactly: the friction, the hub's inertia, and d, h and ζ as starts.
+//! The thesis reports fits of 71.1 % for synthetic data without noise, 46.28 % with noise and −520.9 % for experiments (6.1.2).
+//! Simulating the friction took four to five hours per fit, so the thesis gave it up. In place of the experiment, a simulated
+//! bench has 10 % asymmetric friction, a gyro bias of 2 mrad/s and a delay of 5 ms, three values that neither method knows. The
+//! thesis's method knows everything else exactly: the friction, the hub's inertia, and d, h and ζ as start values.
 
 #[path = "../fmu_twin/mod.rs"]
 #[allow(dead_code, reason = "others use the rest of it")]

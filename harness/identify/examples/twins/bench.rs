@@ -1,18 +1,19 @@
-//! A bench that is not the FMU: the same physics in other variables, by another integrator (Dop853 of ode_solvers), with
-//! none of the project's code.
+//! A bench that is independent of the FMU: the same physics in other variables, by another integrator (Dop853 of ode_solvers),
+//! with none of the project's code.
 //!
 //! ```text
-//! linear      a mass on a spring and a damper, its way s = r θ + l α seen from outside:
+//! linear      a mass on a spring and a damper; its displacement in the inertial frame is s = r θ + l α:
 //!             F = m ωₙ² (s − r θ) + 2ζωₙ m (s' − r ω),   m s'' = −F,   I₀ ω' = τ + τ_f + r F
-//! spherical   a bob on a rod, the rod's direction u seen from outside, with the rod's pull N
-//!             (Lagrange's multiplier); e the hub's radius, h = r e, D the drag, κ = r u·(z × e):
+//! spherical   a pendulum: unit vector u along the rod in the inertial frame, tension N of the rod
+//!             (Lagrange's multiplier); e is the hub's radius, h = r e, D the drag, κ = r u·(z × e):
 //!             N/m = −g u_z + u·D/m + ω² u·h + l|u'|² − κ ω'
 //!             I₀ ω' = τ + τ_f + κ N − z·((h + l u) × D)
 //!             l u'' = −g z − N u/m + D/m − ω' z × h + ω² h,   D = −2ζωₙ m l (u' − ω z × u)
 //! ```
 //!
-//! Dry friction keeps its sign while the hub slips. Where ω crosses zero the instant is found, and there the hub sticks as
-//! long as what would move it is less than c + d. The upright cylinder's first mode is Table 4.1 of Rubaga's thesis.
+//! Dry friction keeps its sign while the hub slips. The instant at which ω crosses zero is computed, and the hub then
+//! sticks as long as the torque of everything except the bearing is less than c + d. The upright cylinder's first mode is
+//! Table 4.1 of Rubaga's thesis.
 
 use ode_solvers::dop853::Dop853;
 use ode_solvers::{OutputType, SVector, System};
@@ -22,29 +23,29 @@ const TOLERANCE: f64 = 1e-11;
 /// Two instants closer than this, s, count as the same.
 const SAME: f64 = 1e-13;
 const REST: f64 = 1e-13;
-/// Largest torque beyond static friction at which the hub still counts as held, N·m.
+/// Torque in excess of static friction, N·m, up to which the hub counts as sticking.
 const TOUCH: f64 = 1e-12;
-/// Longest time between two checks whether a hub that sticks breaks away, s.
+/// Longest time between two checks whether a sticking hub breaks away, s.
 const LOOK: f64 = 5e-3;
 
-/// State: θ, ω, then s and s' of the linear liquid or u and u' of the spherical one. The time is a state because ode_solvers
-/// 0.6.2 evaluates the twelfth stage of Dop853 at the beginning of the step (c₁₂ is 0 in its table, 1 in Hairer's).
+/// State: θ, ω, then s and s' of the linear liquid or u and u' of the spherical one. Time is a state because ode_solvers 0.6.2
+/// evaluates the twelfth stage of Dop853 at the beginning of the step (c₁₂ is 0 in its table, 1 in Hairer's).
 type State = SVector<f64, 9>;
 const TIME: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Liquid {
-    /// All liquid is rigid and turns with the hub.
+    /// All liquid turns with the hub as a rigid body.
     Frozen,
     /// The liquid's first mode is a mass on a spring, linear in its displacement.
     Linear,
-    /// The liquid's first mode is a bob on a rod, which swings in every direction.
+    /// The liquid's first mode is a spherical pendulum.
     Spherical,
 }
 
-/// Friction of the bearing: viscous coefficient b (N·m·s), dry friction c and Stribeck excess d (N·m), Stribeck speed `omega_s` (rad/s),
-/// `asymmetry` (the fraction by which dry friction is larger forwards and smaller backwards), and the rate eps (rad/s) of a smoothed sign
-/// tanh(ω/eps), `None` for the exact sign.
+/// Friction of the bearing: viscous coefficient b (N·m·s), dry friction c and Stribeck excess d (N·m), Stribeck speed `omega_s`
+/// (rad/s), `asymmetry` (relative difference of the dry friction in either direction from the mean), and the rate eps (rad/s) of
+/// a smoothed sign tanh(ω/eps), `None` for the exact sign.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearing {
     pub b: f64,
@@ -67,11 +68,10 @@ pub struct Bench {
     pub zeta: f64,
     pub bearing: Bearing,
     pub liquid: Liquid,
-    /// An appendage on a spring (with the linear liquid): its inertia, kg·m², and its frequency on a hub that is held, Hz.
+    /// Inertia, kg·m², of an appendage on a spring, and its frequency if the hub does not move, Hz. Only with the linear liquid.
     pub appendage: Option<(f64, f64)>,
-    /// A torque that none of the fitted models has, N·m, as a function of time, s, angle, rad, and
-    /// rate, rad/s.
-    pub besides: fn(f64, f64, f64) -> f64,
+    /// A torque that no fitted model contains, N·m, as a function of time, s, angle, rad, and rate, rad/s.
+    pub extra_torque: fn(f64, f64, f64) -> f64,
 }
 
 impl Default for Bench {
@@ -95,18 +95,18 @@ impl Default for Bench {
             },
             liquid: Liquid::Linear,
             appendage: None,
-            besides: |_, _, _| 0.0,
+            extra_torque: |_, _, _| 0.0,
         }
     }
 }
 
-/// The torque that acts on the hub, in one of three forms.
+/// The torque that drives the hub, in one of three forms.
 pub enum Drive<'a> {
-    /// Rows of time (s) and torque (N·m), joined by straight lines.
+    /// Instants (s) and torques (N·m), with linear interpolation.
     Lines(&'a [f64], &'a [f64]),
-    /// Rows of time (s) and torque (N·m), each held until the next row.
+    /// Instants (s) and torques (N·m); each torque is held until the next instant.
     Held(&'a [f64], &'a [f64]),
-    /// A function of time that is smooth between these instants.
+    /// A torque that is a smooth function of time between these instants (s).
     Smooth(&'a [f64], &'a dyn Fn(f64) -> f64),
 }
 
@@ -117,7 +117,7 @@ impl Drive<'_> {
         }
     }
 
-    /// Returns the torque, N·m, at the time `t` between knot `k` and the next.
+    /// Returns the torque, N·m, at the time `t` between knot `k` and the next knot.
     fn within(&self, k: usize, t: f64) -> f64 {
         match self {
             Drive::Held(_, tau) => tau[k],
@@ -132,7 +132,7 @@ impl Drive<'_> {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Contact {
-    /// The hub slips; the number has the sign of its rate ω.
+    /// The hub slips in the direction 1 or −1, the sign of its rate ω.
     Slips(f64),
     Sticks,
     Smooth,
@@ -147,7 +147,7 @@ pub struct Motion {
     pub slosh: f64,
 }
 
-/// Equations of motion of the bench between two knots of the torque, where the torque is smooth.
+/// Equations of motion of the bench between two knots of the torque.
 struct Equations<'a> {
     bench: &'a Bench,
     /// Inertia of everything that turns rigidly with the hub, kg·m².
@@ -159,7 +159,7 @@ struct Equations<'a> {
     contact: Contact,
 }
 
-/// Derivatives of the state, and the torque on a hub at rest from everything except the bearing.
+/// Derivatives of the state, and the torque on the hub at rest from everything except the bearing.
 struct Rates {
     state: State,
     driving: f64,
@@ -178,11 +178,11 @@ impl Equations<'_> {
     }
 
     fn rates(&self, t: f64, y: &State) -> Rates {
-        let Bench { arm: r, gravity: g, zeta, liquid, besides, .. } = *self.bench;
+        let Bench { arm: r, gravity: g, zeta, liquid, extra_torque, .. } = *self.bench;
         let (m, l, natural) = self.mode;
         let stuck = self.contact == Contact::Sticks;
         let (theta, omega) = (y[0], if stuck { 0.0 } else { y[1] });
-        let torque = self.drive.within(self.piece, t) + besides(t, theta, omega);
+        let torque = self.drive.within(self.piece, t) + extra_torque(t, theta, omega);
         let tau = torque + if stuck { 0.0 } else { self.friction(omega) };
         let drag = 2.0 * zeta * natural * m;
         let mut state = State::zeros();
@@ -195,7 +195,7 @@ impl Equations<'_> {
             }
             Liquid::Linear => {
                 let force = m * natural * natural * (y[2] - r * theta) + drag * (y[3] - r * omega);
-                // damped to 0.5 % of critical
+                // damping ratio 0.5 %
                 let spring = self.bench.appendage.map_or(0.0, |(inertia, frequency)| {
                     let natural = std::f64::consts::TAU * frequency;
                     let (angle, rate) = (y[4] - theta, y[5] - omega);
@@ -239,7 +239,7 @@ impl Equations<'_> {
         Rates { state, driving }
     }
 
-    /// Returns the torque, N·m, at which a hub at rest breaks away in a direction, 1 or −1.
+    /// Returns the torque, N·m, at which a sticking hub breaks away in a direction, 1 or −1.
     fn holds(&self, direction: f64) -> f64 {
         let Bearing { c, d, asymmetry, .. } = self.bench.bearing;
         (c + d) * (1.0 + asymmetry * direction.signum())
@@ -283,7 +283,7 @@ impl Equations<'_> {
         solver.integrate().expect("a smooth right-hand side");
         let mut end = *solver.y_out().last().expect("the end");
         if self.bench.liquid == Liquid::Spherical {
-            // back onto the sphere
+            // the direction of the rod is normalised
             let length = (2..5).map(|i| end[i] * end[i]).sum::<f64>().sqrt();
             (2..5).for_each(|i| end[i] /= length);
             let along: f64 = (0..3).map(|i| end[2 + i] * end[5 + i]).sum();
@@ -336,7 +336,7 @@ impl Bench {
         }
     }
 
-    /// Returns the motion from rest at growing instants `at` (s). Before its first knot the torque is 0.
+    /// Returns the motion from rest at increasing instants `at` (s). Before its first knot the torque is 0.
     pub fn motion(&self, drive: &Drive, at: &[f64]) -> Motion {
         let (mass, length, natural, fixed) = self.mode();
         let knots = drive.knots();
@@ -379,8 +379,7 @@ impl Bench {
     }
 }
 
-/// Integrates the motion from `t` to `end`, or to an earlier instant at which the hub sticks or
-/// slips.
+/// Integrates the motion from `t` to `end`, or to an earlier instant at which the hub begins to stick or to slip.
 fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -> (f64, State) {
     match now.contact {
         Contact::Smooth => (end, now.integrate(t, end, &y)),
@@ -391,7 +390,7 @@ fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -
                 let driving = now.rates(t, y).driving;
                 driving.abs() - now.holds(driving)
             };
-            // the torque may have jumped
+            // the torque may have changed in a step
             if over(t, &y) > TOUCH {
                 now.contact = Contact::Slips(now.rates(t, &y).driving.signum());
                 return (t, y);
@@ -409,12 +408,12 @@ fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -
             let slope = |t: f64, y: &State| sign * now.rates(t, y).state[1];
             let mut last = (sign * there[1] < -REST).then_some(end);
             if last.is_none() && slope(t, &y) < 0.0 && slope(end, &there) > 0.0 {
-                // it may cross zero and come back
+                // the rate may cross zero and come back within the step
                 let least = crossing(t, end, &|s| slope(s, &now.integrate(t, s, &y)));
                 last = (sign * now.integrate(t, least, &y)[1] < -REST).then_some(least);
             }
             let Some(last) = last else { return (end, there) };
-            // from rest it moves on before it turns back
+            // from rest the hub moves on before it turns back
             let most = |s: f64| slope(s, &now.integrate(t, s, &y));
             let first =
                 if y[1] == 0.0 && slope(t, &y) > 0.0 { crossing(t, last, &most) } else { t };
@@ -424,7 +423,7 @@ fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -
             let before = now.contact;
             now.contact = now.after_rest(rest, &y);
             if now.contact == before {
-                // torn off and pulled back within rounding
+                // it broke away and stopped again within rounding errors
                 now.contact = Contact::Sticks;
             }
             *stops += 1;

@@ -1,4 +1,4 @@
-//! A twin: a simulated bench with parameters of its own, a torque, and sensors.
+//! A simulated bench (twin) with random parameters, a random torque, and sensors.
 
 use std::f64::consts::TAU;
 
@@ -20,9 +20,10 @@ use signals::recording::Columns;
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 use crate::habits::Written;
 
-/// Relative spread of the true parameters of the twins about those of the nominal bench.
+/// Relative range of the twins' true parameters about the nominal bench.
 const SPREAD: f64 = 0.3;
-/// White noise of a MEMS gyro, rad/s/√Hz; its drift, rad/s, with its correlation time, s; its least step, rad/s.
+/// A MEMS gyro: white noise, rad/s/√Hz; standard deviation of its drift, rad/s; correlation time of the
+/// drift, s; resolution, rad/s.
 const GYRO: (f64, f64, f64, f64) = (5.75e-5, 7.85e-5, 100.0, 1.53e-4);
 
 #[derive(Clone, Copy, Debug)]
@@ -48,14 +49,14 @@ pub struct Twin {
     gyro_bias: f64,
     pub encoder: Option<f64>,
     rate: f64,
-    /// Scales of the torque and of the clock of the recording: recorded value divided by true value.
+    /// Recorded divided by true value of the torque and of the time.
     torque_scale: f64,
     clock: f64,
     drift: Vec<f64>,
 }
 
-/// Signals of a twin as its sensors read them: torque (N·m) at the instants of the commands, rate (rad/s) and, with an encoder, angle
-/// (rad).
+/// Signals of a twin as its sensors measure them: torque (N·m) at the instants of the commands, rate (rad/s) and, with
+/// an encoder, angle (rad).
 pub struct Measured {
     pub torque: Vec<f64>,
     pub rate: Vec<f64>,
@@ -82,7 +83,7 @@ impl Twin {
             bearing,
             ..nominal
         };
-        // what the fit takes as known is so within its tolerances
+        // values that the fit assumes to be known are wrong within their tolerances
         let Tolerances { torque, clock, gravity, arm, density } = Tolerances::default();
         let mut about = |part: f64| 1.0 + part * random.normal();
         let (torque_scale, clock) = (about(torque), about(clock));
@@ -145,13 +146,12 @@ impl Twin {
         self
     }
 
-    /// Returns the course of the torque between rows that is given to the fit; `None` for half of
-    /// the twins, for which the fit has to find it.
-    pub fn told(&self) -> Option<Hold> {
+    /// Returns the intersample behaviour that the fit is given, or `None` for half of the twins, whose fit has to choose it.
+    pub fn known_intersample(&self) -> Option<Hold> {
         (self.seed.is_multiple_of(2)).then_some(self.between)
     }
 
-    /// Returns the slosh models to try: the true model and, for every third twin, a second one.
+    /// Returns the slosh models to fit: the true model and, for every third twin, a second one.
     pub fn models(&self) -> Vec<String> {
         let own = if self.bench.liquid == Liquid::Linear { "linear" } else { "spherical" };
         let all = ["linear", "spherical"].into_iter();
@@ -183,7 +183,7 @@ impl Twin {
             ("friction.asymmetry", bearing.asymmetry),
             ("delay", self.delay),
             ("gyro_scale", self.gyro_scale),
-            // what the gyro reads at rest, in the mean of the recording
+            // mean of the gyro's bias in the recording, with the mean of its drift
             ("gyro_bias[1]", self.gyro_bias + self.gyro_scale * mean(&self.drift)),
         ]
     }
@@ -231,14 +231,13 @@ impl Twin {
         (0..self.drift.len()).map(|k| k as f64 / self.rate).collect()
     }
 
-    /// Returns the times that the recording's clock, which runs fast or slow, shows at these true
-    /// instants, s.
+    /// Converts true instants to the times of the recording's clock, which runs fast or slow, s.
     pub fn stamps(&self, instants: &[f64]) -> Vec<f64> {
         instants.iter().map(|t| self.clock * t).collect()
     }
 
-    /// Reads the sensors at `instants` (s) under a torque that is commanded at the instants `commands` (s). The encoder is
-    /// `encoder_delay` (s) late.
+    /// Measures the sensors at `instants` (s) while the torque is commanded at the instants `commands` (s). The encoder is
+    /// delayed by `encoder_delay` (s).
     pub fn measure(&self, commands: &[f64], instants: &[f64], encoder_delay: f64) -> Measured {
         let torque = self.torque();
         let tau: Vec<f64> = commands.iter().map(|t| torque(*t)).collect();
@@ -266,23 +265,23 @@ impl Twin {
             };
             angles.iter().map(|angle| angle + TAU * 0.1 + std * random.normal()).collect()
         });
-        // as the recording has it
+        // torque as recorded
         let torque = tau.iter().map(|tau| self.torque_scale * tau).collect();
         Measured { torque, rate, angle }
     }
 
-    /// Identifies the recording of the twin, as a user would, with these slosh models. `hear`
-    /// receives each message.
+    /// Identifies the recording of the twin with these slosh models, as a user would. `report` receives each message.
     pub fn identify(
         &self,
         fmu: &Fmu,
         models: Vec<String>,
-        hear: &dyn Fn(&str),
+        report: &dyn Fn(&str),
     ) -> Result<Identification> {
-        let options = Options { intersample: self.told(), models, ..Options::default() };
+        let options =
+            Options { intersample: self.known_intersample(), models, ..Options::default() };
         let coarsest = options.nominal(fmu)?.coarsest();
-        let parts = prepare(self.record(), coarsest, &mut |line| hear(&line))?;
-        output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
+        let parts = prepare(self.record(), coarsest, &mut |line| report(&line))?;
+        output_error::identify(fmu, &parts, &options, &mut |news| report(news.line()))
     }
 
     pub fn identify_file(
@@ -290,13 +289,14 @@ impl Twin {
         fmu: &Fmu,
         models: Vec<String>,
         written: &Written,
-        hear: &dyn Fn(&str),
+        report: &dyn Fn(&str),
     ) -> Result<Identification> {
-        let options = Options { intersample: self.told(), models, ..Options::default() };
+        let options =
+            Options { intersample: self.known_intersample(), models, ..Options::default() };
         let coarsest = options.nominal(fmu)?.coarsest();
         let columns: Columns = written.columns.parse()?;
         let source = Source { columns: columns.with_rate(written.rate)?, trim: written.trim };
-        let parts = read(&written.path, &source, coarsest, &mut |line| hear(&line))?;
-        output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
+        let parts = read(&written.path, &source, coarsest, &mut |line| report(&line))?;
+        output_error::identify(fmu, &parts, &options, &mut |news| report(news.line()))
     }
 }

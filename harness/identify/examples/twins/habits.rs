@@ -1,4 +1,4 @@
-//! Ordinary habits of loggers: a twin's measurement written to a file as loggers, spreadsheets and scripts write it.
+//! Formats in which loggers, spreadsheets and scripts write a recording: writes the measurement of a twin in each of them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -33,7 +33,8 @@ pub const HABITS: [&str; 20] = [
     "frozen",
 ];
 
-/// A recording in a file, with the options with which its user reads it: `--columns`, the first and last time (s), and the rows per second.
+/// A recording in a file, with the options that its user needs to read it: `--columns`, the first and last time (s), and
+/// the rows per second.
 #[derive(Default)]
 pub struct Written {
     pub path: PathBuf,
@@ -51,8 +52,7 @@ struct Row {
     angle: Option<f64>,
 }
 
-/// Returns a twin whose measurement has the property that a logger's habit requires, for example a
-/// slow gyro.
+/// Returns a variant of the twin that the format needs, for example with a slow gyro.
 pub fn of(mut twin: Twin, habit: &str) -> Twin {
     match habit {
         "ms-33hz" | "us-33hz" => twin = twin.with_rate(33.0),
@@ -63,10 +63,10 @@ pub fn of(mut twin: Twin, habit: &str) -> Twin {
     twin
 }
 
-/// Writes the recording of a twin to a directory as a logger with this habit does.
+/// Writes the recording of a twin to a directory in this format.
 ///
 /// # Errors
-/// If there is no such habit, or the file cannot be written.
+/// If there is no such format, or the file cannot be written.
 pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
     let mut rows = log(twin, habit);
     let mut random = Random::new(twin.seed, 11);
@@ -136,7 +136,7 @@ pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
     Ok(written)
 }
 
-/// Returns the rows of a log. If the torque has a slow clock of its own, the rows of this clock are among them.
+/// Returns the rows of a log. If the torque is sampled by a slow clock of its own, its instants are rows, too.
 fn log(twin: &Twin, habit: &str) -> Vec<Row> {
     let mut instants = twin.rows();
     if habit == "uneven" {
@@ -197,7 +197,7 @@ fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
         let stamp = match habit {
             "ms-33hz" => format!("{time:.3}"),
             "us-33hz" => format!("{time:.6}"),
-            // over midnight
+            // time of day, across midnight
             "clock-times" | "dates" => {
                 let micros = ((time + 86_300.0) * 1e6).round() as u64;
                 let (day, micros) = (micros / 86_400_000_000, micros % 86_400_000_000);

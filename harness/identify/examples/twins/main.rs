@@ -1,14 +1,14 @@
-//! Do the estimates keep what they state, for recordings of a bench that is not the FMU? Twins of [`bench`]: truths drawn
-//! within ±30 %, all kinds of torque, noise and flaws of the measurement. Each is identified as a user would; then how often the
-//! 95 % intervals contain the true value.
+//! Coverage of the intervals on recordings of a bench that is independent of the FMU. The twins of [`bench`] have true
+//! parameters within ±30 % of the nominal ones, all kinds of torque, noise and errors of the measurement. Each is identified as
+//! a user would; then it is counted how often the 95 % intervals contain the true value.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example twins -- [KEY=VALUE ...]
-//!   seeds=1-200         which twins
-//!   duration=200        of each recording, s; twice that for a slow sweep
-//!   models=linear,…     as for hubslosh identify --model; else linear and spherical for every third, for the others what it is
-//!   say=false           true: the verdict of every twin
-//!   habits=all          through a file written as loggers write it: all, or some of [`habits::HABITS`]; twin k has the k-th
+//!   seeds=1-200         seeds of the twins
+//!   duration=200        duration of each recording, s; twice that for a slow sweep
+//!   models=linear,…     as for hubslosh identify --model; by default the true model, for every third twin linear and spherical
+//!   say=false           true: prints the verdict of every twin
+//!   habits=all          recordings in files as loggers write them: all, or some of [`habits::HABITS`]; twin k has format k
 //! ```
 
 #[allow(dead_code, reason = "its test looks at more of it")]
@@ -25,14 +25,13 @@ use habits::HABITS;
 use host::fmu::Fmu;
 use identify::bench::identification::Identification;
 
-/// Error of an estimate, in stated standard deviations, from which on it counts as wrong, if the
-/// model fits the recording and the estimate's interval does not contain the true value. An
-/// interval with an infinite end states that the end is not known.
+/// Error of an estimate, in its standard deviations, above which it counts as wrong, if the model fits the recording and the
+/// interval does not contain the true value. An interval with an infinite end does not claim to know this end.
 const WRONG: f64 = 5.0;
 
 #[derive(Default)]
 struct Row {
-    /// Errors of the estimates over their standard deviations.
+    /// Errors of the estimates divided by their standard deviations.
     off: Vec<f64>,
     inside: usize,
 }

@@ -447,7 +447,7 @@ mod tests {
     /// A gyro at rest reads its bias. If the bias were taken for a motion, the initial rate would be an unknown that the
     /// recording does not determine, because dry friction stops the hub at once.
     #[test]
-    fn a_constant_reading_is_a_bias_and_a_hub_that_turns_is_not_at_rest() {
+    fn a_constant_rate_is_a_bias_and_a_hub_that_turns_is_not_at_rest() {
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
         // friction removes the mean rate that the first torque causes
@@ -486,7 +486,7 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_has_a_sentence_of_its_own() {
+    fn each_fault_of_a_recording_is_named_in_its_error() {
         type Change = fn(&mut Recording);
         let faults: [(Change, &str); 8] = [
             (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
@@ -580,7 +580,7 @@ mod tests {
 
     /// Rows in which a slow gyro has no value still drive the model with their torque.
     #[test]
-    fn rows_without_a_sensor_keep_their_torque() {
+    fn rows_without_a_gyro_value_still_drive_the_model() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.csv");
         let mut text = String::from("time,tau_cmd,omega,theta\n");
@@ -610,7 +610,7 @@ mod tests {
 
     /// A rate that repeats each value three times comes from a gyro with a third of the sampling rate of the rows.
     #[test]
-    fn a_gyro_slower_than_the_rows_is_seen_by_its_repeats() {
+    fn a_gyro_slower_than_the_rows_is_recognised_by_repeated_values() {
         let mut random = analysis::random::Random::new(1, 0);
         let mut noisy = rigid();
         noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());

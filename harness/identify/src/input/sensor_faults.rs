@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_gyro_has_no_faults() {
+    fn no_fault_is_found_in_a_sound_gyro() {
         let (time, mut rate) = gyro();
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
         // a hub at rest for 20 s, with a gyro whose resolution is coarser than its noise
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_is_named() {
+    fn each_fault_of_a_sensor_is_reported() {
         let (time, rate) = gyro();
         let clipped: Vec<f64> = rate.iter().map(|w| w.clamp(-0.06, 0.06)).collect();
         let (rows, said) = words(&time, &clipped);

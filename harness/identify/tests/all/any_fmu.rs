@@ -1,4 +1,4 @@
-//! Identification of any FMU, here HubSlosh. The recordings are of a hub whose motion is known in closed form: I ω' = τ − b ω
+//! Identification of an arbitrary FMU, here HubSlosh. The recordings come from closed-form solutions of a hub, I ω' = τ − b ω,
 //! with the inertia I, the rate ω, the torque τ and the viscous coefficient b.
 
 use analysis::random::Random;
@@ -28,7 +28,7 @@ pub const TRUTH: (f64, f64) = (0.35, 0.05);
 const NOISE: f64 = 1e-3;
 const BIAS: f64 = 4e-3;
 
-/// Records a hub with an initial rate `start` under a torque that changes in steps every 2 s.
+/// Records a hub with the initial rate `start` under a torque that changes in steps every 2 s.
 pub fn record(seed: u64, start: f64, bias: f64) -> Record {
     let mut random = Random::new(seed, 0);
     let (inertia, b) = TRUTH;
@@ -44,7 +44,7 @@ pub fn record(seed: u64, start: f64, bias: f64) -> Record {
         record.outputs[0].push(rate + bias + NOISE * random.normal());
         rate = keep * rate + torque / b * (1.0 - keep);
     }
-    // a value that was lost
+    // a lost value
     record.outputs[0][100] = f64::NAN;
     record
 }
@@ -77,7 +77,7 @@ fn found(question: &Question) -> Identification {
     identify(&model, question, &records, &mut |_| {}).unwrap()
 }
 
-/// `identify fmu` is given two recordings that are computed from the closed-form solution of a hub with viscous friction.
+/// Two recordings are computed from the closed-form solution of a hub with viscous friction, and identified together.
 #[test]
 fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
     let found = found(&question(&FREE));
@@ -92,21 +92,21 @@ fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
     ];
     for (name, truth) in truth {
         let e = found.parameters.get(name).or_else(|| found.measurement.get(name)).unwrap();
-        // a chance of 6e-5 for each of six, once for all with these seeds
+        // exceeded with a probability of 6e-5 for each of six values
         assert!((e.value - truth).abs() < 4.0 * e.std, "{name}: {e:?}");
         assert!(e.interval[0] < e.value && e.value < e.interval[1], "{name}: {e:?}");
     }
-    // known to a thousandth: 2400 rows at a signal of a hundred times the noise
+    // 2400 rows with a signal of a hundred times the noise determine I to a thousandth
     assert!(found.parameters["hub.I"].std < 1e-3 * TRUTH.0);
     let noise = found.details.outputs[0].noise_white;
-    // 1/√(2 N) is 2 %
+    // expected error of the noise: 1/√(2 N) = 2 %
     assert!((noise / NOISE - 1.0).abs() < 0.08, "{noise}");
 }
 
-/// The recorded torque is 2 % too small. Because inertia and friction are only known relative to the torque, no residual shows
-/// this error: in intervals that include only noise, the true value is more than ten standard deviations outside.
+/// The recorded torque is 2 % too small. Inertia and friction are determined only relative to the torque, so that no residual
+/// shows this error. Intervals that include only noise miss the true value by more than ten standard deviations.
 #[test]
-fn known_values_count_with_their_tolerances() {
+fn tolerances_of_known_values_widen_the_intervals() {
     let mut records = [record(1, 0.2, BIAS), record(2, -0.1, 0.0)];
     records.iter_mut().flat_map(|r| &mut r.inputs[0]).for_each(|torque| *torque *= 0.98);
     let model = Model::open(packed_for_tests(), Solver::Own).unwrap();
@@ -129,11 +129,11 @@ fn known_values_count_with_their_tolerances() {
     assert_eq!(found.fits, Some(true), "{:?}", found.verdict);
     let e = &found.parameters["hub.I"];
     assert!(holds(&found, "hub.I", TRUTH.0) && holds(&found, "friction.b", TRUTH.1), "{e:?}");
-    // 2 % of I, of which the noise is a small part
+    // 2 % of I, with a small contribution of the noise
     assert!((e.std / (0.02 * TRUTH.0) - 1.0).abs() < 0.05 && e.std_noise < 0.1 * e.std, "{e:?}");
     says(&found, "scale(tau_cmd) 2.00 %");
     assert!(found.measurement["scale(tau_cmd)"].value.abs() < 0.01);
-    // as an unknown with another one known: the torque's error is found
+    // if the inertia is known, the scale error of the torque can be estimated
     let fixed = ["hub.I=0.35:0.3499:0.3501", "friction.b=0.02:0:1", "scale(tau_cmd)=0:-0.2:0.2"];
     let found = of(&[], &fixed).unwrap();
     let e = &found.measurement["scale(tau_cmd)"];
@@ -155,21 +155,19 @@ fn known_values_count_with_their_tolerances() {
     }
 }
 
-/// A fit with the harness's solver (Model Exchange) and a fit with the FMU's solver (Co-Simulation) differ by less than 0.1
-/// standard deviations.
 #[test]
 fn the_hosts_solver_and_the_fmus_give_the_same_estimates() {
     let own = found(&question(&FREE));
     let host = found(&Question { solver: Solver::Host(1e-9), ..question(&FREE) });
     for (name, e) in &own.parameters {
-        // both solvers are good to 1e-8 of the rate, which is 1e-5 of its noise
+        // each solver has an error of 1e-8 of the rate, which is 1e-5 of its noise
         let off = (e.value - host.parameters[name].value) / e.std;
         assert!(off.abs() < 0.1, "{name}: {off}");
     }
 }
 
-/// Records a hub with dry friction c, N·m, that begins at rest, and returns how often it stops: the rate ω tends exponentially to
-/// (τ − c sgn ω)/b until it is zero, and stays zero while |τ| ≤ c.
+/// Records a hub with dry friction c, N·m, that begins at rest, and returns the recording and the number of stops. The rate ω
+/// tends exponentially to (τ − c sgn ω)/b until it is zero, and stays zero while |τ| ≤ c.
 pub fn record_with_stops(seed: u64, c: f64) -> (Record, u32) {
     let mut random = Random::new(seed, 0);
     let (inertia, b) = TRUTH;
@@ -204,9 +202,9 @@ pub fn record_with_stops(seed: u64, c: f64) -> (Record, u32) {
     (record, stops)
 }
 
-/// The motion of this FMU ends at stops, which are events that the FMU handles within its own steps.
+/// The hub stops and breaks away, which are state events that the FMU handles within its own steps.
 #[test]
-fn an_fmu_3_is_identified_through_its_events() {
+fn parameters_of_an_fmi_3_fmu_with_state_events_are_estimated() {
     let c = 0.03;
     let (record, stops) = record_with_stops(1, c);
     assert!(stops > 10, "{stops}");
@@ -221,16 +219,16 @@ fn an_fmu_3_is_identified_through_its_events() {
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [("hub.I", TRUTH.0), ("friction.b", TRUTH.1), ("friction.c", c)] {
         let e = &found.parameters[name];
-        // a chance of 6e-5 for each of three, once for all with this seed; known to 2 %, or the fit has learnt nothing
+        // exceeded with a probability of 6e-5 for each of three values; a standard deviation above 2 % would mean that the
+        // fit has learnt nothing
         assert!((e.value - truth).abs() < 4.0 * e.std && e.std < 0.02 * truth, "{name}: {e:?}");
     }
 }
 
-/// A parameter of a friction law that is not in use is reported as not determined, and an inertia whose true value is
-/// beyond its bound as at its bound.
+/// A parameter of a friction law that is not in use has no effect, and the true value of the inertia is beyond its bound.
 #[test]
-fn parameters_without_information_are_not_determined_and_bounds_are_named() {
-    // the stiffness of a law that is not chosen does nothing; the inertia is wanted beyond its bound
+fn parameters_without_effect_are_not_determined_and_a_reached_bound_is_reported() {
+    // the stiffness belongs to a law that is not chosen; the true inertia is beyond its upper bound
     let asked =
         ["hub.I=0.2:0.1:0.3", "friction.b=0.02:0:1", "init.omega@each=0", "friction.sigma0=1e3"];
     let found = found(&question(&asked));
@@ -241,8 +239,7 @@ fn parameters_without_information_are_not_determined_and_bounds_are_named() {
     assert!(said, "{:?}", found.verdict);
 }
 
-/// A prior of 0.06 ± 1e-6 for a friction of 0.05 outweighs the recordings; the estimate is 0.06, and the verdict is a
-/// misfit.
+/// The prior of the friction is 0.06 ± 1e-6, but the true value is 0.05. The estimate is 0.06, and the verdict reports a misfit.
 #[test]
 fn an_unknown_keeps_its_prior_if_the_recordings_determine_it_less() {
     let mut question = question(&FREE);
@@ -253,7 +250,6 @@ fn an_unknown_keeps_its_prior_if_the_recordings_determine_it_less() {
     assert_eq!(found.fits, Some(false), "the truth is 0.05");
 }
 
-/// For a linear model with known noise, the predicted bound equals the standard deviation of a fit.
 #[test]
 fn predicted_standard_deviations_equal_those_of_the_fit() {
     let at_truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega@each=0"];
@@ -264,7 +260,7 @@ fn predicted_standard_deviations_equal_those_of_the_fit() {
     let found = identify(&model, &question, &records, &mut |_| {}).unwrap();
     for bound in bounds.iter().filter(|bound| bound.is_parameter) {
         let stated = found.parameters[&bound.name].std;
-        // the noise is estimated to 2 %, and one row of a recording was lost
+        // the noise is estimated to 2 %, and one value of the recordings is lost
         assert!((stated / bound.std - 1.0).abs() < 0.1, "{}: {stated} {}", bound.name, bound.std);
     }
 }
@@ -280,7 +276,7 @@ fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
             found.parameters.get(name).or_else(|| found.measurement.get(name)).unwrap().value
         })
         .collect();
-    // along a column of the covariance, the direction in which the others follow: by k σ the deviance grows by k²
+    // along a column of the covariance, in which the other unknowns follow, k σ increases the deviance by k²
     let covariance = &found.details.covariance;
     let moved = |j: usize, k: f64| -> Vec<f64> {
         let std = covariance[j][j].sqrt();
@@ -296,7 +292,8 @@ fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
     let result = found.json().unwrap();
     let deviances = deviances(&model, &question, &records, &result, &points).unwrap();
     for (j, pair) in deviances[1..deviances.len() - 1].chunks(2).enumerate() {
-        // the end of the search is within 0.02 standard deviations: 2 · 2 · 0.02, and the model is linear but for the inertia
+        // the search ends within 0.02 standard deviations, which changes the deviance by 2 · 2 · 0.02; the model is linear
+        // except in the inertia
         for deviance in pair {
             assert!((deviance - deviances[0] - 4.0).abs() < 0.2, "{}: {deviance}", names[j]);
         }
@@ -304,8 +301,7 @@ fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
     assert_eq!(deviances[deviances.len() - 1], f64::INFINITY);
 }
 
-/// The HTML report of a fit contains every figure and is well-formed. With HUBSLOSH_PAGE=page.html in the environment
-/// the test writes the page to this file.
+/// If the environment variable HUBSLOSH_PAGE is set, for example to page.html, the test writes the page to this file.
 #[test]
 fn the_report_of_a_fit_is_a_complete_page() {
     let found = found(&question(&FREE));
@@ -319,8 +315,7 @@ fn the_report_of_a_fit_is_a_complete_page() {
     }
 }
 
-/// The parameter slosh.zeta has an effect only if slosh.zeta_from_correlation is false: it is
-/// warned of once, and cannot be an unknown.
+/// slosh.zeta has an effect only if slosh.zeta_from_correlation is false.
 #[test]
 fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() {
     let records = [record(1, 0.0, 0.0), record(2, 0.0, 0.0)];
@@ -346,7 +341,7 @@ fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() 
         }
     }
     let model = model(Solver::Own);
-    // it has an effect in the second recording
+    // slosh.zeta has an effect in the second recording
     let some = with(&free, &["slosh.zeta_from_correlation@2=false"], Solver::Own);
     foresee(&model, &some, &records, &noise, &mut |_| {}).unwrap();
     let set = ["slosh.model=linear", "slosh.zeta=0.01"];
@@ -359,11 +354,10 @@ fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() 
     assert_eq!(found.done.iter().filter(|line| warns(line)).count(), 1, "{:?}", found.done);
 }
 
-/// A fit never ends in a minimum that fits worse than its start values. A fit that started at the true values once
-/// ended 28 standard deviations away, where the sum of squares was larger by 68, and the verdict was nevertheless
-/// that the model fits.
+/// A fit that started at the true values once ended 28 standard deviations away, where the sum of squares was larger by 68. The
+/// verdict was nevertheless that the model fits.
 #[test]
-fn a_minimum_that_is_worse_than_the_start_is_left() {
+fn a_fit_never_ends_at_a_minimum_that_is_worse_than_its_start() {
     let model = Model::open(packed_for_tests(), Solver::Own).unwrap();
     let records = [record(1, 0.2, 0.0)];
     let truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega=0.2"];
@@ -373,7 +367,7 @@ fn a_minimum_that_is_worse_than_the_start_is_left() {
     let mut fit = Fit::new(&problem);
     let start = fit.at(&problem.starts[0]).unwrap().cost;
     for bad in [[0.5, 0.1, 0.2], [1.0, 0.05, 0.2], [0.35, 0.0, 0.2]] {
-        // no set of derivatives and no step
+        // a search that may compute no Jacobian and make no step
         let there = fit.minimise(&bad, &[true; 3], None, End::new(0, 0.0)).unwrap();
         assert!(there.point.cost > start + 68.0);
         let found = fit.not_above_starts(there).unwrap().point;
@@ -382,7 +376,7 @@ fn a_minimum_that_is_worse_than_the_start_is_left() {
     }
 }
 
-/// The minimum lies six standard deviations beyond a bound, which is too near for the tests of the residual to show a misfit.
+/// The minimum lies six standard deviations beyond a bound, too near for the tests of the residual to show a misfit.
 #[test]
 fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
     let free = found(&question(&FREE));
@@ -395,14 +389,14 @@ fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
         held.fits.is_none() && words.contains("friction.b would fit better beyond a bound"),
         "{words}"
     );
-    // what was set is in the result
+    // the result contains the settings
     let set = |name: &str| held.settings.get(name).map(String::as_str);
     assert_eq!(set("slosh.model"), Some("frozen"));
     assert_eq!(set("fluid.rho"), Some("1e-6"));
 }
 
-/// On the recording of the book's first identification, the method `bench`, which searches in other coordinates with weak priors,
-/// and the method `fmu`, which searches the named parameters, have to give the same estimates and intervals.
+/// Both methods fit the recording of the book's first identification: `identify bench` searches in other coordinates and with
+/// weak priors, `identify fmu` searches the named parameters.
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
 fn identify_bench_and_identify_fmu_give_equal_estimates_and_intervals() {
@@ -449,7 +443,7 @@ fn identify_bench_and_identify_fmu_give_equal_estimates_and_intervals() {
     assert_eq!((bench.fits, found.fits), (Some(true), Some(true)), "{:?}", found.verdict);
     for name in ["tank.d", "tank.h", "slosh.zeta", "hub.I"] {
         let (a, b) = (&bench.parameters[name], &found.parameters[name]);
-        // noise models and priors of the friction differ a little
+        // the models of the noise and the priors of the friction differ slightly
         assert!((a.value - b.value).abs() < 0.1 * a.std, "{name}: {a:?} {b:?}");
         for (a_end, b_end) in a.interval.iter().zip(b.interval) {
             assert!((a_end - b_end).abs() < 0.2 * a.std, "{name}: {a:?} {b:?}");

@@ -1,5 +1,5 @@
-//! Coverage of the intervals for kinds of FMUs that other makers export, by a hundred twins (simulated recordings) of each kind.
-//! No recording comes from an FMU.
+//! Coverage of the 95 % intervals for kinds of FMUs that other tools export, with a hundred simulated recordings (twins) of each
+//! kind. The recordings do not come from the FMUs.
 
 use std::path::Path;
 
@@ -37,8 +37,8 @@ impl Count {
         }
     }
 
-    /// Prints the counts, and checks that at least 93 % of the given intervals contain the true value; if there are few intervals, at
-    /// least 95 % less two standard deviations of this share by chance. No error may exceed [`LIMIT`] standard deviations.
+    /// Prints the counts, and checks that at least 93 % of the intervals contain the true value. If there are few intervals, the
+    /// limit is 95 % minus two standard deviations of the fraction. No error may exceed [`LIMIT`] standard deviations.
     fn check(&self, kind: &str) {
         let part = self.inside as f64 / self.given.max(1) as f64;
         println!(
@@ -55,7 +55,8 @@ impl Count {
     }
 }
 
-/// Run it with `cargo test --release -p identify --test all -- --ignored --nocapture coverage_of_a_hundred`.
+/// Prints a table; `cargo test --release -p identify --test all -- --ignored --nocapture coverage_of_a_hundred`
+/// runs only this test.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn coverage_of_a_hundred_twins_of_each_kind() {

@@ -1,10 +1,10 @@
-//! Records of force and moment of a tank, made by an independent integration: Lagrange's equation of a mass on a curve, in Cartesian
-//! coordinates, by the method of Runge and Kutta of `ode_solvers`. No FMU takes part in making them.
+//! Recordings of force and moment of a tank from an integration that is independent of all FMUs: Lagrange's equation of a mass on
+//! a curve, in Cartesian coordinates, by the Runge–Kutta method of `ode_solvers`.
 //!
 //! ```text
-//! place (q, z(q)) from the bottom of the well, z = l − √(l² − q²) + (κ − 1) q⁴/(8 l³)
+//! position (q, z(q)) of the mass from the lowest point, z = l − √(l² − q²) + (κ − 1) q⁴/(8 l³)
 //! L = m [(q' + X')² + z'²]/2 + m (s − 1) (q q')²/(2 l²) − m g z
-//! F_x = −m (q'' + X''),  F_z = −m (z'' + g),  M_y = (z_b − z_r) F_x − q F_z + those of the rigid mass
+//! F_x = −m (q'' + X''),  F_z = −m (z'' + g),  M_y = (z_b − z_r) F_x − q F_z + loads of the rigid mass
 //! ```
 
 use analysis::random::Random;
@@ -30,7 +30,7 @@ struct Tank {
     kappa: f64,
     m_0: f64,
     h_0: f64,
-    /// Acceleration of the tank: amplitude, m/s², and frequency, Hz, at the start, and its increase, Hz/s.
+    /// Acceleration of the tank: amplitude, m/s², frequency at the start, Hz, and rate of change of the frequency, Hz/s.
     drive: [f64; 3],
 }
 
@@ -69,7 +69,7 @@ impl Tank {
         let Tank { length: l, s, zeta, growth, breaking, .. } = *self;
         let [_, slope, bend] = self.curve(q);
         let omega = (G / l).sqrt();
-        // the pendulum's rate: q = l sin θ
+        // rate of the equivalent pendulum: q = l sin θ
         let angle = (q / l).asin();
         let rate = v / (l * angle.cos());
         let amplitude = (angle * angle + rate * rate / (omega * omega) + 1e-8).sqrt();
@@ -85,12 +85,12 @@ impl Tank {
         -rest / inertia
     }
 
-    /// Returns a record over `seconds` of a tank whose liquid is released at an angle, with loads every `step` (s). The noise is
-    /// a part of each load's standard deviation. The tank's motion has four rows a step, because lines between rows h apart lose
-    /// the part (ω h)²/12 of a wave of frequency ω.
+    /// Returns a recording over `seconds` of a tank whose liquid is released at an angle, with loads every `step` (s). `noise` is
+    /// relative to each load's standard deviation. The tank's motion has four rows per step, because linear interpolation between
+    /// rows h apart reduces a wave of frequency ω by the fraction (ω h)²/12.
     fn record(&self, seconds: f64, step: f64, angle: f64, noise: f64, seed: u64) -> Record {
         let start = Vector2::new(self.length * angle.sin(), 0.0);
-        // twelve steps a row: ω h is 0.03, and the fifth power of that is 2e-8
+        // twelve integration steps a row: ω h is 0.03, and its fifth power 2e-8
         let mut solver = Rk4::new(*self, 0.0, start, seconds, step / 12.0);
         solver.integrate().unwrap();
         let mut record = Record { name: "twin".into(), ..Record::default() };
@@ -137,7 +137,7 @@ impl System<f64, Vector2<f64>> for Tank {
     }
 }
 
-/// Starts and bounds as one would read them off a drawing and the record's spectrum.
+/// Start values and bounds as a user would read them from a drawing and from the spectrum of the recording.
 const FREE: [(&str, &str); 9] = [
     ("tank.mass[1]", "0.5:0.05:3"),
     ("tank.length[1]", "0.05:0.03:0.08"),
@@ -206,12 +206,11 @@ fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)
     result.parameters.iter().map(|(name, p)| (name.clone(), p.interval, truth(name))).collect()
 }
 
-/// Asserts that the model fits the record, and that each estimate is within 4 standard deviations
-/// of the true value.
+/// Asserts that the model fits the recording, and that each estimate is within 4 standard deviations of the true value.
 fn holds(tank: &Tank, result: &Identification) {
     assert_eq!(result.fits, Some(true), "{:#?}", result.verdict);
     for (name, [low, high], truth) in compared(tank, result) {
-        // half as wide again on either side, and once more
+        // twice the width of the interval, which is 4 standard deviations on each side
         let room = 0.5 * (high - low) + 1e-9;
         assert!(low - room < truth && truth < high + room, "{name}: {low} to {high}, not {truth}");
     }
@@ -219,8 +218,6 @@ fn holds(tank: &Tank, result: &Identification) {
 
 const FORCED: Tank = Tank { drive: [0.1, 2.2, 0.03], growth: 0.01, ..TANK };
 
-/// A record of force and torque of SloshTank from an integrator outside the project determines all parameters of the tank,
-/// with intervals that contain the true values.
 #[test]
 fn a_forced_record_of_an_independent_integrator_determines_the_whole_model() {
     let record = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
@@ -236,7 +233,8 @@ fn released(angle: f64) -> [String; 2] {
     [format!("tank.p_0[1,1]={}", angle.sin()), format!("tank.p_0[1,3]={}", -angle.cos())]
 }
 
-/// In a small free decay only the product of mass and angle is determined, so that the angle has to be known to give the mass.
+/// In a small free decay only the product of mass and angle is determined, so that the mass can be estimated only if
+/// the angle is known.
 #[test]
 fn a_free_decay_from_a_known_angle_gives_the_mass() {
     let record = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
@@ -262,7 +260,7 @@ struct Moving {
     tank: Tank,
     point: f64,
     i_0: f64,
-    /// Amplitudes of the tank's displacement, m, and of its angle, rad.
+    /// Amplitudes of the tank's displacement, m, and of its rotation angle, rad.
     size: [f64; 2],
 }
 
@@ -278,7 +276,7 @@ impl Moving {
         })
     }
 
-    /// Acceleration less gravity of a point (x, z) of the tank, without its own acceleration, in the tank's axes.
+    /// Specific force at a point (x, z) of the tank from the motion of the tank, in the tank's axes.
     fn carried(&self, t: f64, [x, z]: [f64; 2], [u, w]: [f64; 2]) -> [f64; 2] {
         let [[_, _, along], [angle, rate, bend]] = self.motion(t);
         let (sin, cos) = angle.sin_cos();
@@ -299,8 +297,8 @@ impl Moving {
         -rest / (1.0 + slope * slope + own * q * q)
     }
 
-    /// Returns rows of time, specific force along x and z, angular rate and acceleration about y,
-    /// and the loads Fx, Fz and My about the reference point, in the tank's axes.
+    /// Returns rows of time, specific force along x and z, angular rate and acceleration about y, and the loads Fx, Fz and My
+    /// about the reference point, in the tank's axes.
     fn rows(&self, seconds: f64, step: f64) -> Vec<[f64; 8]> {
         let mut solver = Rk4::new(*self, 0.0, Vector2::new(0.0, 0.0), seconds, step / 12.0);
         solver.integrate().unwrap();
@@ -338,13 +336,14 @@ const MOVING: Moving = Moving {
     size: [0.0015, 0.05],
 };
 
-/// The record of [`MOVING`], with offsets of the balance, and its question: damping and third order are known.
+/// Returns the recording of [`MOVING`] with offsets of the force balance, and its question, in which damping and
+/// third-order terms are known.
 fn moved(offsets: [f64; 3]) -> (Question, Record) {
     let rows = MOVING.rows(4.0, 0.01);
     let column = |k: usize| -> Vec<f64> { rows.iter().map(|row| row[k]).collect() };
     let mut outputs = measured([5, 6, 7].map(column), |_| 1.0, 7);
     for (k, (values, size)) in outputs.iter_mut().zip([0.01, 0.01, 0.001]).enumerate() {
-        // the noise is that of the balance
+        // only the force balance has noise
         let clean = column(5 + k);
         for (value, clean) in values.iter_mut().zip(clean) {
             *value = clean + offsets[k] + size * (*value - clean);
@@ -364,9 +363,10 @@ fn moved(offsets: [f64; 3]) -> (Question, Record) {
     (question, record)
 }
 
-/// The tank turns about a point off its axis, and the force balance has constant offsets, which are estimated as biases.
+/// The force balance has constant offsets, which are estimated as biases.
 #[test]
-fn a_tank_that_turns_about_another_point_is_found_with_the_offsets_of_its_balance() {
+fn parameters_of_a_tank_that_turns_about_an_offset_point_are_estimated_with_biases_of_the_balance()
+{
     for offsets in [[0.0; 3], [0.2, 0.0, -0.03]] {
         let (mut question, record) = moved(offsets);
         if offsets != [0.0; 3] {
@@ -388,7 +388,7 @@ fn a_tank_that_turns_about_another_point_is_found_with_the_offsets_of_its_balanc
 const BREAKS: Tank = Tank { growth: 0.01, breaking: 0.04, ..TANK };
 
 #[test]
-fn breaking_waves_fit_only_with_their_damping_which_a_known_release_determines() {
+fn breaking_waves_fit_only_a_model_with_damping_by_breaking() {
     let record = BREAKS.record(4.0, 0.02, 0.6, 0.01, 11);
     let still = Record { inputs: vec![vec![0.0; record.time.len()]], ..record };
     let [x, z] = released(0.6);
@@ -414,12 +414,11 @@ fn breaking_waves_fit_only_with_their_damping_which_a_known_release_determines()
     assert!(result.parameters["tank.zeta_breaking[1]"].std < 0.01, "{:?}", result.parameters);
 }
 
-/// Coverage of the 95 % intervals over 20 draws of noise. The errors of one draw are correlated, so that 90 % is two standard
-/// deviations below 95 %. It takes minutes: `-- --ignored --nocapture intervals_of_force`. `HUBSLOSH_DRAWS=21-100` names other
-/// draws.
+/// The errors of one draw of the noise are correlated, so that 90 % is two standard deviations below 95 %. The test takes
+/// minutes: `-- --ignored --nocapture intervals_of_force`. `HUBSLOSH_DRAWS=21-100` chooses other draws.
 #[test]
 #[ignore = "20 fits: .ci/run --nightly"]
-fn intervals_of_force_records_hold_the_truth_in_95_percent_of_20_draws() {
+fn intervals_of_force_records_contain_the_true_values_in_95_percent_of_20_draws() {
     let draws = std::env::var("HUBSLOSH_DRAWS").unwrap_or_else(|_| "1-20".into());
     let (from, to) = draws.split_once('-').expect("HUBSLOSH_DRAWS is FROM-TO");
     let (from, to): (u64, u64) = (from.parse().unwrap(), to.parse().unwrap());

@@ -1,4 +1,4 @@
-//! Friction and inertia from runs of the torque, on recordings of a bench whose equations are independent of the FMU.
+//! Identification of friction and inertia, on recordings of a bench whose equations are independent of the FMU.
 
 use std::collections::BTreeMap;
 
@@ -25,8 +25,7 @@ const ASYMMETRY: f64 = 0.15;
 /// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, rad/s.
 const NOISE: f64 = 4.066e-4;
 
-/// Returns a recording of a push of 0.1 N·m for 5 s forwards (`way` 1) or backwards (−1), and of
-/// the free decay to rest.
+/// Returns a recording of a push of 0.1 N·m for 5 s forwards (`way` 1) or backwards (−1), followed by a free decay to rest.
 pub fn push(seed: u64, way: f64) -> Recording {
     let time: Vec<f64> = (0..=3000).map(|k| 0.02 * f64::from(k)).collect();
     let tau: Vec<f64> =
@@ -37,7 +36,7 @@ pub fn push(seed: u64, way: f64) -> Recording {
     Recording::of("push", time, tau, rate)
 }
 
-/// Asserts that the verdict calls the asymmetry not determined, and that the friction in the direction `way` is within four
+/// Asserts that the verdict reports the asymmetry as not determined, and that the friction in the direction `way` is within four
 /// standard deviations of the true value.
 pub fn is_one_way(
     parameters: &BTreeMap<String, Estimated>,
@@ -80,8 +79,8 @@ fn fit(recordings: &[Recording], options: &Options) -> anyhow::Result<Identifica
     friction::identify(&fmu, &rates, options, &mut |_| {})
 }
 
-/// Returns the parameters that are three standard deviations or more from the true value. The fit has to end at a minimum with no
-/// parameter at a bound.
+/// Returns the parameters that differ from the true value by three standard deviations or more. Also asserts that the fit ends at
+/// a minimum with no parameter at a bound.
 fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
     let found = fit(&recordings(set, seed, bias, asymmetry), &options()).unwrap();
     assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
@@ -101,14 +100,14 @@ fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
         let p = found.parameters.get(name).unwrap_or_else(|| &found.measurement[name]);
         let off = (p.value - truth) / p.std;
         println!("{}, {seed}: {name} {:.4e} ± {:.1e}, {off:+.2} σ", set.name, p.value, p.std);
-        // one of 370 is further off by chance, and the seeds are fixed
+        // exceeded by chance in one of 370 values
         wrong.extend(
             (off.abs() >= 3.0).then(|| format!("{}, {seed}: {name} {off:+.1} σ", set.name)),
         );
         let limit = match name {
-            // the hub rests for 4 s before the ramp breaks it away: 5e-5 rad/s
+            // the hub rests for 4 s before the ramp breaks it away, which determines the bias to 5e-5 rad/s
             "gyro_bias[1]" => 1e-4,
-            // the other recordings need not show a rest
+            // the other recordings may contain no rest
             "gyro_bias[2]" | "gyro_bias[3]" => f64::INFINITY,
             _ => 0.3 * truth.abs(),
         };
@@ -122,18 +121,18 @@ fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
     SETS.iter().flat_map(of).collect()
 }
 
-/// Seed 2 of the first set failed as long as rows at rest were left out: the search alternated between two choices of these rows,
-/// because each choice gives a bias that leads to the other. `friction.d` was 3.4 standard deviations off and the bias of the
-/// ramp 4.9, and the fit was accepted.
+/// Seed 2 of the first set failed when rows at rest were left out of the fit: the search alternated between two choices of these
+/// rows, because each choice gave a bias that led to the other choice. `friction.d` was wrong by 3.4 standard deviations and the
+/// bias of the ramp by 4.9, and the fit was accepted.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
+fn friction_fits_of_three_sets_of_runs_end_in_no_false_minimum() {
     assert_eq!(all_sets(1..=2), [""; 0]);
 }
 
 #[test]
 #[ignore = "13 s of CPU time: .ci/run --nightly"]
-fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {
+fn friction_fits_of_eighteen_more_runs_end_in_no_false_minimum() {
     assert_eq!(all_sets(3..=8), [""; 0]);
 }
 
@@ -148,11 +147,9 @@ fn a_gyro_bias_of_5_degrees_per_second_does_not_mislead_the_friction_fit() {
     assert_eq!(wrong(&SETS[0], 4, 0.087, ASYMMETRY), [""; 0]);
 }
 
-/// If the settings do not state how much liquid is in the tank, the tank counts as empty, and the
-/// verdict says so.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn all_inertia_is_the_hubs_unless_the_liquid_is_stated() {
+fn the_tank_counts_as_empty_unless_the_settings_state_its_liquid() {
     let recordings = recordings(&SETS[2], 1, 0.0, ASYMMETRY);
     let with = |settings| fit(&recordings, &Options { settings, ..options() }).unwrap();
     let (empty, full) = (with(Vec::new()), with(options().settings));
@@ -165,22 +162,21 @@ fn all_inertia_is_the_hubs_unless_the_liquid_is_stated() {
         found.verdict.iter().any(|line| line.starts_with("The tank is taken as empty"))
     };
     assert!(is_said(&empty) && !is_said(&full));
-    // the measured friction lies on the law
+    // the points of measured friction lie on the friction law
     let number = |name: &str| empty.parameters[name].value;
     let law = |w: f64| number("friction.b") * w + w.signum() * number("friction.c");
     let points = &empty.details.friction_points;
     let fast: Vec<_> = points.iter().filter(|p| p.rate.abs() > 0.3 && p.rows > 20).collect();
     assert!(fast.len() > 3, "{points:?}");
     for p in fast {
-        // the asymmetry is 15 % of c
+        // the asymmetry changes the friction by 15 % of c
         assert!((p.torque / law(p.rate) - 1.0).abs() < 0.15, "{p:?} {}", law(p.rate));
     }
 }
 
-/// A recording of 0.8 s, a recording without torque and a hub that does not move: the error says which experiment to
-/// record.
+/// The recordings are too short (0.8 s), without torque, or of a hub that does not move. The error says what to record.
 #[test]
-fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
+fn recordings_that_show_no_friction_are_refused_with_advice() {
     let [_, step, _] = &recordings(&SETS[0], 1, 0.0, ASYMMETRY)[..] else { panic!("three runs") };
     let said = |recording: Recording| fit(&[recording], &options()).unwrap_err().to_string();
     let short = said(step.between(5.0, 5.8));
@@ -191,7 +187,7 @@ fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
     assert!(still.contains("does not move") && still.contains("3.0e-3 N·m"), "{still}");
 }
 
-/// After a push and a free decay in one direction, only the products c (1 + asymmetry) and d (1 + asymmetry) are determined.
+/// A push and a free decay in one direction determine only the products c (1 + asymmetry) and d (1 + asymmetry).
 #[test]
 fn a_hub_that_turns_one_way_determines_the_friction_in_that_direction_only() {
     for way in [1.0, -1.0] {
@@ -213,10 +209,10 @@ fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     one
 }
 
-/// A torque that is held comes half a row late, which is 8.6° of phase at 2.4 Hz. If it were taken as linear between rows, this
-/// phase would be taken for friction.
+/// A held torque acts half a row late, which is a phase of 8.6° at 2.4 Hz. A fit with a linear torque would attribute
+/// this phase to friction.
 #[test]
-fn a_torque_that_is_held_is_recognised() {
+fn a_zero_order_hold_of_the_torque_is_recognised() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque =
         Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=100".parse().unwrap());
@@ -226,7 +222,7 @@ fn a_torque_that_is_held_is_recognised() {
     let found = fit(&recordings, &options()).unwrap();
     for (name, truth) in [("hub.I", 0.322414), ("friction.b", 0.03793)] {
         let p = &found.parameters[name];
-        // four standard deviations: one false alarm in 16,000 draws, and the seed is fixed
+        // exceeded in one of 16,000 draws
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
     assert_eq!(found.fits, Some(true), "{:?}", found.verdict);
@@ -241,19 +237,19 @@ fn a_recording_with_sloshing_liquid_does_not_fit_the_rigid_model_of_the_friction
     assert!(found.fits == Some(false) && found.verdict.iter().any(|l| l.starts_with(DOES_NOT_FIT)));
 }
 
-/// Pulses in both directions, each followed by a decay of 5 s, with an asymmetry of 0.15 and a variation of 0.2 over the
-/// angle.
+/// The recording has pulses in both directions, each followed by a decay of 5 s. The friction has an asymmetry of 0.15 and varies
+/// over the angle by 0.2.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn the_dependence_of_friction_on_direction_and_angle_is_estimated_from_free_decays() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let bench = [("friction.asymmetry", "0.15"), ("friction.forward_cos1", "0.2")];
-    // pulses in turn, and 5 s of decay after each
+    // alternating pulses, each followed by 5 s of decay
     let (mut time, mut tau) = (Vec::new(), Vec::new());
     for k in 0..7_500 {
         let t = 0.02 * f64::from(k);
         let (number, within) = ((t / 10.0) as usize, t % 10.0);
-        // 0.8 rad/s turns the hub by radians, so that all angles come by
+        // at 0.8 rad/s the hub turns by several radians, so that all angles occur
         let sign =
             if (number / 2).is_multiple_of(2) == number.is_multiple_of(2) { 1.0 } else { -1.0 };
         time.push(t);
@@ -269,6 +265,6 @@ fn the_dependence_of_friction_on_direction_and_angle_is_estimated_from_free_deca
     one.angle = Some(setup.run(&fmu, &[], &one, 0.0).unwrap().angle);
     let found = friction::identify(&fmu, &[one], &options(), &mut |_| {}).unwrap();
     let [ahead, back] = &found.details.braking[..] else { panic!("{:?}", found.details.braking) };
-    // forwards it brakes harder: the preferential direction is backwards
+    // friction is larger forwards, so that the preferential direction is backwards
     assert!(-ahead.coefficients[0] > back.coefficients[0], "{ahead:?} {back:?}");
 }

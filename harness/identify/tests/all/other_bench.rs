@@ -1,5 +1,5 @@
-//! Compares the independent bench, which shares no code with the FMU, with the FMU and with closed forms. Identification is tried
-//! on its recordings because an error of the FMU cannot be in them as well.
+//! Compares the independent bench, which shares no code with the FMU, with the FMU and with closed-form solutions. The
+//! identification is tested on its recordings, because they cannot contain errors of the FMU.
 
 use host::fmu::Fmu;
 use identify::bench::simulate::Setup;
@@ -18,11 +18,10 @@ fn sweep(amplitude: f64, time: &[f64]) -> Vec<f64> {
     time.iter().map(|t| amplitude * (turn * (1.9 * t + 0.01 * t * t / 2.0)).sin()).collect()
 }
 
-/// The simulator that makes the recordings for tests of `identify` gives the same motion as the FMU. At a small
-/// torque the hub stands still most of the time; at a large torque the spherical pendulum leaves the plane of the
-/// torque.
+/// At a small torque the hub is at rest most of the time; at a large torque the spherical pendulum leaves the
+/// plane of the torque.
 #[test]
-fn the_simulator_of_test_recordings_moves_as_the_fmu() {
+fn the_independent_simulator_gives_the_same_motion_as_the_fmu() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let time = rows(60.0);
     for (liquid, name) in
@@ -53,7 +52,7 @@ fn the_simulator_of_test_recordings_moves_as_the_fmu() {
                 "{name} {amplitude}: rate {rate:.1e}, angle {angle:.1e}, {} stops, slosh {:.3}",
                 there.stops, there.slosh
             );
-            // 7e-11 is seen
+            // the difference is 7e-11
             assert!(
                 rate < 1e-9 && angle < 1e-9,
                 "{name} {amplitude}: {rate:.1e} rad/s, {angle:.1e} rad"
@@ -63,8 +62,8 @@ fn the_simulator_of_test_recordings_moves_as_the_fmu() {
     }
 }
 
-/// The hub of inertia I rests below the torque c + d, so that a ramp k t makes it break away at t₀ = (c + d)/k. While it slips, I
-/// ω' = τ − c; without Stribeck's excess d and viscous friction its rate is then ω = k (t − t₀)²/2I.
+/// A hub with the inertia I is at rest below the torque c + d, so that a ramp k t makes it break away at t₀ = (c + d)/k. While it
+/// slips, I ω' = τ − c. Without Stribeck's excess d and viscous friction its rate is then ω = k (t − t₀)²/2I.
 #[test]
 fn a_ramp_breaks_away_where_the_closed_form_says() {
     let (k, c) = (0.004, 0.006);
@@ -81,8 +80,8 @@ fn a_ramp_breaks_away_where_the_closed_form_says() {
     }
 }
 
-/// Without friction and damping the transfer function from torque to the hub's rate is (p² + ωₙ²)/(I₀ p (p² + ωₚ²)), ωₚ² = ωₙ² (1
-/// + m r²/I₀): a step τ₀ makes ω = τ₀/I₀ (q t + (1 − q) sin(ωₚ t)/ωₚ), q = ωₙ²/ωₚ².
+/// Without friction and damping the transfer function from torque to the hub's rate is (p² + ωₙ²)/(I₀ p (p² + ωₚ²)) with ωₚ² =
+/// ωₙ² (1 + m r²/I₀). A step τ₀ causes ω = τ₀/I₀ (q t + (1 − q) sin(ωₚ t)/ωₚ) with q = ωₙ²/ωₚ².
 #[test]
 fn a_step_of_torque_moves_hub_and_linear_liquid_as_the_closed_form_says() {
     let bearing = Bearing { b: 0.0, c: 0.0, d: 0.0, omega_s: 1.0, asymmetry: 0.0, eps: None };

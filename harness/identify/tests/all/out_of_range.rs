@@ -1,4 +1,5 @@
-//! Times and values that are NaN, infinite, huge or tiny: every method answers or refuses, and none panics or hangs.
+//! Times and values that are NaN, infinite, very large or very small: every method returns a result or an error,
+//! without panicking or hanging.
 
 use experiments::profile::Torque;
 use host::fmu::Fmu;
@@ -32,7 +33,8 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
     ]
 }
 
-/// Recordings with NaN, infinite and huge times and values are refused by every method with row and reason.
+/// Every method refuses recordings with NaN, infinite or very large times and values, and its error names the
+/// row and the reason.
 #[test]
 fn no_method_hangs_or_panics_on_values_out_of_range() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -68,7 +70,7 @@ fn no_method_hangs_or_panics_on_values_out_of_range() {
         let method = OutputError { options: Options::default() };
         assert!(method.identify(&task, &mut |_| {}).is_err(), "{words}");
     }
-    // sizes within the range: some answers are odd, but each method returns
+    // accepted sizes: some results are strange, but each method returns
     let sizes: [Change; 6] = [
         |r, _| r.rate.iter_mut().for_each(|w| *w *= 1e90),
         |r, _| r.rate.iter_mut().for_each(|w| *w *= 1e-200),

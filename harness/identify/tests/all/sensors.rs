@@ -1,4 +1,5 @@
-//! Twins that are identified through a sensor that is not an output of the FMU, for example a wave gauge or a force sensor.
+//! Identification of simulated recordings from a sensor that is not an output of the FMU, for example a wave gauge
+//! or a force sensor.
 
 use experiments::profile::Torque;
 use experiments::run::{Run, TORQUE};
@@ -49,8 +50,9 @@ fn twin(sensor: &Sensor, column: &str) -> Record {
     }
 }
 
-/// Identifies a twin from one column of a sensor. `noise` is the specified standard deviation of one reading.
-fn comes_back(sensor: &str, column: &str, noise: f64) {
+/// Simulates a bench, records one column of a sensor, and asserts that the estimates are the true values. `noise` is the
+/// specified standard deviation of one reading.
+fn check_estimates_from(sensor: &str, column: &str, noise: f64) {
     let sensor: Sensor = sensor.parse().unwrap();
     let record = twin(&sensor, column);
     let free = ["tank.h=0.1:0.05:0.15", "slosh.zeta=0.003:0:0.1", "hub.I=0.3:0.1:1"];
@@ -76,36 +78,32 @@ fn comes_back(sensor: &str, column: &str, noise: f64) {
     assert!(found.converged && found.fits == Some(true), "{column}: {:?}", found.verdict);
     for (name, truth) in TRUTH {
         let e = &found.parameters[name];
-        // a chance of 6e-5 for each of three, once for all with this seed
+        // exceeded with a probability of 6e-5 for each of three values
         assert!((e.value - truth).abs() < 4.0 * e.std, "{column}: {name}: {e:?}");
         assert!(e.std < 0.05 * truth, "{column}: {name} is determined: {e:?}");
     }
-    // 2500 readings or more tell their noise to 1.4 %, four standard errors
+    // 2500 readings determine their noise to 1.4 %; four standard errors are allowed
     let white = found.details.outputs[0].noise_white;
     assert!((white / noise - 1.0).abs() < 0.06, "{column}: {white}");
 }
 
-/// A simulated bench is recorded by a wave gauge with a delay. `identify` must find the parameters with which the
-/// bench was simulated.
 #[test]
 fn identify_finds_the_parameters_of_a_simulated_bench_with_a_late_wave_gauge() {
-    comes_back(
+    check_estimates_from(
         "wave=gauge:angle=60deg,rate=25,delay=0.04,scale=1.01,noise=2e-4,bias=3e-4",
         "wave",
         2e-4,
     );
 }
 
-/// A simulated bench is recorded by a force sensor with noise and a bias. `identify` must find the parameters with
-/// which the bench was simulated.
+/// The force sensor has noise and a bias.
 #[test]
 fn identify_finds_the_parameters_of_a_simulated_bench_with_a_force_sensor() {
-    comes_back("load=force:noise=5e-3,bias=0.01", "load", 5e-3);
+    check_estimates_from("load=force:noise=5e-3,bias=0.01", "load", 5e-3);
 }
 
-/// A simulated bench is recorded by a camera with a delay of 0.1 s. `identify` must find the parameters with which
-/// the bench was simulated.
+/// The camera has a delay of 0.1 s.
 #[test]
 fn identify_finds_the_parameters_of_a_simulated_bench_with_a_camera() {
-    comes_back("view=camera:rate=10,delay=0.1,noise=5e-4", "view.plane_tangential", 5e-4);
+    check_estimates_from("view=camera:rate=10,delay=0.1,noise=5e-4", "view.plane_tangential", 5e-4);
 }

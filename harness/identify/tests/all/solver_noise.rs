@@ -1,4 +1,5 @@
-//! An FMU whose own solver is adaptive and coarse (`adaptive.c`): its errors jump from one parameter value to the next.
+//! Identification of an FMU with an adaptive solver and a coarse tolerance (`adaptive.c`): its errors jump from one parameter
+//! value to the next.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -91,8 +92,7 @@ fn xml(exchange: bool) -> String {
     )
 }
 
-/// Returns the rates of change of r, v, phi and w by the equations in `adaptive.c` with m = 1 and L
-/// = 1.
+/// Returns the time derivatives of r, v, phi and w by the equations in `adaptive.c` with m = 1 and L = 1.
 fn rates([r, v, phi, w]: [f64; 4], [k, d, c]: [f64; 3], a: f64) -> [f64; 4] {
     let g = 9.81;
     [
@@ -103,8 +103,8 @@ fn rates([r, v, phi, w]: [f64; 4], [k, d, c]: [f64; 3], a: f64) -> [f64; 4] {
     ]
 }
 
-/// Records a free swing from the true start, with noise of `scale` times [`NOISE`]. Runge and
-/// Kutta's method with 100 steps a row has an error below 1e-9.
+/// Records a free swing from the true initial state, with noise of `scale` times [`NOISE`]. The Runge–Kutta method with 100 steps
+/// a row has an error below 1e-9.
 pub fn record(seed: u64, scale: f64) -> Record {
     let noise = NOISE.map(|noise| scale * noise);
     let [k, d, c, r, phi] = TRUTH.map(|(_, value)| value);
@@ -152,8 +152,7 @@ fn found(fmu: &Adaptive, question: &Question, seed: u64, scale: f64) -> Identifi
     identify(&model, question, &[record(seed, scale)], &mut |_| {}).unwrap()
 }
 
-/// Returns the number of the given intervals that contain the true value, and the number of
-/// intervals that are given.
+/// Returns the number of intervals that contain the true value, and the number of all intervals.
 fn held(found: &Identification) -> (usize, usize) {
     let given = TRUTH.iter().filter(|(name, _)| found.parameters[*name].determined);
     let holds = |(name, truth): &&(&str, f64)| {
@@ -163,7 +162,8 @@ fn held(found: &Identification) -> (usize, usize) {
     (given.clone().filter(holds).count(), given.count())
 }
 
-/// Checks the refusal of a fit that the solver's errors decide: no judgement, no number that looks like an interval, and a remedy.
+/// Checks the result of a fit whose estimates depend on the solver's errors: no verdict that the model fits, no interval, and
+/// advice for smaller errors.
 fn check_refusal(found: &Identification, remedy: &str) {
     assert_ne!(found.fits, Some(true), "{:?}", found.verdict);
     let decided = &found.details.decided_by_solver;
@@ -184,11 +184,11 @@ fn check_refusal(found: &Identification, remedy: &str) {
     assert!(!words.contains("The model fits"), "{words}");
 }
 
-/// The fit used to take differences so small that the solver's noise decided them, and it did not compare the solver with a finer
-/// one. The truth was then up to 50,000 standard deviations outside in the first case, 20 in the second and 17 in the third,
-/// although the verdict was that the model fits.
+/// The fit once took differences so small that the solver's noise dominated them, and did not compare the solver with a more
+/// accurate one. The true values were then up to 50,000 standard deviations outside in the first case, 20 in the second and 17 in
+/// the third, although the verdict was that the model fits.
 #[test]
-fn no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide() {
+fn no_interval_is_given_if_solver_errors_exceed_the_noise() {
     for (definitions, scale) in [
         (&["-DTOLERANCE=1e-3", "-DROUGH"][..], 1.0),
         (&["-DTOLERANCE=1e-4"], 0.1),
@@ -203,7 +203,7 @@ fn no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide() {
     check_refusal(&found(&fmu, &question(Solver::Own), 1, 1.0), "ignores the tolerance");
 }
 
-/// The FMU ignores the solver's tolerance, so a run at a finer tolerance shows no difference.
+/// The FMU ignores the tolerance of the solver, so that a simulation with a smaller tolerance shows no difference.
 #[test]
 fn identify_fmu_states_if_the_size_of_solver_errors_cannot_be_determined() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-6", "-DDEAF"]);
@@ -213,10 +213,10 @@ fn identify_fmu_states_if_the_size_of_solver_errors_cannot_be_determined() {
     assert!(found.verdict.iter().any(|line| line.starts_with(said)), "{:?}", found.verdict);
 }
 
-/// At a tolerance of 1e-3 the errors of the FMU's solver exceed the noise. With 1e-5, 95 % intervals contain the true values.
+/// At a tolerance of 1e-3 the errors of the FMU's solver exceed the noise. With 1e-5 the 95 % intervals contain the true values.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
-fn a_finer_tolerance_gives_intervals_that_hold_the_truth() {
+fn a_finer_solver_tolerance_gives_intervals_that_contain_the_true_values() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-3", "-DMODEL_EXCHANGE"]);
     let fine = Question { tolerance: Some(1e-5), ..question(Solver::Own) };
     let mut all = (0, 0);
@@ -226,11 +226,10 @@ fn a_finer_tolerance_gives_intervals_that_hold_the_truth() {
         let (inside, given) = held(&found);
         all = (all.0 + inside, all.1 + given);
     }
-    // of 100 intervals 95 hold the truth; fewer than 89 do by a chance of 0.4 %, once for all with these seeds
+    // 95 of 100 intervals should contain the true value; fewer than 89 would have a probability of 0.4 %
     assert!(all.1 == 100 && all.0 >= 89, "{all:?}");
 }
 
-/// A finer tolerance of the FMU's solver and the harness's solver give the same estimates.
 #[test]
 fn a_finer_tolerance_and_the_hosts_solver_give_the_same_estimates() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-3", "-DMODEL_EXCHANGE"]);
@@ -238,15 +237,14 @@ fn a_finer_tolerance_and_the_hosts_solver_give_the_same_estimates() {
     let (own, host) =
         (found(&fmu, &fine, 1, 1.0), found(&fmu, &question(Solver::Host(1e-8)), 1, 1.0));
     for (name, e) in &host.parameters {
-        // solver errors that are not added are below 0.05 standard deviations, others below 0.3
+        // solver errors whose effect is not added to the intervals are below 0.05 standard deviations, all others below 0.3
         assert!((own.parameters[name].value - e.value).abs() < 0.3 * e.std, "{name}");
     }
 }
 
-/// `design --free` gives NaN for the standard deviation of unknowns whose derivative is dominated by errors of the FMU's
-/// solver.
+/// `design --free` gives NaN for the standard deviation of unknowns whose derivative is dominated by errors of the FMU's solver.
 #[test]
-fn predictions_are_refused_where_solver_errors_decide() {
+fn predicted_standard_deviations_are_nan_if_solver_errors_dominate_the_derivatives() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-3", "-DROUGH", "-DMODEL_EXCHANGE"]);
     let at_truth = TRUTH.map(|(name, value)| format!("{name}={value}").parse().unwrap()).to_vec();
     let question = |solver| Question { free: at_truth.clone(), ..question(solver) };
@@ -259,16 +257,17 @@ fn predictions_are_refused_where_solver_errors_decide() {
     }
     let stated = found(&fmu, &question(Solver::Host(1e-8)), 1, 1.0);
     for bound in bounds(Solver::Host(1e-8)) {
-        // the noise of the fit is estimated to 1/√(2 · 800)
+        // the fit estimates the noise to 1/√(2 · 800)
         let stated = stated.parameters[&bound.name].std;
         assert!((bound.std / stated - 1.0).abs() < 0.1, "{bound:?} {stated}");
     }
 }
 
-/// Model Exchange has no slopes, so the host's solver turned a spacecraft without its wheels' torque. The difference was taken
-/// for an error of the spacecraft's own solver, so that no interval was given for a flight with wheels.
+/// Model Exchange has no input derivatives, so that the host's solver simulated a spacecraft without the torque of its
+/// wheels. The difference was once taken for an error of the spacecraft's own solver, so that no interval was given for
+/// a flight with wheels.
 #[test]
-fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
+fn the_wheel_torque_of_a_spacecraft_is_not_taken_for_a_solver_error() {
     for fmi in [pack::Fmi::V2, pack::Fmi::V3] {
         wheels(pack::packed_version_for_tests(&pack::MODELS[1], fmi));
     }
@@ -277,7 +276,7 @@ fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
 fn wheels(fmu: &std::path::Path) {
     let model = Model::open(fmu, Solver::Own).unwrap();
     let time: Vec<f64> = (0..200).map(|row| 0.1 * f64::from(row)).collect();
-    // N.m.s: to and fro
+    // angular momentum that oscillates, N.m.s
     let momentum = time.iter().map(|t| 5.0 * (1.0 - (0.5 * t).cos())).collect();
     let record = Record {
         outputs: vec![vec![0.0; time.len()]],
@@ -301,10 +300,10 @@ fn with_free(free: &[&str], solver: Solver) -> Question {
     Question { free: free.iter().map(|text| text.parse().unwrap()).collect(), ..question(solver) }
 }
 
-/// The equations contain stiffness k, damping d and mass m only in the ratios k/m and d/m, so that these three cannot
-/// be separated; the parameter c can be determined.
+/// The equations contain stiffness k, damping d and mass m only in the ratios k/m and d/m, so that these three cannot be
+/// separated. The parameter c can be determined.
 #[test]
-fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() {
+fn inseparable_parameters_are_named_together_in_the_verdict_and_in_json() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-7", "-DMODEL_EXCHANGE"]);
     let free = ["k=42:20:80", "m=1:0.5:2", "d=0.1:0:1", "c=0.03:0:1", "r=1.3:1:2", "phi=0.4:-1:1"];
     for solver in [Solver::Own, Solver::Host(1e-8)] {
@@ -319,7 +318,8 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
         }
         let direction = &result.details.cannot_tell_apart[0].direction;
         let relative = |name: &str| direction[name] / result.parameters[name].value;
-        // the direction is an eigenvector of derivatives by differences, good to some 1e-3 where the outputs show d poorly
+        // the direction is an eigenvector of finite-difference derivatives, accurate to about 1e-3 because d has little
+        // effect on the outputs
         assert!((relative("k") / relative("m") - 1.0).abs() < 1e-3, "{direction:?}");
         assert!((relative("d") / relative("m") - 1.0).abs() < 0.05, "{direction:?}");
         let said = result.verdict.iter().any(|l| l.starts_with("d, k, m cannot be distinguished"));
@@ -332,8 +332,7 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
     }
 }
 
-/// Fits with one unknown, with all unknowns at their bounds, and with an unknown without effect have empty or singular
-/// matrices. Each fit gives a result or an error, and none panics.
+/// The matrices of these fits are empty or singular. No fit may panic.
 #[test]
 fn fits_with_one_unknown_all_at_bounds_or_without_effect_end_in_a_result_or_an_error() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-5", "-DMODEL_EXCHANGE"]);
@@ -383,8 +382,8 @@ fn fits_with_one_unknown_all_at_bounds_or_without_effect_end_in_a_result_or_an_e
     }
 }
 
-/// The hinge is shaken at 1 Hz and its motion recorded in 8 rows a period. The FMU takes no slopes of its inputs, so that the
-/// input has to be held over short parts of the way between rows.
+/// The hinge is shaken at 1 Hz, and its motion is recorded in 8 rows per period. The FMU takes no input derivatives, so that the
+/// input is held constant over short steps between rows.
 #[test]
 fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-7", "-DMODEL_EXCHANGE"]);
@@ -402,13 +401,13 @@ fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
     };
     let (own, host) = (run(Solver::Own), run(Solver::Host(1e-9)));
     let off: Vec<f64> = own[1].iter().zip(&host[1]).map(|(a, b)| a - b).collect();
-    // held from the row's beginning, the input is late by 1/16 of a period, 0.4 of its size; the sawtooth of an eighth of its
-    // change within a row has a mean of 0
+    // an input that is held from the beginning of each row is late by 1/16 of a period, an error of 0.4 of its size; the sawtooth
+    // of an eighth of its change per row has a mean of 0
     let (off, size) = (deviation(&off), deviation(&host[1]));
     assert!(off < 0.01 * size, "{off} {size}");
 }
 
-/// Checks the coverage with 20 twins of each kind: `cargo test --release -p identify --test all -- --ignored --nocapture
+/// 20 simulated recordings of each kind: `cargo test --release -p identify --test all -- --ignored --nocapture
 /// coverage_with_adaptive_solvers`.
 #[test]
 #[ignore = "two minutes: .ci/long-tests"]
@@ -436,9 +435,9 @@ fn coverage_with_adaptive_solvers() {
                     "{rough} {deaf} tolerance {tolerance:e}, noise x {scale}: {judged} of 20 judged, {inside} of {given} \
                      intervals hold the truth"
                 );
-                // an exact solver decides nothing: no verdict is withheld
+                // with an accurate solver every fit gets a verdict
                 assert!(tolerance > 1e-6 || judged == 20, "{judged}");
-                // 0.88 of 100 by a chance of 0.4 %
+                // fewer than 0.88 of 100 have a probability of 0.4 %
                 assert!(f64::from(inside as u32) >= 0.88 * f64::from(given as u32));
             }
         }

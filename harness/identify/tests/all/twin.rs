@@ -1,4 +1,4 @@
-//! Recordings of the FMU itself, with its gyro's noise, identified without priors and starts.
+//! Identification of recordings that the FMU simulates, with noise of its gyro, without priors and start values.
 
 use std::f64::consts::TAU;
 
@@ -26,7 +26,7 @@ use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
 use crate::friction::{is_one_way, push};
 
 const LONG: &str = "lin-sweep:amplitude=0.1";
-/// A faster sweep than the thesis's, for tests in which only gross faults matter.
+/// A faster sweep than the thesis's, for tests that only look for large errors.
 const SHORT: &str = "lin-sweep:amplitude=0.1,duration=300,f0=1.8,f1=3";
 
 fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
@@ -37,7 +37,7 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
         .unwrap()
 }
 
-/// Returns options of a fit in which the torque is known to be linear between rows.
+/// Returns options of a fit with the torque linear between rows, as in the simulation.
 fn options() -> Options {
     Options {
         models: vec!["linear".into()],
@@ -49,7 +49,7 @@ fn options() -> Options {
     }
 }
 
-/// Returns options of a fit that has to find the intersample behaviour of the torque.
+/// Returns options of a fit that has to choose the intersample behaviour of the torque.
 fn of_any_torque() -> Options {
     Options { intersample: None, ..options() }
 }
@@ -71,7 +71,7 @@ fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() 
         // four standard deviations: one false alarm in 3000 draws, and the seed is fixed
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
-    // the tank is known to better than a thousandth, or the fit has learnt nothing
+    // a parameter of the tank that is not known to a thousandth would mean that the fit has learnt nothing
     assert!(found.parameters["tank.d"].std < 1e-3 * 0.163);
     let sum =
         found.details.combinations.iter().find(|c| c.name == "friction.c + friction.d").unwrap();
@@ -79,7 +79,7 @@ fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() 
     assert!(found.verdict.iter().any(|line| line.contains("cannot be distinguished")));
 }
 
-/// A parameter that is not estimated by default becomes an unknown if a start value is given for it.
+/// The damping's increase with the amplitude is not estimated by default; a start value makes it an unknown.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn identify_finds_damping_that_grows_with_the_amplitude() {
@@ -90,18 +90,16 @@ fn identify_finds_damping_that_grows_with_the_amplitude() {
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [("slosh.zeta", 0.003), ("slosh.zeta_amplitude", 0.02)] {
         let p = &found.parameters[name];
-        // As above; and known to a tenth, or the fit has learnt nothing.
+        // Four standard deviations as above; the standard deviation must be below a tenth of the value.
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.1 * truth, "{name}: {p:?}");
     }
 }
 
-/// Settings of a twin whose waves break from a steepness of 0.63 on, which the first mode reaches
-/// at a slosh angle of 23°.
+/// Settings of a bench whose waves break at a steepness of 0.63, which the first mode reaches at a slosh angle of 23°.
 const BREAKS: [(&str, &str); 2] =
     [("slosh.zeta_breaking", "0.04"), ("slosh.breaking_steepness", "0.63")];
 
-/// From a simulated recording with waves that break, the fit finds the damping and the steepness with which it was
-/// simulated.
+/// The damping by breaking and the steepness at which waves break are estimated from a simulated recording with breaking waves.
 #[test]
 #[ignore = "half a minute: .ci/run --nightly"]
 fn damping_of_breaking_waves_is_recovered() {
@@ -118,10 +116,10 @@ fn damping_of_breaking_waves_is_recovered() {
     {
         let p = &found.parameters[name];
         println!("{name}: {p:?}");
-        // As above; and known to a quarter, or the fit has learnt nothing.
+        // Four standard deviations as above; the standard deviation must be below a quarter of the value.
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.25 * truth, "{name}: {p:?}");
     }
-    // waves as large of a liquid that does not break
+    // equally large waves of a liquid that does not break
     let without = of(&[], false);
     assert!(
         without.verdict.iter().any(|line| line.contains("--also breaking")),
@@ -130,8 +128,6 @@ fn damping_of_breaking_waves_is_recovered() {
     );
 }
 
-/// If the waves of a simulated recording do not break, the verdict says that the damping by breaking cannot be
-/// estimated.
 #[test]
 fn waves_that_do_not_break_show_no_damping_by_breaking() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -147,10 +143,10 @@ fn waves_that_do_not_break_show_no_damping_by_breaking() {
     );
 }
 
-/// The recorded torque is 2 % too small. Therefore the estimated mass of the liquid is too small, and no residual shows
-/// this.
+/// The recorded torque is 2 % too small. Therefore the estimated mass of the liquid is too small, without any
+/// sign in the residual.
 #[test]
-fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals() {
+fn intervals_contain_the_true_values_if_the_torque_is_wrong_within_its_tolerance() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let mut recording = sweep(&fmu, SHORT, &[]);
     recording.torque.iter_mut().for_each(|tau| *tau *= 0.98);
@@ -168,15 +164,15 @@ fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals
     }
     let said = found.verdict.iter().find(|line| line.contains("share of the variance")).unwrap();
     assert!(said.contains("torque 2 %") && said.contains("tank.h"), "{said}");
-    // 0.1 N·m drives linear slosh to a quarter of a radian
-    let is_told = found.verdict.iter().any(|line| line.starts_with("The slosh is"));
-    assert!(is_told, "{:?}", found.verdict);
+    // a torque of 0.1 N·m drives linear slosh to a quarter of a radian
+    let is_reported = found.verdict.iter().any(|line| line.starts_with("The slosh is"));
+    assert!(is_reported, "{:?}", found.verdict);
 }
 
-/// The wheel has a lag of 30 ms. To first order the lag is a delay, which is estimated; the rest was once taken for a torque
-/// proportional to the square of the rate.
+/// The wheel has a lag of 30 ms. To first order the lag is a delay, which is estimated. The remaining misfit was once attributed
+/// to a torque proportional to the square of the rate.
 #[test]
-fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
+fn the_cause_of_a_misfit_is_named_with_the_option_that_estimates_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque: Profile = "lin-sweep:amplitude=0.1,duration=120,f0=1.5,f1=3.6".parse().unwrap();
     let settings = vec![("slosh.zeta_from_correlation".to_string(), "false".to_string())];
@@ -199,12 +195,12 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
     let lag = &found.measurement["actuator_lag"];
     assert!((lag.value - 0.03).abs() < 4.0 * lag.std && lag.std < 3e-3, "{lag:?}");
-    // the friction of a wheel that is late is the bearing's
+    // with the lag estimated, inertia and friction are right
     let inertia = &found.parameters["hub.I"];
     assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
 }
 
-/// The hub rocks at 4.1 Hz and the gyro sees a part of this motion, which no candidate effect describes.
+/// The hub nutates at 4.1 Hz, and the gyro measures a part of this motion, which no candidate effect describes.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_misfit_that_no_candidate_explains_has_no_cause() {
@@ -217,7 +213,7 @@ fn a_misfit_that_no_candidate_explains_has_no_cause() {
     let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
     let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
     assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
-    // one of them is far beyond chance, and would be named if that were enough
+    // an effect whose score is far beyond chance, but which leaves more than noise
     let explains = found.done.iter().any(|line| line.contains("more than noise is left"));
     assert!(
         explains && found.details.cause.is_none(),
@@ -229,11 +225,11 @@ fn a_misfit_that_no_candidate_explains_has_no_cause() {
     assert!(!says("The cause is an") && says("The cause is unknown"), "{:?}", found.verdict);
 }
 
-/// The arm is 2 % longer than its nominal value. Slosh of a third of a radian shows this, because at this angle no other
-/// parameter has the same effect.
+/// The arm is 2 % longer than its nominal value. With a slosh angle of a third of a radian the recording shows this, because no
+/// other parameter then has the same effect.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
+fn an_arm_that_is_wrong_within_its_tolerance_is_estimated_from_nonlinear_slosh() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque: Profile = "lin-sweep:amplitude=0.15,duration=120,f0=1.5,f1=3.6".parse().unwrap();
     let settings = [
@@ -253,41 +249,41 @@ fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
     };
     let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
     assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
-    // it is an unknown only where the residual was more than noise without it
+    // tank.r becomes an unknown only if the residual is more than noise with its nominal value
     for (name, truth) in [("tank.r", 0.2295), ("tank.d", 0.163), ("slosh.zeta", 0.003)] {
         let p = &found.parameters[name];
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
-    // ten times better than the tolerance
+    // ten times smaller than the tolerance
     assert!(found.parameters["tank.r"].std < 1e-3 * 0.2295, "{:?}", found.parameters["tank.r"]);
-    let is_told = found.verdict.iter().any(|line| line.starts_with("tank.r is estimated"));
-    assert!(is_told, "{:?}", found.verdict);
+    let is_reported = found.verdict.iter().any(|line| line.starts_with("tank.r is estimated"));
+    assert!(is_reported, "{:?}", found.verdict);
 }
 
-/// A simulated recording without noise: its residual is the error of a solver, which no test of noise passes, and models that
-/// are wrong leave thousands of times as much.
+/// The residual of a recording without noise is the error of a solver, which no test accepts as noise. The residuals of wrong
+/// models are thousands of times as large.
 #[test]
-fn a_recording_without_noise_fits_and_other_models_are_given_up_early() {
+fn a_recording_without_noise_fits_and_searches_with_wrong_models_end_early() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque: Profile = "lin-sweep:amplitude=0.1,duration=100,f0=1.8,f1=3".parse().unwrap();
     let recording = Twin::default().record(&fmu, &Torque::Profile(torque), None).unwrap();
     let models = ["linear", "planar"].map(String::from).to_vec();
-    // the course of the torque and the errors of the sensors are unknown
+    // the intersample behaviour and the errors of the sensors are unknown
     let options = Options { models, ..Options::default() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
     let [fit, rival] = &found.details.models[..] else { panic!("{:?}", found.details.models) };
     assert!(fit.model == "linear" && rival.bic > fit.bic + 1e4, "{:?}", found.details.models);
     assert!(rival.simulations < 0.5 * fit.simulations, "{:?}", found.details.models);
-    // a search for the third digit behind the noise would take a thousand
+    // a search for further digits below the noise would take a thousand simulations
     assert!(fit.simulations < 300.0, "{:?}", found.details.models);
 }
 
-/// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
-/// exclude the true value by fourteen standard deviations.
+/// The motion is so slow that the friction curve is nearly straight. The estimate of the Stribeck speed is 0.02 rad/s; an
+/// interval from the curvature there would exclude the true value by fourteen standard deviations.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
+fn intervals_in_a_flat_valley_of_the_likelihood_contain_the_true_friction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let slow = "lin-sweep:amplitude=0.025,duration=600,f0=1.8,f1=3";
     let recordings = [sweep(&fmu, slow, &[])];
@@ -309,9 +305,9 @@ fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
     assert!(said, "{:?}", found.verdict);
 }
 
-/// In a still slower motion the hub never comes near the Stribeck speed ω_s, so that the interval of ω_s has no upper end.
-/// The interval has no lower end either: the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d) for ω_s → ∞, and
-/// the friction with c + d in place of c and with d = 0 is the same curve at any ω_s.
+/// In a still slower motion the hub never comes near the Stribeck speed ω_s, so that the interval of ω_s has no upper end. It has
+/// no lower end either: for ω_s → ∞ the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d), and at any ω_s the same curve
+/// results from c + d in place of c and d = 0.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
@@ -324,16 +320,16 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     assert!(speed.interval == [0.0, f64::INFINITY] && !speed.determined, "{speed:?}");
     let said = found.verdict.iter().any(|l| l.starts_with("friction.omega_s is not determined"));
     assert!(said, "{:?}", found.verdict);
-    // what the recording does show has two ends
+    // the intervals of tank and hub have two ends
     for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("hub.I", 0.322414)] {
         let [low, high] = found.parameters[name].interval;
         assert!(low < truth && truth < high && high < 1.1 * low, "{name}: {low} {high}");
     }
 }
 
-/// A held torque acts half a row late, and if no delay is estimated, nothing can compensate for this. The fit distinguishes
-/// smooth from linear torque long before its minimum is known to a hundredth. The search then stops: a sweep of 2700 s
-/// takes nine simulations in all, and one at the end.
+/// A held torque acts half a row late, and without an estimated delay nothing can compensate for this. The fit therefore
+/// distinguishes smooth from linear torque long before the minimum is known accurately. A search whose sum of squares is clearly
+/// too large ends early: the sweep of 2700 s takes nine simulations in all, and one at the end.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn impossible_intersample_behaviours_cost_few_simulations() {
@@ -343,7 +339,7 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
     let [told, found] = [options(), of_any_torque()]
         .map(|options| identify(&fmu, &recordings, &perfect(options), &mut |_| {}).unwrap());
     let more = found.details.fit.simulations - told.details.fit.simulations;
-    // two more minima, each with sets of derivatives of its own
+    // two more minima, each with Jacobians of its own
     assert!(more < 250.0, "{more}");
     let said = found.verdict.iter().find(|line| line.starts_with("The torque is taken")).unwrap();
     assert!(
@@ -352,14 +348,14 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
     );
     assert!(said.contains("held from row to row (zero-order hold) was given up with"), "{said}");
     for (name, estimated) in &told.parameters {
-        // both searches end a fiftieth of a standard deviation from the minimum, along the friction's valley farther
+        // both searches end a fiftieth of a standard deviation from the minimum, and farther along the valley of the friction
         let off = (estimated.value - found.parameters[name].value).abs() / estimated.std;
         assert!(off < 0.1, "{name}: {off} standard deviations");
     }
 }
 
-/// Changes of tank, hub, friction and the gyro's scale cancel along a valley that bends. Spherical slosh shows the scale, and the
-/// minimum is two hundredths away from the start of the search.
+/// The effects of tank, hub, friction and the gyro's scale cancel along a bent valley of the likelihood. Spherical slosh
+/// determines the scale, whose estimate is 0.02 away from the start of the search.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
@@ -378,12 +374,12 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     assert!(fit.newton_decrement < 0.1, "{} standard deviations away", fit.newton_decrement);
     let scale = &found.measurement["gyro_scale"];
-    // the recording says more of it than was known before, or there was no valley to go along
+    // more accurate than the prior; otherwise the search did not have to follow the valley
     assert!((scale.value - 1.02).abs() < 4.0 * scale.std && scale.std < 0.01, "{scale:?}");
 }
 
-/// The general tests of the residual miss this drag: they stay below 4, although the friction is off by tens of its standard
-/// deviations.
+/// The friction is wrong by tens of its standard deviations, but the general tests of the residual stay below 4 and do
+/// not show the drag.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_drag_that_the_model_lacks_is_named_with_its_size() {
@@ -397,14 +393,13 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
     let [drag] = &found.details.missing[..] else { panic!("{:?}", found.details.missing) };
     assert_eq!(drag.follows, "the rate's square against the motion");
-    // as above, with a known to an eighth
+    // four standard deviations as above; the standard deviation must be below an eighth of the value
     assert!((drag.factor + 0.02).abs() < 4.0 * drag.std && drag.std < 0.003, "{drag:?}");
     assert_eq!(found.fits, Some(false));
     let said = found.verdict.iter().find(|line| line.starts_with(DOES_NOT_FIT)).unwrap();
     assert!(said.contains("a torque that follows the rate's square"), "{said}");
 }
 
-/// Twenty spikes in the rate of a simulated recording are listed in the verdict and not fitted.
 #[test]
 fn twenty_spikes_are_reported_and_left_out() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -423,11 +418,11 @@ fn twenty_spikes_are_reported_and_left_out() {
     }
 }
 
-/// A gyro cannot distinguish a held torque that comes 5 ms late from a linear torque that comes 15 ms late, so that neither may
-/// be stated as sure.
+/// With a gyro, a held torque that acts 5 ms late cannot be distinguished from a linear torque that acts 15 ms late. Therefore
+/// neither delay may be reported as certain.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_sure() {
+fn the_delay_is_uncertain_if_another_intersample_behaviour_fits_as_well() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let known = [
         ("slosh.zeta_from_correlation", "false"),
@@ -442,7 +437,7 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
     let torque =
         Torque::Profile("lin-sweep:amplitude=0.05,duration=130,f0=2,f1=3".parse().unwrap());
     let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
-    // of the friction only what is viscous, which is quick
+    // only viscous friction, which makes the fit fast
     let asked =
         Options { sensor_errors: true, friction: vec!["viscous".into()], ..of_any_torque() };
     let found = identify(&fmu, std::slice::from_ref(&recording), &asked, &mut |_| {}).unwrap();
@@ -451,15 +446,15 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
     let delay = &found.measurement["delay"];
     assert!((delay.interval[0]..=delay.interval[1]).contains(&0.005), "{delay:?}");
     assert!(delay.std > 1e-3, "{delay:?}");
-    // told which it is, the delay is known to tens of microseconds
+    // with a given intersample behaviour the delay is known to tens of microseconds
     let told = Options { intersample: Some(intersample), ..asked };
     let found = identify(&fmu, &[recording], &told, &mut |_| {}).unwrap();
     let delay = &found.measurement["delay"];
     assert!((delay.value - 0.005).abs() < 4.0 * delay.std && delay.std < 2e-4, "{delay:?}");
 }
 
-/// The dry friction of this bench is smoothed near rest, and its torque is linear between rows. A held torque that acts
-/// 10 ms before it is commanded would fit slightly better, but is impossible.
+/// The dry friction of this bench is smoothed near rest, and its torque is linear between rows. A held torque would fit slightly
+/// better if it acted 10 ms before its command, which is impossible.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn no_model_error_makes_the_rate_come_before_the_torque() {
@@ -481,28 +476,27 @@ fn no_model_error_makes_the_rate_come_before_the_torque() {
     );
 }
 
-/// A fit whose initial guesses are wrong by 40 % ends at the same estimates as a fit whose initial guesses come from
-/// the data.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[])];
     let own = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
-    // all the wrong way for the slosh frequency
+    // all errors change the slosh frequency in the same direction
     let far = [("tank.d", 1.4), ("tank.h", 0.6), ("slosh.zeta", 0.6), ("hub.I", 1.4)];
     let truth = |name: &str| own.parameters[name].value;
     let starts = far.map(|(name, off)| (name.to_string(), off * truth(name))).to_vec();
     let there = identify(&fmu, &recordings, &Options { starts, ..options() }, &mut |_| {}).unwrap();
     assert!(there.converged && there.fits == Some(true), "{:?}", there.verdict);
     for (name, p) in &own.parameters {
-        // both searches end within a hundredth of a standard deviation, along the friction's valleys a tenth
+        // both searches end within a hundredth of a standard deviation of the minimum, and along the valleys of the
+        // friction within a tenth
         let off = (there.parameters[name].value - p.value).abs() / p.std;
         assert!(off < 0.2, "{name}: {off} standard deviations");
     }
 }
 
-/// A hub of 5 kg·m²: without `--start hub.I=` the fit fails with an error that names this option.
+/// The hub has 5 kg·m². Without `--start hub.I=` the fit fails with an error that names this option.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_bench_of_another_size_is_estimated_only_if_its_inertia_is_stated() {
@@ -523,7 +517,7 @@ fn a_bench_of_another_size_is_estimated_only_if_its_inertia_is_stated() {
     }
 }
 
-/// A downward sweep reaches the softening resonance from higher frequencies, where rotary slosh begins.
+/// A downward sweep approaches the resonance of softening slosh from higher frequencies, where rotary slosh begins.
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
 fn a_downward_sweep_shows_that_slosh_rotates() {
@@ -542,15 +536,14 @@ fn a_downward_sweep_shows_that_slosh_rotates() {
     }
 }
 
-/// A recording with the angle of an encoder determines the scale error of the gyro, which torque and rate cannot
-/// show.
+/// The scale error of the gyro cannot be estimated from torque and rate, but the angle of an encoder determines it.
 #[test]
-fn an_encoder_shows_the_gyros_scale() {
+fn an_encoder_determines_the_scale_error_of_the_gyro() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let sensor_errors = SensorErrors { gyro_scale: 1.01, ..SensorErrors::default() };
     let torque = Torque::Profile(SHORT.parse().unwrap());
     let mut recording = fmu_twin::record(&fmu, &[], &torque, Some(2), sensor_errors).unwrap();
-    // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
+    // an encoder with 17 bits, whose angle comes from a simulation without noise of the gyro
     let setup = Setup { settings: Vec::new(), intersample: Hold::FirstOrderHold };
     let motion = setup.run(&fmu, &[], &recording, 0.0).unwrap();
     let count = std::f64::consts::TAU / f64::from(1 << 17);
@@ -558,15 +551,16 @@ fn an_encoder_shows_the_gyros_scale() {
     let options = Options { gyro_scale: 0.05, ..options() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let scale = &found.measurement["gyro_scale"];
-    // without the encoder it would be known to 5 %
+    // without the encoder the standard deviation would be 5 %
     assert!(scale.std < 0.002, "{scale:?}");
     assert!((scale.value - 1.01).abs() < 4.0 * scale.std, "{scale:?}");
 }
 
-/// The encoder's angle shows the scale of the gyro, without which no residual is noise: the scale must be free from the beginning.
+/// With the encoder's angle, the residual is noise only if the scale of the gyro is estimated. Therefore the scale must be free
+/// from the beginning of the search.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_recording_with_an_encoder_is_described_as_one_without() {
+fn a_recording_with_an_encoder_fits_with_a_free_gyro_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [
         ("slosh.zeta_from_correlation", "false"),
@@ -594,15 +588,15 @@ fn a_recording_with_an_encoder_is_described_as_one_without() {
     }
 }
 
-/// Friction stops the hub before the first row that is fitted. No row shows the initial rate, and the search once tried ±1,000
-/// rad/s.
+/// Friction stops the hub before the first row that is fitted. No row determines the initial rate, and the search
+/// once tried ±1,000 rad/s.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn the_first_readings_bound_a_rate_that_friction_stops_at_once() {
+fn the_first_gyro_values_bound_an_initial_rate_that_friction_stops_at_once() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,duration=120,f0=2,f1=2.8";
     let all = sweep(&fmu, torque, &[]);
-    // two seconds without torque before it
+    // the torque begins after two seconds at rest
     let (step, noise) = (all.step(), all.rate_noise());
     let rest = (2.0 / step).round() as usize;
     let mut random = Random::new(1, 0);
@@ -620,14 +614,14 @@ fn the_first_readings_bound_a_rate_that_friction_stops_at_once() {
     let first = &found.measurement["init.omega[1]"];
     assert!(first.interval[0] < 0.0 && first.interval[1] > 0.0, "{first:?}");
     assert!(first.value.abs() < spread && first.std < 2.0 * spread, "{first:?}");
-    // nor is the asymmetry given up for it
+    // the asymmetry is still estimated
     assert!(found.parameters["friction.asymmetry"].std < 0.1);
 }
 
-/// A search tried a delay of −5,889 s, and the FMU ran for minutes after the recording's end; another one friction so stiff that a row took
-/// millions of internal steps.
+/// A search once tried a delay of −5,889 s, and the FMU ran for minutes after the end of the recording. Another search tried
+/// friction so stiff that one row took millions of internal steps.
 #[test]
-fn a_run_that_would_not_end_is_refused() {
+fn a_simulation_that_would_take_too_long_is_refused() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recording = sweep(&fmu, "lin-sweep:amplitude=0.1,duration=20,f0=2,f1=3", &[]);
     let run = |settings: &[(&str, &str)], delay: f64| {
@@ -647,11 +641,11 @@ fn a_run_that_would_not_end_is_refused() {
     let stiff = [lugre, ("friction.sigma0", "1e9"), ("init.omega", "100")];
     let said = says(&stiff, 0.0);
     assert!(said.contains("solver.max_steps = 600 internal steps"), "{said}");
-    // the user's own bound stays
+    // the limit that the user sets is kept
     let own = [&stiff[..], &[("solver.max_steps", "50")]].concat();
     let said = says(&own, 0.0);
     assert!(said.contains("solver.max_steps = 50 internal steps"), "{said}");
-    // the stiffest bristles that a fit reaches
+    // the largest stiffness of the bristles that a fit may try
     assert!(run(&[lugre, ("friction.sigma0", "1000")], 0.0).is_ok());
 }
 
@@ -665,9 +659,8 @@ fn no_model_fits_a_torque_that_is_clipped() {
     assert!(found.verdict.iter().any(|line| line.starts_with(DOES_NOT_FIT)), "{:?}", found.verdict);
 }
 
-/// A rate in deg/s without a stated unit is refused, and the message suspects degrees per second.
 #[test]
-fn degrees_per_second_are_refused_by_name() {
+fn a_rate_in_degrees_per_second_is_refused() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let mut degrees = sweep(&fmu, SHORT, &[]);
     degrees.rate.iter_mut().for_each(|w| *w = w.to_degrees());
@@ -675,8 +668,8 @@ fn degrees_per_second_are_refused_by_name() {
     assert!(error.contains("omega looks like degrees per second"), "{error}");
 }
 
-/// The model of the fit equals a simulated recording whose torque is held, interpolated or band-limited between samples,
-/// with a delay of 0 or 5 ms.
+/// The simulation of the fit reproduces a simulated recording whose torque is held, linear or band-limited between samples, with
+/// a delay of 0 or 5 ms.
 #[test]
 fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -689,7 +682,7 @@ fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
         (Hold::BandLimited, 0.005),
     ] {
         let sensor_errors = SensorErrors { delay, ..SensorErrors::default() };
-        // the gyro's clock without its noise
+        // the sampling of the gyro without its noise
         let settings = ["imu.arw", "imu.bias_instability"].map(|name| (name.into(), "0".into()));
         let twin =
             Twin { intersample, sensor_errors, settings: settings.to_vec(), ..Twin::default() };
@@ -699,15 +692,15 @@ fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
         let off = recording.rate.iter().zip(&motion.rate).map(|(a, b)| (a - b).abs());
         let off = off.fold(0.0, f64::max);
         let largest = recording.rate.iter().fold(0.0, |m: f64, w| m.max(w.abs()));
-        // friction where the hub turns round is the steepest: a thousandth of it is some 1e-5 rad/s
+        // the largest error is where friction changes its sign: a thousandth of it is about 1e-5 rad/s
         assert!(off < 1e-3 * largest, "{intersample:?}, {delay} s late: off by {off} of {largest}");
     }
 }
 
-/// Torque, inertias, masses and friction that are all scaled alike make the same motion, so that an error of the torque's scale
-/// should change the inertias and the friction by the same factor. The hub sticks in each half cycle, and the instants at which
-/// it does depend on the torque. The sweep is too gentle to determine friction.b and friction.c: any value along a flat valley
-/// may be the nearest fit, and their intervals are what must not move.
+/// If torque, inertias, masses and friction are all multiplied by the same factor, the motion does not change. Therefore an error
+/// of the torque's scale should change the estimated inertias and friction by the same factor. The hub sticks in each half cycle,
+/// at instants that depend on the torque. The sweep is too gentle to determine friction.b and friction.c: any values along a flat
+/// valley of the likelihood may be the best fit, so that the test compares their intervals.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_asymmetry_not_at_all()
@@ -770,7 +763,7 @@ fn a_damping_ratio_that_the_correlation_replaces_is_not_estimated() {
     assert!(nominal::warnings(&fmu, &[]).unwrap().is_empty());
 }
 
-/// The damping is the largest that the FMU allows, and a difference from there leaves the range.
+/// The true damping is the largest that the FMU allows, so that a finite difference may leave the range.
 #[test]
 fn a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -787,12 +780,12 @@ fn a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result(
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let zeta = &found.parameters["slosh.zeta"];
     assert!(zeta.value > 0.9 && zeta.value <= 0.999, "{zeta:?}");
-    // draws that the FMU would refuse are none
+    // draws that the FMU would refuse are left out
     assert!(zeta.interval[1] > 0.98 && zeta.interval[1] <= 0.999, "{zeta:?}");
 }
 
-/// Dry friction changes its sign when the hub turns back, which shows when the torque acts. Therefore the course between rows and
-/// the delay can both be found.
+/// Dry friction changes its sign when the hub turns back, which shows when the torque acts. Therefore the intersample behaviour
+/// and the delay can both be estimated.
 #[test]
 fn a_delay_of_half_a_row_is_not_reported_if_the_torque_between_rows_is_found() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -807,11 +800,10 @@ fn a_delay_of_half_a_row_is_not_reported_if_the_torque_between_rows_is_found() {
     let delay = &found.measurement["delay"];
     assert!((delay.value - 0.01).abs() < 4.0 * delay.std && delay.std < 1e-3, "{delay:?}");
     let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
-    // held is refuted; smooth or linear is the same 10 ms
+    // a held torque is excluded; smooth and linear give the same delay of 10 ms
     assert!(says("linear between rows") && !says("half a row"), "{:?}", found.verdict);
 }
 
-/// The recording has rigid liquid and almost no dry friction, so that the asymmetry of the friction is not determined.
 #[test]
 fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -826,7 +818,7 @@ fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
     let asymmetry = &found.parameters["friction.asymmetry"];
     assert!(asymmetry.std > 0.3, "{asymmetry:?}");
     for name in ["friction.c", "friction.d"] {
-        // friction in each direction is bounded, and so is this
+        // the friction in each direction has an upper bound, and so has their sum
         assert!(found.parameters[name].interval[1] < 0.1, "{:?}", found.parameters[name]);
         let combination = format!("{name} (1");
         let of = found.details.combinations.iter().find(|c| c.name.starts_with(&combination));
@@ -845,11 +837,11 @@ fn on_bench(bench: &Bench, seed: u64, seconds: u32) -> Recording {
     Recording::of("bench", time, tau, read)
 }
 
-/// The verdict once named "an actuator that lags" as the cause for a hub with an appendage on a spring, with 12 ms at 8 Hz and 17
-/// ms at 4 Hz.
+/// For a hub with an appendage on a spring, the verdict once named a lag of the actuator as the cause: 12 ms with an appendage at
+/// 8 Hz, and 17 ms at 4 Hz.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
+fn no_tried_effect_is_named_as_the_cause_for_a_flexible_hub() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for frequency in [8.0, 4.0] {
         let bench = Bench { appendage: Some((0.05, frequency)), ..Bench::default() };
@@ -865,8 +857,8 @@ fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
     }
 }
 
-/// The verdict once named "the rate's square", at 12 standard deviations, for friction that falls by a third with a time constant
-/// of a minute.
+/// The friction falls by a third with a time constant of a minute. The verdict once named a torque that follows the square of the
+/// rate as the cause, at 12 standard deviations.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn drifting_friction_is_never_reported_as_another_cause() {
@@ -889,16 +881,16 @@ fn drifting_friction_is_never_reported_as_another_cause() {
     }
 }
 
-/// A bench whose actuator makes another torque of its command, or on which a torque acts that no model has: nothing that is stated as
-/// sure is wrong, and no wrong cause is named.
+/// The actuator's torque differs from its command, or a torque acts that no model contains. No estimate that is reported as
+/// determined may be wrong, and no wrong cause may be named.
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
-fn benches_outside_the_model_get_neither_wrong_values_nor_wrong_causes() {
+fn benches_that_differ_from_the_model_get_neither_wrong_values_nor_wrong_causes() {
     type Acts = fn(f64) -> f64;
-    type Besides = fn(f64, f64, f64) -> f64;
+    type ExtraTorque = fn(f64, f64, f64) -> f64;
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let none: Besides = |_, _, _| 0.0;
-    let plants: [(&str, Acts, Besides, &[&str]); 7] = [
+    let none: ExtraTorque = |_, _, _| 0.0;
+    let plants: [(&str, Acts, ExtraTorque, &[&str]); 7] = [
         ("a dead zone", |tau| if tau.abs() < 0.01 { 0.0 } else { tau }, none, &[]),
         ("steps of the torque", |tau| (tau / 0.02).round() * 0.02, none, &[]),
         ("a limit of the torque", |tau| tau.clamp(-0.08, 0.08), none, &["largest torque"]),
@@ -907,8 +899,8 @@ fn benches_outside_the_model_get_neither_wrong_values_nor_wrong_causes() {
         ("a bearing that ripples", |tau| tau, |_, angle, _| 2e-3 * (40.0 * angle).sin(), &[]),
         ("a pump nearby", |tau| tau, |t, _, _| 3e-3 * (TAU * 0.7 * t).sin(), &[]),
     ];
-    for (name, acts, besides, causes) in plants {
-        let bench = Bench { besides, ..Bench::default() };
+    for (name, acts, extra_torque, causes) in plants {
+        let bench = Bench { extra_torque, ..Bench::default() };
         let time: Vec<f64> = (0..=7500).map(|k| 0.02 * f64::from(k)).collect();
         let command = |t: f64| 0.1 * (TAU * (1.25 * t + 0.0075 * t * t)).sin();
         let recorded: Vec<f64> = time.iter().map(|t| command(*t)).collect();
