@@ -1,5 +1,5 @@
-//! Files of other kinds than text in columns and Parquet (`.mat`, HDF5, TDMS, MDF4, Excel): the Python
-//! package `hubslosh` converts them to text, which is then read here.
+//! Files of other kinds than text in columns and Parquet (`.mat`, HDF5, TDMS, MDF4, Excel): calls the Python
+//! package `hubslosh`, which converts them to text.
 
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
@@ -9,8 +9,7 @@ use anyhow::{Context, Result, bail};
 use files::input;
 use files::temporary::Folder;
 
-/// The error for a file of a kind that only the Python package may be able to read; the text is the
-/// reason.
+/// The error for a file that only the Python package may be able to read. The text is the reason.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Foreign(pub String);
@@ -52,12 +51,11 @@ pub fn kind(path: &Path) -> Result<Kind> {
     }
 }
 
-/// Converts a file to text in columns with the Python package. The folder of the text is deleted when the
-/// returned value is dropped.
+/// Converts a file to text in columns with the Python package. The folder with the text is deleted when the
+/// returned value is dropped. `why` is the reason why the file was not read here.
 ///
 /// # Errors
-/// If no Python with the package is found, or the package cannot read the file; `why` is the reason
-/// that the file was not read here.
+/// If no Python with the package is found, or the package cannot read the file.
 pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> {
     let folder = Folder::new()?;
     let out = folder.path().join("recording.csv");
@@ -76,7 +74,7 @@ pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> 
             return Ok((folder, out));
         }
         let words = String::from_utf8_lossy(&done.stderr);
-        // The interpreter lacks the package or has an older version of it.
+        // Python lacks the package or has an older version of it.
         let is_there = words.lines().last().and_then(|line| line.strip_prefix("error: "));
         if let Some(words) = is_there {
             bail!("{words}");

@@ -1,6 +1,6 @@
-//! Sampled signals: as columns of the project's own files (`table`) and of recordings made by others
-//! (`recording`). Everything that needs the large generic crate `parquet` is here, so that its code is compiled only
-//! once.
+//! Sampled signals: columns of the project's own files (`table`), and recordings that other programs
+//! wrote (`recording`). All code that needs the large generic crate `parquet` is in this crate, so that
+//! it is compiled only once.
 
 mod foreign;
 mod parquet_file;

@@ -1,5 +1,5 @@
-//! Tables of numbers in CSV or Parquet files (distinguished by the ending). Signals are in SI units under the
-//! FMU's names, `time` in s.
+//! Tables of numbers in CSV or Parquet files (by the file's ending). Signals have SI units and the FMU's
+//! names; `time` is in s.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -45,7 +45,7 @@ pub fn check_ending(path: &Path) -> Result<()> {
 }
 
 impl Table {
-    /// Makes a table from columns with their names.
+    /// Creates a table from columns with their names.
     ///
     /// # Panics
     /// If the columns are not equally long, or names and columns differ in number.
@@ -55,7 +55,7 @@ impl Table {
         Table { names, columns, gaps: BTreeSet::new() }
     }
 
-    /// Makes a table from pairs of name and column.
+    /// Creates a table from pairs of name and column.
     ///
     /// # Panics
     /// If the columns are not equally long.
@@ -65,10 +65,11 @@ impl Table {
         Table::new(names, columns)
     }
 
-    /// Adds a column in which NaN marks missing values; the file then has an empty field or a null there.
+    /// Adds a column in which NaN marks missing values. In a file, a missing value is an empty field (CSV)
+    /// or a null (Parquet).
     ///
     /// # Panics
-    /// If it has another number of rows than the table.
+    /// If the column has another number of rows than the table.
     pub fn with_gaps(mut self, name: &str, column: Vec<f64>) -> Table {
         assert_eq!(column.len(), self.rows());
         self.names.push(name.into());
@@ -94,7 +95,7 @@ impl Table {
         Some(&self.columns[index])
     }
 
-    /// Returns a table that has only the columns `names` of this one, in the order of `names`.
+    /// Returns a table with the columns `names` of this table, in the order of `names`.
     ///
     /// # Panics
     /// If a column does not exist.
@@ -107,11 +108,10 @@ impl Table {
         }
     }
 
-    /// Reads the columns `wanted` from a file, which may have others.
+    /// Reads the columns `wanted` from a file. The file may contain further columns.
     ///
     /// # Errors
-    /// If the file cannot be read, a column is missing or exists twice, or a value is not a finite
-    /// number.
+    /// If the file cannot be read, a column is missing or exists twice, or a value is not a finite number.
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
         let read = if is_parquet(path)? { read_parquet } else { read_csv };
@@ -121,10 +121,10 @@ impl Table {
         Ok(table)
     }
 
-    /// Checks that all values are finite, except missing ones in columns with gaps.
+    /// Checks that all values are finite, except missing values in columns with gaps.
     ///
     /// # Errors
-    /// Names the first value that is not.
+    /// Names the first value that is not finite.
     pub fn all_finite(&self) -> Result<()> {
         for (column, values) in self.names.iter().zip(&self.columns) {
             let gaps = self.gaps.contains(column);
@@ -137,8 +137,8 @@ impl Table {
         Ok(())
     }
 
-    /// Checks that the table can be read again after it was written: all values finite, no two columns with
-    /// the same name.
+    /// Checks that the written table could be read again: all values are finite, and no two columns
+    /// have the same name.
     fn check(&self) -> Result<()> {
         let mut names = BTreeSet::new();
         if let Some(twice) = self.names.iter().find(|name| !names.insert(*name)) {
@@ -147,8 +147,8 @@ impl Table {
         self.all_finite()
     }
 
-    /// Writes the table to a CSV or Parquet file, replacing the file as a whole. `metadata` are a Parquet
-    /// file's key-value pairs; a CSV file has none.
+    /// Writes the table to a CSV or Parquet file. An existing file is replaced as a whole. `metadata` are
+    /// key-value pairs, which only a Parquet file contains.
     ///
     /// # Errors
     /// If a value is neither finite nor missing, or the file cannot be written.
@@ -167,7 +167,7 @@ impl Table {
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
         self.check()?;
         let mut out = BufWriter::new(file);
-        // A comma within the name of an array's element, p[1,2], does not separate columns (RFC 4180).
+        // A comma within a name, as in p[1,2], does not separate columns if the name is in quotes (RFC 4180).
         let quoted = |name: &String| match name.contains([',', '"']) {
             true => format!("\"{}\"", name.replace('"', "\"\"")),
             false => name.clone(),
@@ -175,7 +175,7 @@ impl Table {
         writeln!(out, "{}", self.names.iter().map(quoted).collect::<Vec<_>>().join(","))?;
         for row in 0..self.rows() {
             for (i, column) in self.columns.iter().enumerate() {
-                // The shortest digits that read back to the same number.
+                // Written with the fewest digits that give the same number when read.
                 let comma = if i == 0 { "" } else { "," };
                 match column[row] {
                     value if value.is_nan() => write!(out, "{comma}")?,
@@ -208,7 +208,7 @@ impl Table {
         let metadata = metadata.iter().map(|(k, v)| KeyValue::new(k.clone(), v.clone())).collect();
         let properties = WriterProperties::builder()
             .set_dictionary_enabled(false)
-            .set_encoding(Encoding::BYTE_STREAM_SPLIT) // exponents beside exponents: they compress
+            .set_encoding(Encoding::BYTE_STREAM_SPLIT) // groups the exponents, which compress well
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
             .set_key_value_metadata(Some(metadata))
             .build();
@@ -243,8 +243,8 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
         .with_context(|| format!("the table {} cannot be used", path.display()))
 }
 
-/// Returns true if HubSlosh wrote the Parquet file. The file then names our Parquet library, which
-/// programs in other languages do not use.
+/// Returns true if HubSlosh wrote the Parquet file, because the file then names the Parquet library of
+/// HubSlosh, which programs in other languages do not use.
 pub fn is_ours(path: &Path) -> bool {
     let writer = parquet_file::writer(path).ok().flatten();
     writer.is_none_or(|writer| writer.starts_with("parquet-rs"))

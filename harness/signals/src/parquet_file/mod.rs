@@ -57,9 +57,8 @@ impl Kind {
     }
 }
 
-/// Columns that were read from a Parquet file; NaN marks missing values. If the times are dates,
-/// `origin` is the date of the first row in RFC 3339, and the times count from that row, in
-/// seconds.
+/// Columns that were read from a Parquet file; NaN marks missing values. If the file holds dates as times, `origin` is the date
+/// of the first row in RFC 3339, and the returned times are seconds since this row.
 pub struct Found {
     pub columns: Vec<Vec<f64>>,
     pub origin: Option<String>,
@@ -81,21 +80,21 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     guarded(|| Ok(pairs(&open(path)?)))
 }
 
-/// Returns the name of the library that wrote the file, if the file has it.
+/// Returns the name of the library that wrote the file, if the file states it.
 ///
 /// # Errors
-/// If the file is not complete.
+/// If the file is incomplete.
 pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
 
-/// Reads columns. `positions` selects them among the names of all columns of the file. `time` is the position
-/// of the time among the selected ones, with the seconds of the unit that is stated for it: integers need
-/// one, and timestamps have their own. Columns at which `booleans` is true may hold true and false.
+/// Reads columns of a Parquet file. `positions` are the positions of these columns among all columns of the file. `time` is the
+/// position of the time among the columns to read, together with the length of its unit, s, if the unit is stated: integers need
+/// a unit, and timestamps have their own. Columns with true in `booleans` may hold Booleans.
 ///
 /// # Errors
-/// If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for
-/// types that are not read here.
+/// If the file cannot be read, or the stated unit of timestamps is not their own; [`Foreign`] for types that this
+/// function does not read.
 pub fn read(
     path: &Path,
     positions: impl Fn(&[String]) -> Result<Vec<usize>>,
@@ -199,9 +198,8 @@ fn pairs(reader: &SerializedFileReader<File>) -> BTreeMap<String, String> {
     pairs.map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default())).collect()
 }
 
-/// Appends the values of a column to `into`; a row without a value becomes NaN. `level` is the
-/// Parquet definition level at which a value is present. Dates are counted from `first`, which the
-/// first row sets.
+/// Appends the values of a column to `into`; a row without a value becomes NaN. `level` is the Parquet definition level of a
+/// present value. Dates are converted to seconds since `first`, which is set to the date of the first row.
 fn values(
     reader: ColumnReader,
     rows: usize,
@@ -231,7 +229,7 @@ fn values(
     }
 }
 
-/// Appends `rows` values to `into`, a batch at a time. A missing value becomes NaN.
+/// Appends `rows` values to `into` in batches. A missing value becomes NaN.
 fn batches<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     rows: usize,

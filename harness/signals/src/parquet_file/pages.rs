@@ -1,5 +1,5 @@
-//! Sizes that the pages of a column claim, checked before the Parquet library allocates memory for them: a
-//! header of a few bytes may claim 2 GB.
+//! Checks the sizes that the page headers of a Parquet column state, before the Parquet library allocates
+//! memory for them: a header of a few bytes may state 2 GB.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -9,7 +9,8 @@ use files::budget;
 
 /// Largest page that is accepted, bytes: 500 times the size that common writers use.
 const LARGEST: u64 = 512 << 20;
-/// Longest page header that is accepted, bytes. A header is short, because its statistics are two numbers.
+/// Longest page header that is accepted, bytes. Real headers are short, because their
+/// statistics are two numbers.
 const HEADER: u64 = 1 << 16;
 const DEEPEST: usize = 16;
 
@@ -89,7 +90,7 @@ impl Header<'_> {
     }
 
     /// Reads the number and type of the next field; `None` at the end of a structure. `last` is the number of
-    /// the field before, because numbers are stored as differences.
+    /// the preceding field, because a header stores field numbers as differences.
     fn field(&mut self, last: i64) -> Result<Option<(i64, u8)>> {
         let byte = self.byte()?;
         if byte == 0 {
@@ -105,7 +106,7 @@ impl Header<'_> {
     fn skip(&mut self, kind: u8, depth: usize) -> Result<()> {
         ensure!(depth < DEEPEST, "the header of a page is damaged");
         match kind {
-            1 | 2 => {} // true and false are types
+            1 | 2 => {} // true and false are two types without further bytes
             3 => drop(self.byte()?),
             4..=6 => drop(self.unsigned()?),
             7 => self.pass(8)?,

@@ -1,5 +1,5 @@
-//! `--columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s`: which column of a file holds which signal, and in
-//! which unit.
+//! The option `--columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s`, which assigns columns of a file, and
+//! their units, to signals.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! Resampling to an even time grid, for methods that need one: spectra, Allan variances.
+//! Resampling to an even time grid, which spectra and Allan variances need.
 
 use anyhow::{Result, ensure};
 use files::budget;
@@ -10,9 +10,9 @@ const OFF: f64 = 1e-3;
 const MISSING: f64 = 0.01;
 const MOST_ROWS: f64 = 10.0;
 
-/// Resamples a table onto an even time grid, and returns the time step of the grid, s, with the table. Values of rows that
-/// lie on the grid are unchanged; other values are interpolated linearly, also over missing rows if these are few. `done`
-/// receives a message if values were interpolated.
+/// Resamples a table onto an even time grid, and returns the time step of the grid, s, and the resampled table. Rows that
+/// lie on the grid are unchanged; other values are interpolated linearly, also in a few missing rows. `done` receives a
+/// message if values were interpolated.
 ///
 /// # Errors
 /// If time does not increase, or if too many rows are missing.
@@ -20,8 +20,8 @@ pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> 
     even_with_gaps(table, MISSING, done)
 }
 
-/// Resamples a table as [`even`] does, but accepts that up to the share `most_missing` of the rows is missing, for example
-/// 0.1 for 10 %.
+/// Resamples a table as [`even`] does, but accepts that up to the fraction `most_missing` of the rows is missing, for
+/// example 0.1 for 10 %.
 ///
 /// # Errors
 /// If time does not increase, or if more rows are missing.
@@ -58,9 +58,9 @@ pub fn even_with_gaps(
         100.0 * most_missing
     );
     let lost = time.windows(2).filter(|pair| pair[1] - pair[0] > 1.5 * usual).count();
-    // The nearest whole number of steps.
+    // Number of steps, rounded to a whole number.
     let count_of = ((last - first) / usual).round().max(1.0);
-    // The number of rows of the grid is limited, whatever the spacing of the times.
+    // Times with a wrong spacing must not produce an enormous grid.
     ensure!(
         count_of <= MOST_ROWS * rows as f64,
         "most rows are {usual:e} s apart, so that an even grid over the {:.3e} s of the recording would have {count_of:.1e} rows \
@@ -70,8 +70,8 @@ pub fn even_with_gaps(
     budget::table(count_of as usize, table.names().len())?;
     let step = (last - first) / count_of;
     done(format!(
-        "the rows are not equally spaced ({usual:.6} s mostly, in {lost} places more than 1.5 times that): they are joined by \
-         lines on a grid of {step:.6} s"
+        "the rows are not equally spaced (usually {usual:.6} s apart, in {lost} places more than 1.5 times as much): they are \
+         interpolated linearly on a grid of {step:.6} s"
     ));
     let grid: Vec<f64> = (0..=count_of as usize).map(|k| first + k as f64 * step).collect();
     let columns = table.names().iter().map(|name| {

@@ -1,14 +1,13 @@
-//! Recordings: signals in SI units from files that others wrote. Text in columns and Parquet are read here;
-//! the Python package converts other kinds to text ([`crate::foreign`]). [`Columns`], a row of units or the
-//! names of the columns (`gyro_z [deg/s]`, `gyro_z_dps`) give the signal and the unit of each column. Without
-//! a stated unit a column is taken to be in SI units, which a message says, or the file is refused where that
-//! is implausible.
+//! Reads recordings: signals in SI units from files that other programs wrote. Text in columns and Parquet are read
+//! here; the Python package converts other kinds of files to text ([`crate::foreign`]). The signal and the unit of a
+//! column follow from [`Columns`], from a row of units or from the name of the column (`gyro_z [deg/s]`,
+//! `gyro_z_dps`). A column without a stated unit is assumed to be in SI units, and a message says so; if this is
+//! implausible, the file is refused.
 //!
-//! The rows of a recording are those with a value of one signal, the rows' signal. Other signals may lack
-//! values in these rows, because they are slower or values were lost; they are completed by holding the last
-//! value or by linear interpolation. Nothing is resampled. Times that were printed with few digits are put
-//! back onto their even grid ([`stamps`]). Files of inputs ([`read_inputs`]) are read by the same rules, but
-//! keep all rows.
+//! The rows of a recording are the rows with a value of one signal, for example the rate. Other signals may lack values
+//! in these rows, because they are slower or values were lost; missing values are replaced by the last value or by
+//! linear interpolation. A recording is not resampled. Times that were printed with few digits are restored to their
+//! even grid ([`stamps`]). Files of inputs ([`read_inputs`]) are read by the same rules, but keep all rows.
 
 mod columns;
 mod even;
@@ -30,9 +29,8 @@ use crate::foreign::{self, Foreign, Kind};
 use crate::parquet_file::{self, Found};
 use crate::table::Table;
 
-/// Names and units of a file's columns. `full` are the names as they are in the file, `names` are
-/// the names without a unit in brackets at the end, and `row` holds the units from a row below the
-/// names.
+/// Names and units of a file's columns. `full` are the names as in the file, `names` are the names without a unit in
+/// brackets at the end, and `row` contains the units from a row below the names.
 struct Header {
     names: Vec<String>,
     full: Vec<String>,
@@ -52,8 +50,7 @@ impl Header {
         header
     }
 
-    /// Adds columns without a name until there are `width` columns. Such a column is called `#4`,
-    /// `#5`, … by its number.
+    /// Adds columns without a name until there are `width` columns. Such a column is named by its number: `#4`, `#5`, …
     fn widen(&mut self, width: usize) {
         for k in self.names.len()..width {
             self.names.push(format!("#{}", k + 1));
@@ -62,8 +59,8 @@ impl Header {
         }
     }
 
-    /// Finds the position of a column by its name as it is in the file, by the name without a unit in
-    /// brackets, or by the name without any unit of `dimension`.
+    /// Finds the position of a column by its name as in the file, by its name without a unit in brackets, or by its
+    /// name without any unit of `dimension`.
     fn place(&self, column: &str, dimension: Option<Dimension>) -> Result<usize> {
         let number = column.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
         if let Some(place) = number.filter(|n| (1..=self.names.len()).contains(n)) {
@@ -119,8 +116,9 @@ impl Header {
         }
     }
 
-    /// Finds pairs of columns with whole seconds and with fractions of a second, such as `stamp.sec` and
-    /// `stamp.nanosec`, with the factor from the second column to seconds.
+    /// Finds pairs of columns of which one contains whole seconds and the other fractions of a second, such
+    /// as `stamp.sec` and `stamp.nanosec`. Returns the positions of both, and the factor that converts the
+    /// second column to seconds.
     fn halves(&self) -> Vec<(usize, usize, f64)> {
         const RESTS: [(&str, f64); 3] = [
             ("nanoseconds nanosecs nanosec nsecs nsec ns", 1e-9),
@@ -156,13 +154,13 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
     };
     let (bare, unit) = name.rsplit_once(open)?;
     let (bare, unit) = (bare.trim(), unit.trim_end_matches(close).trim());
-    // `data(3)` is a name.
+    // A number in brackets belongs to the name, as in `data(3)`.
     let number = unit.chars().all(|c| c.is_ascii_digit());
     (!bare.is_empty() && !number).then_some((bare, unit))
 }
 
-/// Treatment of a signal in rows without a value: keep the last value, as for a command that is held;
-/// interpolate linearly from the last value to the next; or leave NaN.
+/// Treatment of a signal in rows without a value: keep the last value, as a held command does; interpolate linearly
+/// between the last value and the next; or leave NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
     Held,
@@ -170,9 +168,8 @@ pub enum Between {
     Missing,
 }
 
-/// A signal that is to be read from a recording: one of [`SIGNALS`], or a variable of an FMU. A file without
-/// a `required` signal is an error. `unit` is the unit in which the values are returned, and which is assumed
-/// where the file states none; `None` for SI.
+/// A signal to read from a recording: one of [`SIGNALS`], or a variable of an FMU. A file without a `required` signal
+/// is an error. `unit` is the unit of the returned values, and the assumed unit if the file states none; `None` for SI.
 #[derive(Clone, Copy, Debug)]
 pub struct Signal<'a> {
     pub name: &'a str,
@@ -189,8 +186,7 @@ pub struct Wanted<'a> {
     pub columns: &'a Columns,
 }
 
-/// Times later than this, s, are counted from the beginning of the recording, because they are probably
-/// seconds since 1970.
+/// Times later than this, s, are converted to times since the first row, because they are probably seconds since 1970.
 const LATE: f64 = 1e6;
 /// Latest time, s since 1970, for which a file need not state a unit: the year 5138. Milliseconds
 /// since 1970 are later.
@@ -201,19 +197,18 @@ const SLOWEST: f64 = 1.0;
 /// Shortest time between rows, s, for which a file need not state the unit of time: no slosh is
 /// recorded at 20 kHz, but rows at 50 Hz with times in days are 2e-7 apart.
 const FASTEST: f64 = 5e-5;
-/// Largest magnitude of a value in SI that is accepted. Its fourth power, which statistics need, is
-/// finite in sums over all rows.
+/// Largest absolute value in SI units that is accepted. Statistics need its fourth power, whose sum over all
+/// rows is then finite.
 const LARGEST: f64 = 1e60;
-/// Longest gap of a slow signal that is filled, over the usual time between the signal's values.
-/// Gaps up to [`SHORT`] are always filled.
+/// Longest gap of a slow signal that is filled, relative to the usual time between the signal's values. Gaps up to
+/// [`SHORT`] are always filled.
 const LOST: f64 = 10.0;
-/// Ratio of the time between two values of a signal to the usual time, above which a value must
-/// have been lost.
+/// Ratio of the time between two values of a signal to the usual time, above which a value counts as lost.
 const LATE_BY: f64 = 1.5;
 const SHORT: f64 = 0.25;
 
-/// Lists every column of a file by its name there, with the position in `signals` of the signal that the
-/// column holds. A column holds the signal of its name, with or without a unit.
+/// Lists every column of a file by its name in the file, with the index in `signals` of the signal that the column
+/// contains. A column contains a signal if it has the signal's name, with or without a unit.
 pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<usize>)>> {
     let file = with_text_file(path, File::open)?;
     let header = file.header();
@@ -238,7 +233,7 @@ pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Resul
     with_text_file(path, |path| read_as(path, wanted, None, &mut done))
 }
 
-/// Reads a recording if it is text in columns or Parquet, and returns `None` for other kinds of files, which the Python
+/// Reads a recording if it is text in columns or Parquet. Returns `None` for other kinds of files, which the Python
 /// package converts. `name` is the file's name in errors, because `path` may be temporary.
 ///
 /// # Errors
@@ -257,11 +252,11 @@ pub fn read_here(
     }
 }
 
-/// Reads histories of inputs: `time` (s) and the signals, with all rows. Signals in `booleans` may be `true`
+/// Reads inputs as functions of time: `time` (s) and the signals, with all rows. Signals in `booleans` may be `true`
 /// and `false`, which become 1 and 0. Rows may be unevenly spaced, and each must have every value.
 ///
 /// # Errors
-/// If the file cannot be read so.
+/// If the file cannot be read, or a value is missing.
 pub fn read_inputs(
     path: &Path,
     wanted: &Wanted,
@@ -296,8 +291,8 @@ impl File {
     }
 }
 
-/// Calls `work` with the file `path` or, if only the Python package can read it, with the text to
-/// which that package converts it.
+/// Calls `work` with the file `path` or, if only the Python package can read the file, with the text to which
+/// that package converts it.
 fn with_text_file<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T> {
     let read = match work(path) {
         Err(error) if error.is::<Foreign>() => {
@@ -308,8 +303,8 @@ fn with_text_file<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> R
     read.with_context(|| format!("the file {} cannot be used", path.display()))
 }
 
-/// Reads a recording. If `inputs` is given, the file holds histories of inputs instead, and
-/// `inputs` lists those that are Booleans.
+/// Reads a recording. If `inputs` is given, the file contains inputs as functions of time instead, and `inputs`
+/// lists the Boolean ones.
 fn read_as(
     path: &Path,
     wanted: &Wanted,
@@ -318,7 +313,7 @@ fn read_as(
 ) -> Result<Table> {
     let file = File::open(path)?;
     let header = file.header();
-    // Time first, then the signals that are there. A table of times alone has no signal.
+    // Time first, then the signals of the file. A table with only times has no signal.
     let rows_signal = wanted.signals.first().map_or("time", |signal| signal.name);
     let time_signal = Signal { name: "time", required: true, between: Between::Line, unit: None };
     let counted = wanted.columns.rate();
@@ -369,7 +364,7 @@ fn read_as(
             Ok(unit) => unit,
             Err(error) => {
                 problems.push(format!(
-                    "column {}: {error}; --columns {}={}:UNIT says which it is",
+                    "column {}: {error}; --columns {}={}:UNIT states its unit",
                     header.names[place], signal.name, column.name
                 ));
                 continue;
@@ -399,7 +394,7 @@ fn read_as(
     }
     ensure!(
         problems.is_empty(),
-        "{} (columns in it: {}{}; --columns SIGNAL=COLUMN:UNIT,... says which is which{})",
+        "{} (columns in it: {}{}; --columns SIGNAL=COLUMN:UNIT,... assigns columns to signals{})",
         problems.join("; "),
         header.names.join(", "),
         if let File::Text(layout) = &file { &layout.texts } else { "" },
@@ -407,7 +402,7 @@ fn read_as(
     );
     let time = header.full[places[0]].as_str();
     let timed = counted.is_none();
-    // Whole seconds and the rest of a second in two columns are one time.
+    // Two columns with whole seconds and fractions of a second are one time.
     let half = halves.iter().find(|(whole, rest, _)| {
         timed && (places[0] == *whole && stated.is_none_or(|s| s == 1.0) || places[0] == *rest)
     });
@@ -442,7 +437,7 @@ fn read_as(
                 header.full[*whole], header.full[*rest]
             ));
         } else if time == header.full[*rest] {
-            // The file has a time of its own.
+            // The rate replaces the times that the file also contains.
             columns[0] = part;
         }
     }
@@ -496,8 +491,8 @@ fn read_as(
     Ok(Table::new(names, columns))
 }
 
-/// Adds whole seconds and fractions of a second (times `factor`, s) to one time. Returns the first whole
-/// second, from which the times count, and the times, s; `None` if the columns are something else.
+/// Adds whole seconds and fractions of a second (multiplied by `factor`, s). Returns the first whole second, and the
+/// times since then, s. Returns `None` if the columns contain anything else.
 fn join_seconds(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
     let first = *whole.first()?;
     let fine =
@@ -524,7 +519,7 @@ fn plausible(time: &[f64]) -> Result<()> {
     if usual == 0.0 {
         usual = (time[time.len() - 1] - time[0]) / steps.len() as f64;
     }
-    // Compared with six digits.
+    // Compared with six digits, as in the message.
     let shown: f64 = format!("{usual:.5e}").parse().unwrap_or(usual);
     ensure!(
         usual < SLOWEST && (usual > FASTEST || usual <= 0.0),
@@ -533,8 +528,7 @@ fn plausible(time: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the unit that is assumed for a signal if the file states none; `None` for a variable of
-/// an FMU that has no unit.
+/// Returns the unit that is assumed for a signal if the file states none; `None` for an FMU's variable without a unit.
 fn unstated<'a>(signal: &Signal<'a>) -> Option<&'a str> {
     let own = signal.unit.or_else(|| Some(quantity(signal.name).ok()?.unit()));
     own.filter(|unit| !unit.is_empty())
@@ -560,13 +554,13 @@ fn factor(signal: &Signal, unit: &str) -> Result<f64> {
             format!("\"{unit}\" is not a unit of {quantity} (allowed: {})", quantity.units())
         });
     };
-    // Without a unit in the FMU there is no reason to convert.
+    // An FMU's variable without a unit is not converted.
     let known = if own.is_empty() { Some(1.0) } else { conversion(unit, own) };
     known.with_context(|| format!("\"{unit}\" cannot be converted to {}'s \"{own}\"", signal.name))
 }
 
-/// Selects the rows in which the first signal has a value, and fills missing values of the other
-/// signals there as their [`Between`] says.
+/// Selects the rows in which the first signal has a value, and fills missing values of the other signals in these rows
+/// as their [`Between`] says.
 ///
 /// # Errors
 /// If a gap is too long to be filled.
@@ -613,17 +607,17 @@ fn complete(
         let longest = SHORT.max(LOST * usual);
         let how = match signal.between {
             Between::Held => "held",
-            Between::Line => "joined by lines",
+            Between::Line => "interpolated linearly",
             Between::Missing => continue,
         };
         done(format!(
-            "{name} has a value in {} of {rows} rows, {usual:.4} s apart; it is {how} in between",
+            "{name} has a value in {} of {rows} rows, {usual:.4} s apart; between these rows it is {how}",
             there.len()
         ));
         let late = there.windows(2).filter(|k| time[k[1]] - time[k[0]] > LATE_BY * usual).count();
         if late > 0 {
             done(format!(
-                "{name}: {late} times the next value comes late: one is lost, and what {name} was in between is a guess"
+                "{name}: in {late} places the next value comes late, so that a value must have been lost; {name} is uncertain there"
             ));
         }
         let mut lost = 0;
@@ -645,7 +639,8 @@ fn complete(
                 };
             }
         }
-        // Before its first value and after its last; a held signal lasts for one usual spacing longer.
+        // Rows before the signal's first value, and after its last value. The last value of a held signal is valid for
+        // one more usual spacing.
         let last = there[there.len() - 1];
         for k in (0..there[0]).chain(last + 1..rows) {
             let holds = k > last && signal.between == Between::Held && time[k] - time[last] < usual;

@@ -1,8 +1,9 @@
-//! Times that a logger printed with few digits, put back onto the even grid that they come from.
+//! Finds the even grid of times that a logger printed with few digits.
 //!
-//! A logger at 33 Hz that prints milliseconds writes 0.030, 0.061, 0.091. Each stamp is wrong by up to half a
-//! millisecond, and a torque that is shifted by so much causes larger errors than a gyro's noise. If one even
-//! grid, possibly with rows left out, explains every stamp within its rounding, that is the logger's grid.
+//! A logger at 33 Hz that prints milliseconds writes 0.030, 0.061, 0.091. Each time is wrong by up to half
+//! a millisecond, and such a shift of the torque causes larger errors than the noise of a gyro. If one
+//! even grid, possibly with missing rows, explains every printed time within its rounding, the grid
+//! replaces the printed times.
 
 /// An even grid that explains printed times: the unit of their last digit, the step, and the times, all in s.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,17 +14,17 @@ pub struct Grid {
 }
 
 const DECIMALS: i32 = 6;
-/// Largest difference between a time and a multiple of the unit of its last digit, over this unit,
-/// that is explained by floating-point rounding: times since 1970 have only 52 binary digits.
+/// Largest difference between a time and a multiple of its last digit's unit, relative to this unit, that
+/// floating-point rounding explains: times since 1970 in seconds have only 52 binary digits.
 const OFF: f64 = 1e-2;
-/// Fraction of the unit of the last digit by which the times may spread more about an even grid
-/// than rounding to this digit explains.
+/// Deviation from an even grid in excess of half the last digit's unit, relative to this unit, at which the
+/// grid is still accepted.
 const BEYOND: f64 = 0.02;
 const FEWEST: usize = 20;
 
-/// Relation between the times of a recording and an even grid: they are already even or no grid explains
-/// them; they are rounded times of a grid; or several rows share one time for the reason in the field, so
-/// that the true times are unknown.
+/// Relation between the times of a recording and an even grid: the times are already even or no grid explains
+/// them; they are rounded times of a grid; or several rows share one time, so that the true times are unknown for
+/// the reason in the field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stamps {
     AsTheyAre,
@@ -34,8 +35,8 @@ pub enum Stamps {
 /// Largest accepted relative error of the step of an even grid. The clock of every logger has an
 /// error of this size.
 const LARGEST_ERROR: f64 = 1e-4;
-/// If more than this fraction of the rows has the same time as the row before, the times are not the times of the
-/// measurements.
+/// Fraction of rows with the same time as the row before, above which the times are not the
+/// times of the measurements.
 const SHARED: f64 = 0.05;
 
 pub fn regular(time: &[f64]) -> Stamps {
@@ -64,8 +65,8 @@ pub fn regular(time: &[f64]) -> Stamps {
     }
 }
 
-/// Returns the even grid that explains printed times, and the largest relative error that its step
-/// may have; `None` if there is no such grid.
+/// Returns the even grid that explains the printed times, and the largest possible relative error of its step;
+/// `None` if there is no such grid.
 fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let quantum = quantum(time)?;
     let units: Vec<f64> = time.iter().map(|t| ((t - time[0]) / quantum).round()).collect();
@@ -76,7 +77,7 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let mut sorted = steps.clone();
     let middle = (steps.len() - 1) / 2;
     let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // No time was rounded.
+    // The times are already even, without rounding.
     if steps.iter().all(|step| *step > 0.0 && (step / usual).fract() == 0.0) {
         return None;
     }
@@ -97,9 +98,9 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     Some((grid, uncertainty(&units, &counts, step) / step))
 }
 
-/// Returns the largest difference from `step` at which an even grid still explains all times. Times
-/// and steps are in units of the last printed digit. The spread of the times about the grid is a
-/// convex function of the step, so that the result is unique.
+/// Returns the largest difference from `step` with which an even grid still explains all times. Times and steps
+/// are in units of the last printed digit. The deviation of the times from the grid is a convex function of the
+/// step, so that the result is unique.
 fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
     let spread = |step: f64| {
         let off = units.iter().zip(counts).map(|(unit, count)| unit - step * count);
@@ -140,8 +141,8 @@ fn quantum(time: &[f64]) -> Option<f64> {
     })
 }
 
-/// Improves the row numbers of the stamps (in quanta) iteratively, and returns them with offset and step of
-/// the grid that explains all stamps; `None` if no grid does.
+/// Finds the row numbers of the printed times (in units of the last digit) by iteration. Returns them with the
+/// offset and the step of the grid that explains all times; `None` if no grid does.
 fn fitted(units: &[f64], mut counts: Vec<f64>) -> Option<(Vec<f64>, f64, f64)> {
     let n = units.len() as f64;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
@@ -161,7 +162,7 @@ fn fitted(units: &[f64], mut counts: Vec<f64>) -> Option<(Vec<f64>, f64, f64)> {
         if grows && high - low <= 1.0 + BEYOND {
             return Some((counts, from, step));
         }
-        // Rows that are less than a quantum apart cannot be counted from their stamps.
+        // The row numbers of steps below one unit of the last digit cannot be counted.
         if step < 1.0 {
             return None;
         }
@@ -185,10 +186,10 @@ mod tests {
         }
     }
 
-    /// The step of the grid behind times in whole seconds is known to 0.03 % after a minute of
-    /// rows, and after twenty minutes to the error of any clock.
+    /// From times in whole seconds, the step of the grid is known to 0.03 % after a minute of rows, and with the
+    /// accuracy of any clock after twenty minutes.
     #[test]
-    fn a_grid_counts_only_if_its_step_is_known() {
+    fn a_grid_is_accepted_only_if_its_step_is_known_accurately() {
         let whole =
             |rows| (0..rows).map(|k| (f64::from(k) * 0.02 + 0.3).floor()).collect::<Vec<f64>>();
         let Stamps::Unknown(why) = regular(&whole(3000)) else { panic!("a minute is accepted") };
@@ -211,16 +212,16 @@ mod tests {
 
     #[test]
     fn times_printed_with_few_digits_are_restored_to_the_even_grid_of_the_samples() {
-        // the last one has rows closer than its digits
+        // the rows of the last grid are closer than the unit of the last digit
         for (step, quantum) in [(1.0 / 33.0, 1e-3), (1.0 / 60.0, 1e-2), (1.0 / 120.0, 1e-2)] {
             let grid = on(&printed(step, 0..5000, quantum));
             assert_eq!(grid.quantum, quantum);
             let off = |(k, t): (usize, &f64)| (t - grid.time[0] - k as f64 * step).abs();
             let worst = grid.time.iter().enumerate().map(off).fold(0.0, f64::max);
-            // of the last one the rounded halves, all up, turn the grid a little
+            // in the last grid all halves are rounded up, which changes its step slightly
             assert!(worst < 2e-2 * quantum, "{step} {worst:e}");
         }
-        // two stretches of rows are missing
+        // two groups of rows are missing
         let mut gaps = printed(1.0 / 33.0, 0..5000, 1e-3);
         gaps.drain(4000..4077);
         gaps.drain(1000..1007);
@@ -235,7 +236,7 @@ mod tests {
         let mut lost = even.clone();
         lost.drain(100..110);
         assert_eq!(regular(&lost), Stamps::AsTheyAre);
-        // real jitter of 3 ms, printed in ms
+        // times with a real jitter of 3 ms, printed in ms
         let mut state = 1_u64;
         let jitter = even.iter().map(|t| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

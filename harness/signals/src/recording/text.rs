@@ -1,6 +1,6 @@
-//! Reads numbers in columns of text: separated by semicolons, tabs, commas or blanks, with decimal points or
-//! commas, comment lines, lines above the header, a row of units below it, dates or clock times as time. The
-//! layout is detected in the first lines of a file. Columns of text are skipped.
+//! Reads numbers in columns of text, separated by semicolons, tabs, commas or blanks, with decimal points or decimal
+//! commas. Files may have comment lines, lines above the header, a row of units below it, and dates or clock times as time.
+//! The layout is detected in the first lines of a file. Columns of text are skipped.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -21,8 +21,7 @@ const NAMED: usize = 5;
 const SEPARATORS: [(u8, &str); 4] =
     [(b';', "semicolons"), (b'\t', "tabs"), (b',', "commas"), (b' ', "blanks")];
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
-/// Words in a field that stand for a missing value, including those that C libraries and
-/// spreadsheets print for NaN.
+/// Words in a field that mean a missing value, including the words that C libraries and spreadsheets print for NaN.
 const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
 /// Reason why a field is not read, as a phrase that a message puts after the text of the field.
@@ -56,7 +55,8 @@ enum Value {
     Number(f64),
     Time(Moment),
     Missing,
-    /// A number or a time whose meaning is not unique, such as 1,234, or that cannot be read; the payload is the reason.
+    /// A number or a time with several possible meanings, such as 1,234, or one that cannot be read; the
+    /// payload is the reason.
     Ambiguous(Unreadable),
     Other,
 }
@@ -66,8 +66,8 @@ impl Value {
         !matches!(self, Value::Missing | Value::Other)
     }
 
-    /// Parses a field as a number, a time or a missing value. `decimal` is the decimal sign of the
-    /// fields before it, and is set by the first number that has one.
+    /// Parses a field as a number, a time or a missing value. `decimal` is the decimal sign of the preceding fields; the
+    /// first number with a decimal sign sets it.
     fn parse(field: &str, separator: u8, decimal: &mut Option<char>) -> Value {
         match number(field, separator, decimal) {
             Ok(Some(number)) => Value::Number(number),
@@ -85,10 +85,10 @@ impl Value {
     }
 }
 
-/// Parses a field as a number; `None` if it is not one.
+/// Parses a field as a number; `None` if it is not a number.
 ///
 /// # Errors
-/// If it can be read in two ways, or has another decimal sign than the fields before.
+/// If the number has two possible meanings, or another decimal sign than the preceding fields.
 fn number(
     field: &str,
     separator: u8,
@@ -105,7 +105,7 @@ fn number(
     {
         return Err(Unreadable::Decimal { sign, before });
     }
-    // Quotes around a field with a comma show that the comma is not the separator: "1,234".
+    // Quotes around a field with a comma show that its comma is not a separator: "1,234".
     if let (b',', Some((whole, rest)), None) = (separator, text.split_once(','), *decimal)
         && rest.len() == 3
         && (1..4).contains(&whole.trim_start_matches(['-', '+']).len())
@@ -188,8 +188,8 @@ impl Lines {
     }
 }
 
-/// First lines of a file, split by one of the separators: number, fields and values of each line, the
-/// positions of the columns that hold text instead of numbers or times, and the positions of the rows of values in `lines`.
+/// First lines of a file, split by one of the separators: line number, fields and values of each line, the positions of the
+/// columns of text, and the indices in `lines` of the lines that are rows of values.
 struct Sample {
     separator: (u8, &'static str),
     lines: Vec<(u64, Vec<String>, Vec<Value>)>,
@@ -212,7 +212,7 @@ impl Sample {
                 fields.iter().map(|field| Value::parse(field, separator.0, &mut None)).collect();
             lines.push((file.number(), fields, values));
         }
-        // Lines with a value somewhere are rows; a row of units may contain a 1, too.
+        // Lines with any value are rows, but a row of units may contain a 1.
         let valued = |(_, _, values): &&(u64, _, Vec<Value>)| {
             values.len() >= least && values.iter().any(Value::is_there)
         };
@@ -243,8 +243,8 @@ impl Sample {
     }
 }
 
-/// Layout of a file, detected in its first lines. `above` is the number of lines before the first row;
-/// `texts` is the end of the message that a column is missing, with the names of columns that hold text.
+/// Layout of a file, detected in its first lines. `above` is the number of lines above the first row; `texts` lists the
+/// columns of text for the message that a column is missing.
 pub(super) struct Layout {
     separator: u8,
     pub header: Header,
@@ -259,7 +259,7 @@ impl Layout {
     /// # Errors
     /// If no separator gives rows of numbers.
     pub fn detect(path: &Path) -> Result<Self> {
-        // A table of times alone has one column.
+        // One column is enough for a table of times alone.
         let mut tried = Vec::new();
         for (separator, least) in
             SEPARATORS.map(|of| (of, 2)).into_iter().chain([(SEPARATORS[2], 1)])
@@ -271,8 +271,7 @@ impl Layout {
             let line = fields.join(&char::from(separator).to_string());
             line.chars().take(60).collect::<String>()
         };
-        // Chooses the separator by which most lines are rows. Columns of text count only if every separator
-        // has them.
+        // The separator with the most rows is chosen. Separators without columns of text are preferred.
         let key = |sample: &&Sample| (sample.width > 1, sample.texts.is_empty(), sample.rows.len());
         let usable = tried
             .iter()
@@ -311,7 +310,7 @@ impl Layout {
                     "line {line}, \"{}\", is neither a row of numbers nor a header (allowed: names above the rows)",
                     start(fields, separator.0)
                 );
-                // Each row ends with separators.
+                // A last column that is empty in every row comes from separators at the ends of the lines.
                 let is_empty = |k: usize| rows.iter().all(|row| lines[*row].1[k].is_empty());
                 while width > names.len() && is_empty(width - 1) && fields.len() < width {
                     width -= 1;
@@ -367,11 +366,11 @@ impl Layout {
         Ok(Layout { separator: separator.0, header, above: at, notes, texts: shown })
     }
 
-    /// Reads the columns at the positions `places`. If `times`, the first one is the time and may hold dates
+    /// Reads the columns at the positions `places`. If `times` is true, the first of them is the time and may hold dates
     /// and clock times. `true` and `false` are allowed where `booleans` is true. NaN marks missing values.
     ///
     /// # Errors
-    /// If a field is not a number, or can be read in two ways; the error names the lines.
+    /// If a field is not a number, or has two possible meanings; the error names the lines.
     pub fn read(
         &self,
         path: &Path,

@@ -1,9 +1,9 @@
-//! Times as dates and clock times: the only parser of times in text.
+//! Parses dates and clock times; all times that are read from text are parsed here.
 //!
-//! Dates by ISO 8601 (also without signs), 2026/01/31, 31.01.2026, 31-Jan-2026, Jan 31, 2026, and with
-//! slashes or dashes in the order that the file shows; clocks of 24 and 12 hours with any decimals,
-//! `12:00:00:020`; offsets from UTC as Z, UTC, +01:00, +0100, +01; durations as `1 days 00:00:00.02`. A text
-//! that can be read in two ways is an error.
+//! Dates may be written by ISO 8601 (also without separators), as 2026/01/31, 31.01.2026, 31-Jan-2026, Jan
+//! 31, 2026, or with slashes or dashes in any order that the file makes unambiguous. Clock times have 24 or
+//! 12 hours and any number of decimals, `12:00:00:020`, with an offset from UTC as Z, UTC, +01:00, +0100 or
+//! +01. Durations are written as `1 days 00:00:00.02`. A text with two possible meanings is an error.
 
 use chrono::{DateTime, Datelike as _, NaiveDate, NaiveTime, Timelike as _};
 
@@ -49,12 +49,12 @@ pub enum Moment {
     /// Nanoseconds since 1970, UTC unless the text has another offset.
     Date(i64),
     Clock(i64),
-    /// A date with an unknown order of day and month, and nanoseconds since its midnight.
+    /// A date whose order of day and month is unknown, and nanoseconds since its midnight.
     Ordered(Ordered, i64),
 }
 
-/// A date such as 3/4/2026, in which day or month may be first. A year with two digits (`is_short`) may also
-/// be first.
+/// A date such as 3/4/2026, whose first number may be the day or the month. If the year has two digits
+/// (`is_short`), the first number may also be the year.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ordered {
     first: u32,
@@ -64,7 +64,7 @@ pub struct Ordered {
 }
 
 impl Ordered {
-    /// Returns the date in days since 1970; `day_first` is true if the first of the two numbers is the day.
+    /// Returns the date in days since 1970. `day_first` is true if the first number is the day.
     fn day(self, day_first: bool) -> Result<i64, Unreadable> {
         let Ordered { first, second, year, .. } = self;
         let (day, month) = if day_first { (first, second) } else { (second, first) };
@@ -85,8 +85,8 @@ const WEEKDAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
 /// Parses a field as a date or a clock time; `None` if it is neither.
 ///
 /// # Errors
-/// If it is one that cannot be read, or that can be read in two ways. The error is the reason,
-/// worded to follow the field.
+/// If it cannot be read, or has two possible meanings. The error is the reason, worded to follow the
+/// text of the field.
 pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     if field.len() < 4
         || field.len() > 60
@@ -95,7 +95,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
         return Ok(None);
     }
     let Some(colon) = field.find(':') else { return basic(field) };
-    // Decimal commas are written by Python's logging.
+    // Python's logging writes decimal commas.
     let bytes = field.as_bytes();
     let decimal = field.rfind(',').filter(|at| {
         *at > colon
@@ -120,7 +120,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     if before.is_empty() {
         return Ok(Some(Moment::Clock(time - offset)));
     }
-    // Durations of pandas and Python: 1 days 00:00:00.02; 1 day, 0:00:00.02.
+    // Durations as pandas and Python print them: 1 days 00:00:00.02; 1 day, 0:00:00.02.
     if let Some((count, word)) = before.split_once(' ')
         && matches!(word, "day" | "days")
     {
@@ -136,7 +136,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     })
 }
 
-/// Parses a date with a clock time in ISO 8601 without separators, such as 20260131T120000.020.
+/// Parses an ISO 8601 date with a clock time and without separators, such as 20260131T120000.020.
 fn basic(field: &str) -> Result<Option<Moment>, Unreadable> {
     let Some((day, clock)) = field.split_once(['T', ' ', '_']) else { return Ok(None) };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
@@ -153,8 +153,7 @@ fn basic(field: &str) -> Result<Option<Moment>, Unreadable> {
     })
 }
 
-/// Splits a clock time such as `1:00 pm +01:00` into the time with its half of the day (am, pm) and
-/// the offset from UTC, ns.
+/// Splits a clock time such as `1:00 pm +01:00` into the time with am or pm, and the offset from UTC, ns.
 fn zoned(clock: &str) -> Result<Option<(String, i64)>, Unreadable> {
     let end = clock.find(|c: char| !matches!(c, '0'..='9' | ':' | '.')).unwrap_or(clock.len());
     let (time, rest) = clock.split_at(end);
@@ -170,7 +169,7 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, Unreadable> {
         _ => ("", lower.as_str()),
     };
     let zone = zone.strip_prefix("utc").or_else(|| zone.strip_prefix("gmt")).unwrap_or(zone);
-    // chrono reads an offset only after a date.
+    // The date is added because chrono parses an offset only after a date.
     let offset = DateTime::parse_from_str(&format!("2000-01-01 0:0 {zone}"), "%Y-%m-%d %H:%M %#z");
     let offset = match (zone, offset) {
         ("" | "z", _) => 0,
@@ -186,8 +185,8 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, Unreadable> {
 /// next to a date, `12:00`.
 fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, Unreadable> {
     let mut text = text.to_string();
-    // Three, six or nine digits after a third colon are milli-, micro- or nanoseconds; two would be frames
-    // of a film.
+    // Three, six or nine digits after a third colon are milli-, micro- or nanoseconds; two digits would be
+    // frames of a film and are refused.
     if let Some((whole, part)) = text.rsplit_once(':')
         && whole.matches(':').count() == 2
         && [3, 6, 9].contains(&part.trim_end_matches(['a', 'p', 'm']).len())
@@ -200,7 +199,7 @@ fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, Unreadable> {
         (true, _) => "%I:%M:%S%.f%p",
     };
     match NaiveTime::parse_from_str(&text, format) {
-        // A leap second is outside the day's seconds.
+        // A leap second has no place in the day's seconds.
         Ok(time) if i64::from(time.nanosecond()) < SECOND => {
             let seconds = i64::from(time.num_seconds_from_midnight());
             Ok(Some(seconds * SECOND + i64::from(time.nanosecond())))
@@ -267,7 +266,7 @@ fn date(text: &str) -> Result<Option<Day>, Unreadable> {
     }
 }
 
-/// Converts the times of a column to seconds from the first one. `last` is the last clock time plus the days
+/// Converts the times of a column to seconds since the first one. `last` is the last clock time plus the days
 /// that have passed, ns; `day_first` is unknown until a date shows the order of day and month.
 #[derive(Default)]
 pub struct Times {
@@ -281,11 +280,11 @@ impl Times {
         self.first.is_none()
     }
 
-    /// Returns the seconds from the first time to this one. `field` is the text, which messages repeat. A
-    /// clock time that jumps back by more than half a day has passed midnight.
+    /// Converts a time to seconds since the first one. `field` is the text that messages repeat. If a clock
+    /// time jumps back by more than half a day, midnight has passed.
     ///
     /// # Errors
-    /// If the time is of another kind than the first, or its date can be read in two ways.
+    /// If the time is of another kind than the first, or its date has two possible meanings.
     pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, Unreadable> {
         if let Moment::Ordered(Ordered { first, second, .. }, _) = moment
             && first.max(second) > 12

@@ -1,10 +1,9 @@
-//! Units in which recordings come, and their values in SI.
+//! Reads units of measurement, and converts their values to SI.
 //!
-//! One grammar reads a unit wherever a file states it: in brackets, in a row of units, and in the name of a
-//! column itself ([`in_name`]). A unit is a product of symbols (`mN`, `deg`, `s`) or words (`degrees`,
-//! `microseconds`) with whole exponents: `N·m`, `mN.m`, `Nm`, `m/s^2`, `m s⁻²`, `deg per sec`, `deg_s`. The
-//! expected quantity decides between several meanings: `nm` is newton metres for a torque and nanometres for
-//! a length.
+//! One grammar reads units in brackets, in a row of units, and within the name of a column ([`find_unit`]). A
+//! unit is a product of symbols (`mN`, `deg`, `s`) or words (`degrees`, `microseconds`) with whole exponents:
+//! `N·m`, `mN.m`, `Nm`, `m/s^2`, `m s⁻²`, `deg per sec`, `deg_s`. If a text has several meanings, the
+//! expected quantity decides: `nm` means newton metres for a torque and nanometres for a length.
 
 use std::fmt;
 
@@ -25,8 +24,8 @@ pub(super) type Dimension = [i8; 4];
 
 const GRAVITY: f64 = 9.80665;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Force of a pound under standard gravity, N (0.453 592 37 kg, the international yard and pound agreement of
-/// 1959).
+/// Weight of a pound under standard gravity, N. The pound is 0.453 592 37 kg (international yard and
+/// pound agreement of 1959).
 const POUND: f64 = 0.453_592_37 * GRAVITY;
 
 /// A symbol of a unit such as `N`: its name, its dimension, its value in SI, and the prefixes with
@@ -71,8 +70,8 @@ const WORDS: &str = "sec=s second=s msec=ms milli=ms usec=us micro=us nsec=ns na
 
 type Product = (Dimension, f64);
 
-/// Finds the unit symbol `name`, also with a prefix such as m for milli. With `fold` the case of
-/// letters does not count, which may give several results.
+/// Finds the meanings of the unit symbol `name`, also with a prefix such as m for milli. If `fold` is true,
+/// upper and lower case are equal, which may give several meanings.
 fn symbol(name: &str, fold: bool) -> Vec<Product> {
     let same = |a: &str, b: &str| if fold { a.eq_ignore_ascii_case(b) } else { a == b };
     let mut found = Vec::new();
@@ -90,8 +89,8 @@ fn symbol(name: &str, fold: bool) -> Vec<Product> {
     found
 }
 
-/// Finds a unit that is written as a word, in any case, also in the plural and with a prefix:
-/// `Milliseconds`.
+/// Finds the meanings of a unit that is written as a word, in upper or lower case, in the singular or plural,
+/// with or without a prefix: `Milliseconds`.
 fn word(name: &str) -> Vec<Product> {
     let lower = name.to_lowercase();
     let mut found = Vec::new();
@@ -111,12 +110,13 @@ fn word(name: &str) -> Vec<Product> {
     found
 }
 
-/// Reads a run of letters within a unit: a symbol, a word, or two of them without a sign in between
-/// (`mNm`, `inlb`).
+/// Reads a run of letters within a unit: a symbol, a word, or two of them without a separator (`mNm`,
+/// `inlb`).
 fn run(name: &str, fold: bool) -> Vec<Product> {
     let either = |name: &str| [symbol(name, fold), word(name)].concat();
     let mut found = either(name);
-    // In capitals mega and milli are the same: both are returned, so that neither is taken.
+    // With equal cases M may be mega or milli: both meanings are returned, so that the
+    // text counts as ambiguous.
     if fold && name.starts_with(['M']) && name[1..].starts_with(['n', 'N']) {
         let milli = run(&format!("m{}", &name[1..]), true);
         return milli.iter().map(|m| (m.0, 1e9 * m.1)).chain(milli.clone()).collect();
@@ -149,8 +149,8 @@ fn times(a: Product, b: Product, exponent: i8) -> Product {
     (dimension, factor)
 }
 
-/// A run of letters within a unit, with its exponent. `is_soft` is true if the sign before it may stand for a
-/// product or for a quotient, as in `deg_s`.
+/// A run of letters within a unit, with its exponent. `is_soft` is true if the separator before it may mean a
+/// product or a quotient, as in `deg_s`.
 struct Term {
     letters: String,
     exponent: i8,
@@ -205,11 +205,11 @@ fn terms(text: &str) -> Option<Vec<Term>> {
     (!found.is_empty() && !divides).then_some(found)
 }
 
-/// Returns the products that a unit may mean. With `fold` the case of letters does not count; with `divide`
-/// ambiguous signs, as in `deg_s`, are read as division.
+/// Returns all meanings of a unit as products of symbols. If `fold` is true, upper and lower case are equal;
+/// if `divide` is true, ambiguous separators, as in `deg_s`, mean division.
 fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     let Some(terms) = terms(text).filter(|terms| terms.len() < 6) else { return Vec::new() };
-    // ms2 and ms-2 are m/s² without the sign of division.
+    // ms2 and ms-2 mean m/s², although no sign of division is there.
     if let [Term { letters, exponent: 2 | -2, .. }] = &terms[..]
         && letters.eq_ignore_ascii_case("ms")
     {
@@ -236,7 +236,7 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
             found = each.collect();
             continue;
         }
-        // rads^-1 is rad/s.
+        // rads^-1 means rad/s.
         let left = term.letters.strip_suffix(['s', 'S']).filter(|_| is_single && exponent < 0);
         let left = left.map(|left| run(left, fold)).unwrap_or_default();
         let each = found.iter().flat_map(|a| {
@@ -250,7 +250,7 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     found
 }
 
-/// Returns the values in SI of a unit of the given dimension: one value for a unit, none for a text that is
+/// Returns the SI values of a unit with the given dimension: one value for a unit, none for a text that is
 /// not a unit, several if the text is ambiguous.
 pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
     for fold in [false, true] {
@@ -270,8 +270,8 @@ pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
     Vec::new()
 }
 
-/// Units of quantities that the bench does not measure, such as volts. They help to recognise the
-/// row of units below the names of a file's columns.
+/// Units of quantities that the bench does not measure, such as volts. With them, a row of units below the
+/// names of the columns is recognised.
 const OTHERS: [&str; 42] = [
     "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "°C", "degF", "Pa",
     "hPa", "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "l", "m/s", "km/h", "mph", "km", "T",
@@ -279,8 +279,8 @@ const OTHERS: [&str; 42] = [
     "grad",
 ];
 
-/// Returns true if the text is a unit, which may stand in brackets. A column named `nanosec` or the
-/// like contains fractions of a second.
+/// Returns true if the text is a unit, which may therefore stand in brackets. `nanosec` and similar names are
+/// no units, because such columns contain fractions of a second.
 pub(super) fn is_unit(text: &str) -> bool {
     let text = text.trim_matches(['[', ']', '(', ')', ' ']);
     if ["nanosec", "nanosecs", "nsec", "nsecs"].contains(&text) {
@@ -292,7 +292,8 @@ pub(super) fn is_unit(text: &str) -> bool {
     OTHERS.contains(&text) || Quantity::ALL.into_iter().any(known)
 }
 
-/// Returns the factor from one unit to another; `None` unless both are known units of one quantity.
+/// Returns the factor that converts values from one unit to another; `None` unless both are known units
+/// of the same quantity.
 pub fn conversion(from: &str, to: &str) -> Option<f64> {
     if from == to {
         return Some(1.0);
@@ -312,11 +313,11 @@ pub(super) fn parse_unit(unit: &str) -> Option<Product> {
 }
 
 const BETWEEN: [char; 11] = ['_', '.', ' ', '-', ',', ':', '/', '(', ')', '[', ']'];
-/// Units at the end of a name that often have another meaning: minimum, input, revision.
+/// Units that often mean something else at the end of a name: minimum, input, revision.
 const OFTEN_OTHERS: [&str; 5] = ["min", "in", "rev", "raw", "counts"];
 
-/// A unit that was found in the name of a column: its text, its value in SI (`factor`), the
-/// beginning of the name before it, and whether the name ends with the unit.
+/// A unit that was found in the name of a column: its text, its SI value (`factor`), the part of the name
+/// before it, and whether it ends the name.
 #[derive(Debug, PartialEq)]
 pub(super) struct Stated {
     pub text: String,
@@ -350,7 +351,7 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
         match factors(inside, dimension)[..] {
             [factor] => {
                 let found_here = stated(from, to, inside, factor);
-                // For example t_ms [s].
+                // A second unit, as in `t_ms [s]`.
                 if let Ok(Some(also)) = find_unit(&found_here.before, dimension)
                     && also.text.len() > 1
                     && also.factor != factor
@@ -359,7 +360,7 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
                 }
                 found.push(found_here);
             }
-            // `data(3)` of a .mat file and `p[1,2]` of an FMU are names.
+            // Indices in brackets, as in `data(3)` of a .mat file and `p[1,2]` of an FMU, belong to the name.
             [] if inside.chars().all(|c| c.is_ascii_digit() || ", ".contains(c)) => {}
             [] if !is_unit(inside) && !name[to..].trim().is_empty() => {}
             _ => other = Some(inside),
@@ -371,10 +372,10 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
         let mut taken = (usize::MAX, 0);
         let mut windows: Vec<(usize, usize)> =
             starts.iter().flat_map(|from| ends.iter().map(move |to| (*from, *to))).collect();
-        // For example gyro in deg/s.
+        // The word "in" introduces a unit, as in `gyro in deg/s`.
         let leads = |from: usize| name[from..].to_lowercase().starts_with("in ");
         windows.retain(|(from, to)| from < to && to - from <= 40 && !leads(*from));
-        // The longest is taken first, among equally long ones the last.
+        // The longest unit is used; of equally long ones, the last.
         windows.sort_by_key(|(from, to)| (std::cmp::Reverse(to - from), std::cmp::Reverse(*from)));
         for (from, to) in windows {
             let text = &name[from..to];
@@ -391,7 +392,7 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
             if factors.is_empty() {
                 continue;
             }
-            // Nm_s is not a torque.
+            // A unit may be a part of a longer one: Nm_s is not a torque.
             let rest = name[from..].trim();
             let continues = !is_last
                 && [false, true].iter().any(|divide| !products(rest, false, *divide).is_empty());
@@ -423,8 +424,8 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
     }
 }
 
-/// Returns true if a part of a name can be a unit. A single letter is a unit only at the end, after a
-/// separator and in the right case; the whole name only if it is a time (`millis`).
+/// Returns true if a part of a column's name can be a unit. A single letter is a unit only at the end of the
+/// name, after a separator and in the correct case; a whole name is a unit only if it is a time (`millis`).
 fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Dimension) -> bool {
     let shouts = !name.contains(|c: char| c.is_lowercase());
     let is_time = dimension == Time.dimension();
@@ -439,8 +440,8 @@ fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Di
     }
 }
 
-/// Returns the beginning of a column's name before its unit, without the characters that introduce
-/// the unit: opening brackets, separators and the word "in".
+/// Returns the part of a column's name before its unit, without the characters that introduce the unit:
+/// opening brackets, separators and the word "in".
 fn strip_unit(name: &str) -> &str {
     let name = name.trim_end_matches(|c| BETWEEN.contains(&c) || ['[', '(', '{', '<'].contains(&c));
     let cut = name.strip_suffix(" in").unwrap_or(name);
@@ -457,15 +458,15 @@ fn brackets(name: &str) -> Vec<(usize, usize)> {
             from = end;
         }
     }
-    // [rad/(s)] counts once.
+    // The brackets of `[rad/(s)]` are one pair of brackets with a unit.
     let inside = |a: &(usize, usize), b: &(usize, usize)| a != b && b.0 <= a.0 && a.1 <= b.1;
     let all = found.clone();
     found.retain(|a| !all.iter().any(|b| inside(a, b)));
     found
 }
 
-/// Returns true if a word begins at the position `at`: after a separator, or at a capital after a small
-/// letter.
+/// Returns true if a word begins at the position `at`: after a separator, or with a capital
+/// after a lower-case letter.
 fn begins(name: &str, at: usize) -> bool {
     let (Some(left), Some(right)) = (name.get(..at), name.get(at..)) else { return false };
     let (Some(next), last) = (right.chars().next(), left.chars().next_back()) else { return false };
@@ -480,8 +481,8 @@ fn ends(name: &str, at: usize) -> bool {
     !BETWEEN.contains(&last) && next.is_none_or(|next| BETWEEN.contains(&next) || is_hump(next))
 }
 
-/// Returns true if a new word begins with the letter `next` in a name of mixed case: at the B of
-/// aB, and at the A of ABc.
+/// Returns true if a new word begins with the letter `next` in a name of mixed case: with the B of aB, and
+/// with the A of ABc.
 fn is_hump(last: char, next: char, after: Option<char>) -> bool {
     next.is_uppercase() && (!last.is_uppercase() || after.is_some_and(char::is_lowercase))
 }

@@ -1,5 +1,5 @@
-//! Files as the tools of a laboratory write them, 40 rows each, from one recording: every one is read with the right values, or
-//! refused with the line and the words that help.
+//! Files in the formats of laboratory tools, with 40 rows of the same recording: each is read with the correct values, or
+//! refused with its line and a message that helps.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ fn torque(k: usize) -> i64 {
     (37 * k % 200) as i64 - 100
 }
 
-/// Returns the rate in row `k` of the test recording in tenths of a degree per second, an integer.
+/// Returns the rate in row `k` of the test recording, in tenths of a degree per second.
 fn tenths(k: usize) -> i64 {
     (13 * k % 50) as i64 - 25
 }
@@ -104,8 +104,8 @@ fn parquet(time: &str, timestamps: bool) -> Vec<u8> {
     bytes
 }
 
-/// A file as a tool writes it: the tool's name, the file's ending and bytes, the columns, and the words of
-/// the refusal (`None` if it must be read).
+/// A file in the format of a tool: the tool's name, the file's ending and contents, the columns, and words of the error (`None`
+/// if the file must be read).
 type Case = (&'static str, &'static str, Vec<u8>, String, Option<&'static str>);
 
 fn spreadsheets() -> Vec<Case> {
@@ -115,7 +115,7 @@ fn spreadsheets() -> Vec<Case> {
     });
     let minus = |text: &str| text.replace('-', "\u{2212}");
     let french = lines("t;T_cmd;gyro z\n", |k| {
-        // µN·m, with narrow blanks between thousands
+        // µN·m, with narrow blanks as separators of thousands
         let torque = format!("{}\u{202f}000", torque(k)).replace("0\u{202f}000", "0\u{202f}000");
         let torque = if torque.starts_with("0\u{202f}") { "0".into() } else { torque };
         format!("{};{};{}", millis(k), minus(&torque), minus(&commas(&rate(k))))
@@ -728,10 +728,10 @@ fn files_of_many_tools_are_read_correctly_or_refused_with_a_helpful_message() {
     for (tool, ending, bytes, columns, refusal) in &cases {
         match (read_text(ending, bytes, columns), refusal) {
             (Ok((table, said)), None) => {
-                // times count from the first row where they are dates, else from their own zero
+                // dates are converted to times since the first row, other times keep their zero
                 let from = column(&table, "time")[0];
                 let times: Vec<f64> = column(&table, "time").iter().map(|t| t - from).collect();
-                // times since 1970 in s have 52 binary digits
+                // times since 1970 in s have only 52 binary digits
                 let off = |(a, b): (&f64, &f64)| (a - b).abs() > 3e-7;
                 if times.len() != ROWS || times.iter().zip(&time).any(off) {
                     wrong.push(format!("{tool}: times {times:?}\n{said}"));

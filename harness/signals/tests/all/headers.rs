@@ -1,6 +1,6 @@
-//! Random headers and time formats, each with its truth: a recording is read right or refused, and never silently wrong. Units stand
-//! in brackets, behind the name, in words, in a row or on the command line, or nowhere; times are numbers, dates, clock times, or
-//! seconds with nanoseconds.
+//! Reads files with random headers and time formats whose true values are known. The reader has to return these values or refuse
+//! the file, never return wrong values. Units are in brackets, behind the name, in words, in a row, on the command line, or
+//! missing; times are numbers, dates, clock times, or seconds with nanoseconds.
 
 use fastrand::Rng;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
@@ -89,7 +89,7 @@ struct Column {
     below: String,
     option: String,
     cells: Vec<String>,
-    /// Values of the column in SI; `None` if the file does not state the unit.
+    /// True values of the column in SI units; `None` if the file does not state the unit.
     truth: Option<Vec<f64>>,
 }
 
@@ -102,8 +102,8 @@ struct File {
     is_clear: bool,
 }
 
-/// Writes a unit next to a name as people do. Returns false if a reader may not recognise it: capitals, or
-/// blanks that also separate columns.
+/// Appends a unit to a name in one of several common notations. Returns false if a reader cannot always recognise the unit,
+/// because of capitals or of blanks that may also separate columns.
 fn with_unit(dice: &mut Rng, name: &str, unit: &str) -> (String, bool) {
     let (header, fine) = match dice.u8(..12) {
         0 | 1 => (format!("{name} [{unit}]"), true),
@@ -132,7 +132,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
     let (unit, factor) = pick(dice, units);
     let name = pick(dice, names);
     let cells = si.iter().map(|value| match value / factor {
-        // counts of a clock are whole
+        // a clock counts whole units
         count
             if signal == "time"
                 && (count - count.round()).abs() < 1e-6 * count.abs().max(1.0)
@@ -146,7 +146,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
         Column { signal, cells: cells.collect(), truth: Some(si.to_vec()), ..Column::default() };
     let at = |header: &str| header.split([',', ':', '=']).count() == 1;
     match dice.u8(..10) {
-        // nowhere: in SI or not
+        // a file without a unit, whose values may be in SI units or not
         0 => {
             column.header = name.into();
             column.truth = None;
@@ -160,7 +160,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
             column.header = name.into();
             column.below = unit.into();
         }
-        // two statements
+        // two units, which may contradict each other
         3 => {
             let (header, _) = with_unit(dice, name, unit);
             column.header = header;
@@ -171,7 +171,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
                 column.truth = Some(vec![f64::NAN]); // must be refused
             }
         }
-        // a unit of something else, or of nothing
+        // a unit of another quantity, or no known unit
         4 if dice.bool() => {
             let other = pick(dice, &["V", "furlong/s", "kg", "deg", "m/s", "mm", "Hz", "rps"]);
             column.header = format!("{name} [{other}]");
@@ -234,7 +234,7 @@ fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
     };
     let form = dice.u8(..16);
     if form < 3 {
-        // ROS, candump, Linux
+        // names of ROS, candump and Linux
         let stem = pick(dice, &["", "stamp.", "header.stamp.", "tv_", "Stamp_"]);
         let (whole, rest, unit) = pick(
             dice,
@@ -244,13 +244,13 @@ fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
         let parts = ms.iter().map(|t| (t.rem_euclid(1000) * unit).to_string()).collect();
         let mut first = column(format!("{stem}{whole}"), seconds);
         if dice.bool() {
-            first.option.clear(); // found by itself
+            first.option.clear(); // the reader finds this pair without an option
         }
         let second = Column { header: format!("{stem}{rest}"), cells: parts, ..Column::default() };
         return vec![first, second];
     }
     if form == 3 {
-        // whole seconds, many rows to each
+        // times in whole seconds, shared by many rows
         let cells = ms.iter().map(|t| t.div_euclid(1000).to_string()).collect();
         *clear = false;
         let is_even = ms.windows(2).all(|t| t[0] / 1000 != t[1] / 1000);
@@ -290,7 +290,7 @@ fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
         }
     });
     let cells: Vec<String> = cells.collect();
-    // orders that the file does not show
+    // dates whose order of day and month the file does not show
     let (_, _, day) = civil(ms[0].div_euclid(86_400_000));
     if changes && (form == 15 || matches!(form, 8 | 9) && day < 12) {
         *clear = false;
@@ -302,7 +302,7 @@ fn file(dice: &mut Rng) -> File {
     let (step, rows) = (pick(dice, &[2, 10, 20, 25, 40, 100]), dice.usize(20..45));
     let mut clear = true;
     let day = dice.i64(19_000..21_000) * 86_400_000;
-    // some begin before midnight
+    // half of the files pass midnight
     let in_day = if dice.bool() { 86_400_000 - step * 10 } else { dice.i64(0..86_000_000) };
     let ms: Vec<i64> = (0..rows).map(|k| day + in_day + step * k as i64).collect();
     let mut columns = match dice.bool() {
@@ -323,7 +323,7 @@ fn file(dice: &mut Rng) -> File {
     let before = names.len();
     names.dedup();
     clear &= names.len() == before;
-    // a row of units is one where most columns have one
+    // a row is recognised as a row of units only if most columns have a unit
     let below = columns.iter().filter(|column| !column.below.is_empty()).count();
     clear &= below == 0;
     File { columns, is_clear: clear }
@@ -349,8 +349,7 @@ fn text(dice: &mut Rng, columns: &[Column]) -> String {
     all
 }
 
-/// 10,000 random files whose columns have names with and without units; no column is taken for another signal or read in a
-/// wrong unit.
+/// No column of 10,000 random files, with and without units in their names, is taken for another signal or read in a wrong unit.
 #[test]
 fn random_headers_are_read_right_or_refused() {
     let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());
@@ -401,7 +400,7 @@ fn random_headers_are_read_right_or_refused() {
                 wrong.push(format!("{header} should be refused: {}", all()));
                 continue;
             }
-            // dates and times of many digits count from the first row
+            // dates and large times are converted to times since the first row
             let from = if *signal == "time" { values[0] - truth[0] } else { 0.0 };
             for (value, truth) in values.iter().zip(truth) {
                 let off = (value - from - truth).abs();
@@ -416,7 +415,7 @@ fn random_headers_are_read_right_or_refused() {
             }
         }
     }
-    // the first lines show the header and some rows
+    // the first lines of the file for the message
     let start =
         |text: &String| text.replace('\r', "\n").lines().take(12).collect::<Vec<_>>().join("\n");
     wrong.iter().chain(&refused).take(12).for_each(|each| println!("{}\n", start(each)));

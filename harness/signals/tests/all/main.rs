@@ -1,4 +1,5 @@
-//! Tests of `signals`, outside the library: its generic crates are compiled once.
+//! Tests of the crate `signals`. They are outside the library so that its generic crates
+//! are compiled only once.
 
 mod corpus;
 mod headers;

@@ -1,4 +1,5 @@
-//! Recordings in every form that loggers write give the same numbers, and the error for a wrong one names the place.
+//! Recordings in every format that loggers write give the same values, and the error for a faulty recording names the
+//! line and the column.
 
 use std::path::{Path, PathBuf};
 
@@ -55,7 +56,7 @@ const TIME: [f64; 3] = [0.0, 0.02, 0.04];
 const TORQUE: [f64; 3] = [0.1, 0.25, -0.3];
 const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::consts::PI / 180.0];
 
-/// A table whose only column is the time, such as a plan for an FMU without inputs, is read.
+/// A table with only times is a plan for an FMU without inputs.
 #[test]
 fn a_table_with_only_times_is_read() {
     let directory = tempfile::tempdir().unwrap();
@@ -85,7 +86,7 @@ fn a_recording_gives_equal_numbers_for_every_separator_decimal_mark_comment_and_
             "\"t\",\"T_cmd\",\"gyro z\"\n\"0\",\"100\",\"0\"\n\"20\",\"250\",\"1,0\"\n\"40\",\"-300\",\"-1,5\"",
             given,
         ),
-        // units in a row, or in the names
+        // units in a row, or in the names of columns
         ("csv", "t;T_cmd;gyro z\nms;mN·m;°/s\n0;100;0\n20;250;1\n40;-300;-1,5\n", renamed),
         ("csv", "t [ms],T_cmd (mN.m),gyro z [deg/s]\n0,100,0\n20,250,1\n40,-300,-1.5\n", renamed),
         (
@@ -93,13 +94,13 @@ fn a_recording_gives_equal_numbers_for_every_separator_decimal_mark_comment_and_
             "# bench, 24 °C\n% again\nt [ms],T_cmd [mNm],gyro z [dps]\n// more\n0,100,0\n20,250,1\n# within\n\n40,-300,-1.5\n",
             renamed,
         ),
-        // a preamble, columns that nobody asked for, a separator at the end, the last line cut off
+        // lines above the header, unused columns, a separator at the end of each line, and an incomplete last line
         (
             "csv",
             "Logger 3000\nSerial;17\nt;state;T_cmd;gyro z\nms;;mNm;deg/s\n0;0;100;0;\n20;0;250;1;\n40;1;-300;-1,5;\n60;1;3",
             renamed,
         ),
-        // a header in a comment, as numpy writes it; blanks
+        // a header in a comment, as numpy writes it, and blanks between the columns
         (
             "dat",
             "# t T_cmd gyro\n0 100 0\n20 250 1\n  40  -300   -1.5\n",
@@ -107,7 +108,7 @@ fn a_recording_gives_equal_numbers_for_every_separator_decimal_mark_comment_and_
         ),
         // no header
         ("csv", "0,100,0\n20,250,1\n40,-300,-1.5\n", "time=#1:ms,tau_cmd=#2:mNm,omega=#3:deg/s"),
-        // dates, with and without a zone
+        // dates with and without an offset from UTC
         (
             "csv",
             "t,T_cmd,gyro z\n2026-01-31T23:59:59.990Z,100,0\n2026-02-01T00:00:00.010Z,250,1\n2026-02-01T01:00:00.030+01:00,-300,-1.5\n",
@@ -128,11 +129,11 @@ fn a_recording_gives_equal_numbers_for_every_separator_decimal_mark_comment_and_
     assert!(cut.contains("line 4 was taken for a row of units"), "{cut}");
 }
 
-/// A torque at 10 Hz and a gyro at 50 Hz in one file: the torque is held between its rows, and a row with a lost rate is
-/// left out.
+/// The file contains a torque at 10 Hz and a gyro at 50 Hz. The torque is held between its rows, and a row without a
+/// rate is left out.
 #[test]
 fn a_slow_torque_is_held_and_lost_rows_are_left_out() {
-    // torque at 10 Hz under a gyro at 50 Hz, which has rows of its own; one rate lost
+    // the rows of the torque and of the gyro are separate; one rate is missing
     let mut text = String::from("time,tau_cmd,omega\n");
     for k in 0..=100 {
         let t = 0.02 * f64::from(k);
@@ -152,7 +153,7 @@ fn a_slow_torque_is_held_and_lost_rows_are_left_out() {
         said.contains("tau_cmd has a value in 21 of 122 rows, 0.1000 s apart; it is held"),
         "{said}"
     );
-    // on an even grid the lost row is on the line between its neighbours
+    // on an even grid the missing rate is interpolated linearly
     let (step, grid) = even(table, &mut |_| {}).unwrap();
     assert!((step - 0.02).abs() < 1e-12 && grid.rows() == 101);
     assert!((column(&grid, "omega")[7] - 7.0).abs() < 1e-9);
@@ -179,8 +180,7 @@ fn stored(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/data")).join(name)
 }
 
-/// Timestamps in Parquet files of several libraries, written by `data/make_parquet.py`, become
-/// seconds from the first one.
+/// The files were written by several libraries (`data/make_parquet.py`).
 #[test]
 fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
     for name in ["ts_s", "ts_ms", "ts_us", "ts_ns", "pandas_ts", "polars_ts"] {
@@ -192,10 +192,10 @@ fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
         assert_close(column(&table, "omega"), &[0.0, 0.5, 1.0, 1.5, 2.0], name);
         let origin = if name.starts_with("polars") { "1970" } else { "2026-01-01T00:00:00+00:00" };
         assert!(said.contains(&format!("time counts from {origin}")), "{said}");
-        // a unit that is stated must be that of the type
+        // a stated unit must agree with the unit of the type
         let error = read_file(&path, &columns("time=time:min")).unwrap_err();
         assert!(error.contains("but another one is stated for it, of 60 s"), "{name}: {error}");
-        // the files of `hubslosh run` and `view`
+        // files that `hubslosh run` and `view` write
         let table = Table::read(&path, &["time", "omega"]).unwrap();
         assert_close(column(&table, "time"), &expected, name);
     }
@@ -227,11 +227,10 @@ fn parquet_columns_of_rare_types_are_refused_with_advice_to_use_the_python_packa
     assert!(error.contains("column time holds INT64 (allowed: timestamps, floating"), "{error}");
 }
 
-/// The unit in the name of the time column "t [ms]" is not applied to its dates, and the unit of "T
-/// [mNm]" is.
+/// The unit of the column "t [ms]" is not applied to its dates, but the unit of the column "T [mNm]" is.
 #[test]
 fn the_unit_in_the_name_of_the_time_column_is_not_applied_to_other_columns() {
-    // dates need no unit, but milli- of the torque is the same factor as milli- of the time
+    // dates need no unit; the factor milli of the torque must not be lost, although the time has the same factor
     let text =
         "t [ms],T [mNm],omega\n2026-01-31T12:00:00.000Z,100,0\n2026-01-31T12:00:00.020Z,250,1\n";
     let (table, _) = read_text("csv", text.as_bytes(), "time=t,tau_cmd=T").unwrap();
@@ -315,24 +314,24 @@ fn errors_in_a_recording_state_line_column_and_allowed_values() {
     assert!(error.contains("; and 4 more (allowed"), "{error}");
 }
 
-/// Each of these files was refused or read wrongly by an earlier version.
+/// An earlier version refused each of these files or read wrong values.
 #[test]
 fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written() {
     let renamed = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
     let cases: [(&str, &str); 4] = [
-        // rosbag exports, flight logs: a column of text, one of Booleans
+        // rosbag exports and flight logs: a column of text and a column of Booleans
         (
             "t,state,armed,T_cmd,gyro z\n0,idle,false,100,0\n20,\"sweep, up\",true,250,1\n40,sweep,true,-300,-1.5\n",
             renamed,
         ),
-        // events in some rows only, the first among them
+        // a column with events in a few rows, one of them the first
         ("t,event,T_cmd,gyro z\n0,start,100,0\n20,,250,1\n40,,-300,-1.5\n", renamed),
-        // Excel abroad, with a typographic minus
+        // Excel in other countries, with a typographic minus
         (
             "\u{feff}sep=;\nt;T_cmd;gyro z\n0,0;100;0\n20,0;250;1\n40,0;\u{2212}300;\u{2212}1,5\n",
             renamed,
         ),
-        // decimals in all columns, a 1 in the row of units
+        // decimal commas in all columns, and a 1 in the row of units
         (
             "t;T_cmd;ok;gyro z\nms;mNm;1;deg/s\n0;100;1;0\n20;250;1;1\n40;-300;1;-1,5\n",
             "time=t,tau_cmd=T_cmd,omega=gyro z",
@@ -353,7 +352,7 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
 fn recordings_with_clock_times_or_dates_in_many_notations_are_read() {
     let rows = |stamps: [&str; 3]| stamps.map(|stamp| format!("{stamp};0,1;2\n")).concat();
     let cases = [
-        // over midnight
+        // clock times across midnight
         ["23:59:59.990", "00:00:00.010", "0:00:00.03"],
         ["23:59:59,990", "24:00:00,010", "24:00:00,030"],
         [
@@ -369,7 +368,7 @@ fn recordings_with_clock_times_or_dates_in_many_notations_are_read() {
         let text = format!("time;tau_cmd;omega\n{}", rows(stamps));
         let found = read_text("csv", text.as_bytes(), "");
         if k == 1 {
-            // nobody's day has an hour 24
+            // no time of day has the hour 24
             let error = found.unwrap_err();
             assert!(
                 error.contains(
@@ -400,7 +399,7 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
             "time;tau_cmd;omega\n0.5;0;0\n0,75;0;0\n",
             "line 3, column time: \"0,75\" is read with a decimal comma, the lines above with a decimal point",
         ),
-        // the first bad line, not the last of the sample
+        // the error names the first line, not the last one that was examined
         (
             "time,tau_cmd,omega\n0,0,true\n1,0,true\n2,0,false\n",
             "line 2, column omega: \"true\" is not a number; line 3",
@@ -427,7 +426,7 @@ fn a_file_without_times_is_read_only_with_a_stated_rate() {
     assert_close(column(&table, "tau_cmd"), &TORQUE, text);
     assert!(said.contains("its rows are taken as 50 per second (--rate)"), "{said}");
     assert!(Columns::default().with_rate(Some(0.0)).is_err());
-    // what a time column says is passed over, unless it is asked for
+    // a rate replaces the time column, unless --columns asks for this column
     std::fs::write(&path, format!("time,{text}").replace('\n', "\n7,")).unwrap();
     let (table, said) = read_file(&path, &at_50_hz).unwrap();
     assert_close(column(&table, "time"), &TIME, text);
@@ -458,7 +457,7 @@ fn columns_of_seconds_and_nanoseconds_form_one_time() {
         assert_close(column(&table, "time"), &TIME, head);
         assert!(said.contains("the times are the columns"), "{said}");
     }
-    // two full times
+    // two columns that each contain the full time
     let rows = "1.00,1000000000,0\n1.02,1020000000,1\n1.04,1040000000,2\n";
     for time in ["t_s", "t_ns"] {
         let text = format!("t_s,t_ns,omega\n{rows}");
@@ -520,7 +519,7 @@ fn parquet_files_of_common_codecs_with_units_in_their_names_are_read() {
     ];
     for codec in codecs {
         write_parquet(&path, ["time (s)", "tau cmd [mN.m]", "omega"], codec);
-        // a column is named with its unit or without
+        // a column may be named with or without its unit
         for of in ["time=time (s),tau_cmd=tau cmd [mN.m]", "tau_cmd=tau cmd"] {
             let (table, _) = read_file(&path, &columns(of)).unwrap();
             assert_close(column(&table, "time"), &TIME, of);

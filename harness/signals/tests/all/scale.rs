@@ -1,5 +1,5 @@
-//! Valid files whose times are known, in every unit, type and layout: the reader gives these times or refuses the file. A factor
-//! between units that is lost or taken twice is never silent.
+//! Reads random valid files with times in every unit, type and layout, whose true times are known. The reader returns the true
+//! times or refuses the file: a wrong factor between units never goes unnoticed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,13 +22,13 @@ const UNITS: [(&str, i64); 6] = [
 ];
 const STEPS: [i64; 7] = [1, 2, 10, 20, 25, 100, 250];
 const BEGIN: i64 = 1_769_860_800;
-/// Largest share of files that may be refused, although each of them states a unit, a date or a clock time.
+/// Largest fraction of files that may be refused, although each of them states a unit, a date or a clock time.
 const REFUSED: f64 = 1e-3;
 
 #[derive(Clone, Default)]
 struct Truth {
     columns: String,
-    /// True times of the rows from the first row, s. Rows at the end of a file may be cut off.
+    /// True times since the first row, s. Rows at the end of a file may be cut off.
     time: Vec<f64>,
     is_unstated: bool,
 }
@@ -38,12 +38,12 @@ fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
     let mut dice = Rng::with_seed(seed.unwrap_or(1));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("input.{ending}"));
-    // by the words of the reason: how many, and the first
+    // number of refused files, and the first of them, by the reason
     let mut refused: BTreeMap<String, (u64, String)> = BTreeMap::new();
     let mut foreign = 0;
     for n in 0..count {
         let (bytes, Truth { columns, time, is_unstated }) = make(&mut dice);
-        // a new file: some file systems write what replaces an old one to the disk at once
+        // the old file is deleted, because some file systems write a replaced file to the disk at once
         let _ = std::fs::remove_file(&path);
         std::fs::write(&path, &bytes).unwrap();
         let text = || format!("file {n}, {columns}:\n{}", String::from_utf8_lossy(&bytes));
@@ -52,7 +52,7 @@ fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
         let wanted = Wanted { signals: &[signal], columns: &columns };
         let table = match recording::read_here(&path, &path, &wanted, &mut |_| {}) {
             Ok(Some(table)) => table,
-            // times of day, integers: the Python package reads them
+            // only the Python package reads times of day and integers
             Ok(None) => {
                 foreign += 1;
                 continue;
@@ -134,7 +134,7 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
         9 => number(time(k), 1_000_000_000),
         _ => number(time(k), ns),
     };
-    // a column before the time: row names, or a keyword in the first row
+    // a column before the time, with row names or a keyword in the first row
     let first = match dice.u8(..4) {
         0 if separator != " " => Some("rows"),
         1 if below.is_none() && separator != " " => Some("keyword"),
@@ -167,7 +167,7 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     }
     out += &row(&head, false);
     if below.is_some() {
-        // with as many fields as the rows
+        // as many fields as the rows have
         let cells =
             units.iter().map(|unit| if separator == " " && unit.is_empty() { "-" } else { unit });
         out += &row(&cells.map(String::from).collect::<Vec<_>>(), false);
@@ -203,7 +203,7 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
         "us" => TimeUnit::MICROS,
         _ => TimeUnit::NANOS,
     };
-    // timestamps and times of day know no seconds
+    // timestamps and times of day have no unit s
     let ns = if kind < 2 && unit == "s" { 1 } else { ns };
     let name = if kind == 3 { format!("t [{unit}]") } else { "t".to_string() };
     let first = Type::primitive_type_builder(
@@ -217,9 +217,9 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
         }
         _ => first,
     };
-    // a time of day in ms is an i32, which is left out here: a plain integer without a unit
+    // a time of day in ms is an i32, which is written as a plain integer without a unit
     let is_integer = kind == 2 || kind == 1 && unit == "ms";
-    // numbers whose steps are no seconds
+    // times whose unit cannot be s, by their steps
     let is_unstated = is_integer || kind == 5 && step.max(ns) >= 1_000_000_000;
     let omega = Type::primitive_type_builder("omega", Physical::DOUBLE);
     let fields =
@@ -230,7 +230,7 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), properties).unwrap();
     let mut group = writer.next_row_group().unwrap();
     let origin = if kind == 0 { BEGIN * 1_000_000_000 } else { 0 };
-    // whole numbers of the unit
+    // a whole number of units
     let step = (step / ns).max(1) * ns;
     let times: Vec<i64> = (0..rows).map(|k| (origin + step * k as i64) / ns).collect();
     let mut column = group.next_column().unwrap().unwrap();

@@ -1,4 +1,4 @@
-//! Tables are read as they were written, and errors about damaged tables say what is wrong.
+//! Tables are read as they were written, and errors about damaged tables name the row and the column.
 
 use std::collections::BTreeMap;
 
