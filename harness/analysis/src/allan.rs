@@ -1,8 +1,8 @@
-//! Allan deviation of a gyro at rest, and the noise parameters that it shows (IEEE Std 952).
+//! Allan deviation of a gyro at rest, and the noise parameters that it determines (IEEE Std 952).
 //!
-//! | term | Allan variance | source |
+//! | term | Allan variance | appearance of the deviation |
 //! | --- | --- | --- |
-//! | white noise, angle random walk N | N²/τ | slope −1/2 of the deviation |
+//! | white noise, angle random walk N | N²/τ | slope −1/2 |
 //! | flicker noise, bias instability B | (2 ln 2/π) B² | flat at 0.664 B |
 //! | rate random walk K | K² τ/3 | slope +1/2 |
 //! | rate ramp R | R² τ²/2 | slope +1, a drift of R rad/s² |
@@ -18,9 +18,9 @@
 //! ```
 //!
 //! The deviation rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2,
-//! without a plateau. The *bias instability* B in data sheets describes flicker noise. The FMU's Gauss–Markov bias
-//! has sigma = B/0.664 (thesis 5.5). Its maximum is therefore 0.617/0.664 B = 0.93 B, and B is 0.664/0.617 = 1.076
-//! times the maximum.
+//! without a plateau. The *bias instability* B in data sheets describes flicker noise. The FMU's Gauss–Markov
+//! bias has sigma = B/0.664 (thesis 5.5). Its maximum is therefore 0.617/0.664 B = 0.93 B, and B is 0.664/0.617 =
+//! 1.076 times the maximum.
 
 mod covariance;
 mod fit;
@@ -158,7 +158,7 @@ impl Noise {
 
 /// Returns the Allan variance of a Gauss–Markov process divided by its variance, at `x` correlation times.
 fn markov(x: f64) -> f64 {
-    // exp_m1, because for small x everything except (2/3) x³ cancels
+    // exp_m1 avoids cancellation: for small x only (2/3) x³ is left
     (2.0 * x + 4.0 * (-x).exp_m1() - (-2.0 * x).exp_m1()) / (x * x)
 }
 
@@ -172,8 +172,8 @@ mod tests {
         let mut random = Random::new(1, 0);
         let samples: Vec<f64> = (0..100_000).map(|_| 3.0 * random.normal()).collect();
         for point in variances(0.02, &samples) {
-            // of n samples each: sigma/sqrt(n). Its relative standard error is about
-            // 1/sqrt(1.5 spans of that length) for the variance times two; five of them.
+            // The mean of n samples has the deviation sigma/sqrt(n). The relative standard error of the variance
+            // is about 1/sqrt(1.5 times the number of such intervals); five standard errors are allowed.
             let n = point.tau / 0.02;
             let expected = 3.0 / n.sqrt();
             let error = (2.0 / (1.5 * 100_000.0 / n)).sqrt() / 2.0;
@@ -184,20 +184,20 @@ mod tests {
 
     #[test]
     fn the_allan_deviation_of_a_ramp_rises_with_the_averaging_time() {
-        // rate D t: two neighbouring means differ by D tau, so the deviation is D tau / sqrt 2
+        // two neighbouring means of the rate D t differ by D tau, so that the deviation is D tau / sqrt 2
         let samples: Vec<f64> = (0..20_000).map(|k| 0.25 * 0.1 * k as f64).collect();
         let points = variances(0.1, &samples);
         assert!(points.len() > 40 && (points.last().unwrap().tau - 200.0).abs() < 30.0);
         for point in points {
             let expected = 0.25 * point.tau / 2f64.sqrt();
-            // sums of 2e4 numbers up to 5e2 carry 1e-9 each
+            // sums of 2e4 numbers up to 5e2 have a rounding error of 1e-9
             assert!((point.variance.sqrt() / expected - 1.0).abs() < 1e-7, "{point:?}");
         }
     }
 
     #[test]
     fn an_alternating_signal_appears_only_in_averages_of_odd_length() {
-        // +1, −1, ...: means of odd m are ±1/m, those of even m nothing
+        // +1, −1, ...: means of an odd number m of samples are ±1/m, of an even number 0
         let samples: Vec<f64> = (0..1000).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
         for point in variances(1.0, &samples) {
             let m = point.tau;
@@ -216,14 +216,14 @@ mod tests {
         // + (1 + x) e^−2x = 0
         assert!((peak / 100.0 - 1.8926).abs() < 1e-3, "{peak}");
         assert!((deviation(peak) - 0.61737).abs() < 1e-4, "{}", deviation(peak));
-        // slopes at the ends: sqrt(2x/3) and sqrt(2/x)
+        // for small and large x: sqrt(2x/3) and sqrt(2/x)
         assert!((deviation(0.01) / (2.0 * 1e-4 / 3.0f64).sqrt() - 1.0).abs() < 1e-3);
         assert!((deviation(1e6) / 2e-4f64.sqrt() - 1.0).abs() < 1e-3);
     }
 
     #[test]
     fn the_allan_variance_of_a_simulated_gauss_markov_bias_equals_the_formula() {
-        // 1e6 samples, 50 to a correlation time: 2e4 correlation times
+        // 1e6 samples, 50 in each correlation time: 2e4 correlation times
         let (mut random, mut bias) = (Random::new(2, 0), 0.0);
         let keep = (-1.0 / 50.0f64).exp();
         let samples: Vec<f64> = (0..1_000_000)
@@ -234,8 +234,8 @@ mod tests {
             .collect();
         let noise = Noise { bias_instability: FLICKER, bias_time: 1.0, ..Noise::default() };
         for point in variances(0.02, &samples).iter().filter(|p| (0.2..20.0).contains(&p.tau)) {
-            // below 0.2 s the sampling matters, which the formula does not include; a standard
-            // error is sqrt(1/(1.5 x 2e4/20)) = 2.6 % at the longest time and less below
+            // below 0.2 s the effect of sampling, which the formula neglects, matters; the standard error is at
+            // most sqrt(1/(1.5 x 2e4/20)) = 2.6 %, at the longest time
             let ratio = point.variance / noise.variance(point.tau);
             assert!((ratio - 1.0).abs() < 0.1, "{point:?}: {ratio}");
         }

@@ -1,13 +1,13 @@
-//! Sweep-synchronous demodulation: Fourier coefficients of torque and rate at the sweep's own
-//! phase, over a window that moves with the sweep,
+//! Sweep-synchronous demodulation: Fourier coefficients of torque and rate at the phase of the sweep, over a
+//! window that moves with the sweep,
 //!
 //! ```text
 //! Y(t) = Σ w(t' − t) y(t') e^{−jφ(t')},   H(f(t)) = Y(t) / U(t)
 //! ```
 //!
-//! φ is the known phase of the sweep (it is not estimated), w a Hann window of a number of
-//! [cycles]. U uses the same window, so the window's effect on amplitude and phase cancels in H.
-//! Harmonics due to friction rotate by many cycles within the window and average out.
+//! φ is the known phase of the sweep (it is not estimated), w a Hann window of a number of [cycles]. U uses
+//! the same window, so that the window's effect on amplitude and phase cancels in H. Harmonics due to
+//! friction rotate by many cycles within the window and average out.
 
 use crate::response::FrequencyResponse;
 use crate::sweep::Sweep;
@@ -24,24 +24,25 @@ pub const CYCLES: f64 = 24.0;
 
 const MOST_MOVE: f64 = 0.015;
 
-/// Returns the number of cycles in the window at a frequency, Hz: 24, or fewer if the sweep would change by
-/// more than 1.5 % of its frequency. The minimum is 3, with which harmonics still average out.
+/// Returns the number of cycles in the window at a frequency, Hz: [`CYCLES`], or fewer if the sweep
+/// would change by more than 1.5 % of its frequency, but at least [`LEAST_CYCLES`], with which
+/// harmonics still average out.
 pub fn cycles(sweep: &Sweep, frequency: f64) -> f64 {
     let slow = MOST_MOVE * frequency.powi(2) / sweep.rate_at(frequency).abs();
     slow.clamp(LEAST_CYCLES, CYCLES)
 }
 
-/// Frequency responses, one for each output, with the data from which their uncertainty follows: `noise_gain`
-/// is the variance of H for a noise of unit power spectral density in the output, Σ|w|²/(h |U|²), at the
-/// responses' frequencies.
+/// Frequency responses, one for each output, with the data from which their uncertainty follows.
+/// `noise_gain` is the variance of H for a noise of unit power spectral density in the output, Σ|w|²/(h
+/// |U|²), at the responses' frequencies.
 pub struct Demodulated<const N: usize> {
     pub responses: [FrequencyResponse; N],
     pub noise_gain: Vec<f64>,
 }
 
-/// Returns the standard deviation of |H| over |H|, which is also the standard deviation of the
-/// phase in rad. `unexplained` is the two-sided power spectral density of the part of the output
-/// that the response does not explain, such as noise.
+/// Returns the relative standard deviation of |H|, which is also the standard deviation of the phase in rad.
+/// `unexplained` is the two-sided power spectral density of the part of the output that the response does not
+/// explain, such as noise.
 pub fn deviation(
     response: &FrequencyResponse,
     unexplained: &[f64],
@@ -78,8 +79,8 @@ pub fn frequency_responses<const N: usize>(
         let to = time.partition_point(|&t| t <= centre + half);
         let (mut u, mut squares) = (Complex64::default(), 0.0);
         let mut y = [Complex64::default(); N];
-        // From sample to sample the window's cosine rotates by the same angle. Over some hundred samples
-        // this recurrence is exact to 1e-13 and takes a fifth of the time.
+        // From sample to sample the window's cosine rotates by the same angle. This recurrence is accurate to
+        // 1e-13 over some hundred samples, and takes a fifth of the time.
         let turns = |seconds: f64| Complex64::cis(std::f64::consts::PI * seconds / half);
         let Some(first) = time.get(from) else { continue };
         let (mut window, turn) = (turns(first - centre), turns(step));

@@ -4,8 +4,8 @@ use crate::random::Random;
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
 
-/// Features of a frequency response: the frequency of the local maximum of |H|, which is the resonance, the frequency of the local minimum,
-/// which is the antiresonance, both in Hz, and the ratio of the two magnitudes, dB.
+/// Features of a frequency response: the frequency of the local maximum of |H| (resonance), the frequency of the local minimum
+/// (antiresonance), both in Hz, and the ratio of the two magnitudes, dB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
     pub f_res: Option<f64>,
@@ -20,16 +20,15 @@ pub struct Deviations {
 }
 
 impl Features {
-    /// Returns the standard deviations of the features by adding simulated errors to the response. `relative`
-    /// is the relative standard deviation of the response at each frequency, and `slope` the rate of change
-    /// of its error along the frequency relative to the error, 1/Hz. In responses with another error of this
-    /// kind 95 % of the features' shifts are below 1.96 deviations.
+    /// Returns the standard deviations of the features, by adding simulated errors to the response. `relative` is the
+    /// relative standard deviation of the response at each frequency, and `slope` the rate of change of its error along the
+    /// frequency relative to the error, 1/Hz. With other simulated errors, 95 % of the shifts of a feature are below 1.96
+    /// of its standard deviations.
     ///
-    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are
-    /// normal numbers whose deviation is the rate s, so that errors at frequencies Δf apart have the
-    /// correlation exp(−s²Δf²/2) of a Gaussian window. The slope of the error divided by the curvature of ln
-    /// |H| would be simpler, but holds only where the error is small compared with the response, which is not
-    /// the case at an antiresonance.
+    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are normal numbers with
+    /// the standard deviation s, the slope, so that errors at frequencies Δf apart have the correlation exp(−s²Δf²/2) of a
+    /// Gaussian window. The slope of the error divided by the curvature of ln |H| would be simpler, but is valid only if the
+    /// error is small compared with the response, which is not the case at an antiresonance.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -37,7 +36,7 @@ impl Features {
         slope: impl Fn(f64) -> f64,
     ) -> Deviations {
         let f = &response.frequency;
-        // Far enough for the extremum of a response with an error, and no farther, to save time.
+        // Range around a feature in which its extremum can be after an error is added; a wider range would take more time.
         let margin = 3.0 * self.delta_f().unwrap_or(f64::INFINITY);
         let near = |f: f64| self.f_dip.is_none_or(|dip| f > dip - margin);
         let first = f.partition_point(|f| !near(*f));
@@ -83,13 +82,12 @@ impl Features {
         Deviations { f_res, f_dip }
     }
 
-    /// Finds antiresonance and resonance: the two ends of the largest rise of |H| (in dB) with frequency.
+    /// Finds antiresonance and resonance: the lower and the upper end of the largest rise of |H| (in dB) with frequency.
     ///
-    /// The result equals the thesis's definition, smallest and largest |H| in the band (its 6.9 and 6.10),
-    /// where that definition works. It also works where that definition fails: a damped resonance is lower
-    /// than the band's edge at 1.25 Hz, where the hub's inertia dominates. The ripple behind the resonance
-    /// may also be lower than the antiresonance. An end of the band is neither antiresonance nor resonance,
-    /// and a rise of less than [`LEAST`] is not slosh.
+    /// The thesis's definition (its 6.9 and 6.10), the smallest and largest |H| in the band, gives the same result if the
+    /// resonance is the highest and the antiresonance the lowest point of the band. It fails if a damped resonance is lower than
+    /// |H| at the band's edge of 1.25 Hz, where the hub's inertia dominates, or if a ripple above the resonance is lower than the
+    /// antiresonance. An end of the band is neither antiresonance nor resonance, and a rise of less than [`LEAST`] is not slosh.
     pub fn find(response: &FrequencyResponse) -> Self {
         Features::find_within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
@@ -121,8 +119,7 @@ impl Features {
     }
 }
 
-/// Number of responses with simulated errors from which a standard deviation of a feature is
-/// computed; 100 determine it to 7 %.
+/// Number of simulated errors from which the standard deviation of a feature is computed; 100 determine it to 7 %.
 const DRAWS: usize = 100;
 const WAVES: usize = 8;
 
@@ -181,7 +178,7 @@ mod tests {
             Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
         let clean = Features::find(&response);
         for (f, h) in response.frequency.iter().zip(&mut response.response) {
-            // a trough of a beat 60 mHz above the resonance, 5 dB lower than the antiresonance
+            // a minimum, due to a beat, 60 mHz above the resonance and 5 dB lower than the antiresonance
             *h *= 1.0 - 0.994 * (-((f - 2.52) / 0.004_f64).powi(2)).exp();
         }
         let level = response.decibels();
@@ -195,7 +192,7 @@ mod tests {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::find(&hub.frequency_response(&grid)), Features::default());
-        // the band up to 2.4 Hz has the antiresonance but not the resonance
+        // up to 2.4 Hz the band contains the antiresonance, but not the resonance
         let early = logarithmic_grid((1.25, 2.4), 2000);
         let features = Features::find(&Linear::bench_10_cm(0.003).frequency_response(&early));
         assert!(features.f_dip.is_some() && features.f_res.is_none(), "{features:?}");

@@ -1,4 +1,5 @@
-//! Free decay: frequency and damping of an undriven oscillation, and their dependence on its amplitude,
+//! Free decay: frequency and damping of an undriven oscillation x with the amplitude A and the phase φ, and
+//! their dependence on A,
 //!
 //! ```text
 //! A'/A = −ω (ζ + ζ_A A)          ω = 2πf
@@ -6,16 +7,16 @@
 //! x    =  x₀ + s t + A cos φ
 //! ```
 //!
-//! ζ_A is the contribution of friction proportional to the square of the speed (quadratic drag, a baffle), whose
-//! decrement is proportional to the amplitude. κ is that of a hardening or softening spring. The first equation is
-//! Bernoulli's. With g = (1 − e^{−ζωt})/ζ
+//! ζ_A A is the damping by a friction proportional to the square of the speed (quadratic drag, a baffle), whose decrement
+//! is proportional to the amplitude. κ describes a hardening or softening spring. The first equation is a Bernoulli
+//! equation; its solution is
 //!
 //! ```text
-//! A = A₀ e^{−ζωt} / (1 + ζ_A A₀ g)
+//! A = A₀ e^{−ζωt} / (1 + ζ_A A₀ g),   g = (1 − e^{−ζωt})/ζ
 //! ```
 //!
-//! [`Start`] estimates all of them from the oscillation's phasor over windows of two periods, by linear least squares of its
-//! logarithm.
+//! [`Start`] estimates the parameters from the oscillation's phasor over windows of two periods, by linear least
+//! squares of its logarithm.
 
 use std::f64::consts::TAU;
 
@@ -35,15 +36,16 @@ pub struct Record<'a> {
     pub signal: &'a [f64],
 }
 
-/// Returns the amplitude at a time (s) after the beginning, where it is `start`, of an oscillation with this frequency (Hz), ζ and ζ_A.
+/// Returns the amplitude at the time `t` (s) of an oscillation with this frequency (Hz), ζ and ζ_A, whose amplitude is `start`
+/// at t = 0.
 pub fn amplitude(t: f64, start: f64, [frequency, zeta, zeta_a]: [f64; 3]) -> f64 {
     let s = TAU * frequency * t;
     let g = if (zeta * s).abs() < 1e-9 { s } else { -(-zeta * s).exp_m1() / zeta };
     start * (-zeta * s).exp() / (1.0 + zeta_a * start * g)
 }
 
-/// Evaluates the model with frequency (Hz), ζ, ζ_A and κ at the times of a record that begins at `time[0]` with the amplitude, phase,
-/// offset and slope `own`.
+/// Evaluates the model with frequency (Hz), ζ, ζ_A and κ at the times of a record. `own` contains the amplitude, phase, offset
+/// and slope at `time[0]`.
 pub fn model(time: &[f64], [frequency, zeta, zeta_a, kappa]: [f64; 4], own: [f64; 4]) -> Vec<f64> {
     let omega = TAU * frequency;
     let damped = (1.0 - zeta * zeta).max(0.0).sqrt();
@@ -64,7 +66,8 @@ pub fn model(time: &[f64], [frequency, zeta, zeta_a, kappa]: [f64; 4], own: [f64
 
 const LINES: usize = 400;
 
-/// Returns the largest line in the residual of a fit of an oscillation with this frequency (Hz): its frequency, Hz, and amplitude.
+/// Returns frequency, Hz, and amplitude of the largest other oscillation, in the residual of a fit of an oscillation
+/// with this `frequency`, Hz.
 pub fn largest_other(time: &[f64], residual: &[f64], frequency: f64) -> (f64, f64) {
     let (n, seconds) = (time.len() as f64, time[time.len() - 1] - time[0]);
     let amplitude = |f: f64| {
@@ -94,8 +97,8 @@ pub struct Start {
 }
 
 const FINE: usize = 4;
-/// Ratio of the phasor's amplitude to its largest amplitude in the record, below which the phasor
-/// is not used because noise dominates it.
+/// Smallest amplitude of the phasor, relative to its largest amplitude in the record, that is used. Smaller ones
+/// are dominated by noise.
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
@@ -129,7 +132,7 @@ impl Start {
         if frequency * seconds < LEAST_PERIODS || deviation(signal) == 0.0 {
             return None;
         }
-        // the phasor over Hann windows of two periods
+        // phasor over Hann windows of two periods
         let half = 1.0 / frequency;
         let windows = ((seconds / half) as usize * 2).clamp(8, 4000);
         let mut points: Vec<(f64, Complex64)> = Vec::new();
@@ -214,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_free_decay_of_100000_uneven_rows_is_fitted_with_a_single_fourier_transform() {
-        // 100,000 rows of 0.6 to 1.4 times the mean step: the search at every frequency took minutes
+        // the spacing is 0.6 to 1.4 times the mean step; a search with one sum per frequency took minutes
         let mut random = Random::new(5, 0);
         let mut time = vec![0.0];
         for _ in 1..100_000 {

@@ -18,8 +18,8 @@ pub struct Noise {
     pub time: f64,
 }
 
-/// Whitening filter for the rows of one recording: for each row φ of the preceding step, the Kalman gain K,
-/// and 1/sqrt(innovation variance); `log_variance` is Σ ln(innovation variance).
+/// Whitening filter for the rows of one recording. For each row it contains φ of the preceding step, the
+/// Kalman gain K, and 1/sqrt(innovation variance); `log_variance` is Σ ln(innovation variance).
 pub struct Whitening {
     rows: Vec<[f64; 3]>,
     log_variance: f64,
@@ -30,15 +30,15 @@ impl Noise {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }
 
-    /// Returns the whitening filter for rows at these times, s. Rows that are not `fresh` carry no new
-    /// information; their innovation is 0.
+    /// Returns the whitening filter for rows at these times, s. Rows that are not `fresh` contain no new
+    /// measurement; their innovation is 0.
     pub fn whitening(&self, time: &[f64], fresh: Option<&[bool]>) -> Whitening {
         let (white, drift) = (self.white.powi(2), (self.white * self.drift).powi(2));
         let mut variance = drift;
         let mut log_variance = 0.0;
         let mut rows = Vec::with_capacity(time.len());
         let (mut last_step, mut keep) = (0.0, 1.0);
-        // Once the filter has settled its gains are constant.
+        // The gains of a settled filter are constant.
         let (mut last_innovation, mut settled) = (f64::NEG_INFINITY, ([1.0, 0.0, 1.0], 0.0));
         for k in 0..time.len() {
             if k > 0 {
@@ -68,7 +68,7 @@ impl Noise {
 }
 
 impl Whitening {
-    /// Replaces a residual, or a sensitivity, by innovations divided by their standard deviation.
+    /// Replaces a residual, or a sensitivity, by its innovations divided by their standard deviation.
     pub fn apply(&self, signal: &mut [f64]) {
         let mut bias = 0.0;
         for (value, [keep, gain, scale]) in signal.iter_mut().zip(&self.rows) {

@@ -1,14 +1,14 @@
-//! Tests whether the residual of a model is the gyro's noise. The innovations are then white with unit variance (Ljung,
-//! System Identification, chapter 16).
+//! Tests whether the residual of a model is the gyro's noise. If it is, its innovations are white with unit variance
+//! (Ljung, System Identification, chapter 16).
 //!
 //! * whiteness: Ljung and Box's Q of the autocorrelations up to [`LAGS`];
-//! * in time: power in windows of [`WINDOW`] rows against the white noise level, which a burst or a clipped
-//!   stretch raises;
+//! * in time: power in windows of [`WINDOW`] rows, compared with the level of the white noise; a burst or a
+//!   clipped part raises it;
 //! * in frequency: power in bands of the periodogram;
-//! * cross-correlation with the torque and with its square: a dependence on the input is missing in
-//!   the model.
+//! * cross-correlation with the torque and with its square: a correlation shows that the model lacks an
+//!   effect of the input.
 //!
-//! With many rows each test is sensitive to effects of no importance, so the result includes the
+//! With many rows each test is sensitive to negligible effects, so that the result also contains the
 //! size of the excess.
 
 use fourier::Forward;
@@ -25,14 +25,13 @@ const FEWEST_LINES: usize = 4;
 /// exceeds it with the probability 1e-6, and any of about a hundred tests with 1e-4.
 pub const LIMIT: f64 = 5.0;
 
-/// Results of the tests, in standard deviations of the results that chance would give.
+/// Results of the tests. Each is in standard deviations of the result that pure noise would give.
 ///
 /// - `whiteness`: result of the whiteness test.
-/// - `in_time`, `in_frequency`: largest excess of the power in a time window or a frequency band, with its
-///   time, s, or frequency, Hz.
-/// - `torque`, `torque_squared`: largest cross-correlation with an input, or with its square, over lags up to
-///   2 s.
-/// - `excess`: root mean square of the residual above the noise in the worst band, rad/s.
+/// - `in_time`, `in_frequency`: largest excess of the power in a time window or a frequency band, with its time,
+///   s, or frequency, Hz.
+/// - `torque`, `torque_squared`: largest cross-correlation with an input, or with its square, over lags up to 2 s.
+/// - `excess`: root mean square of the residual above the noise in the worst band, rad/s (not in standard deviations).
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Tests {
     pub whiteness: f64,
@@ -77,7 +76,6 @@ impl Tests {
             .sum();
         let step = (time[time.len() - 1] - time[0]) / (count - 1.0);
         let window = WINDOW.min(e.len());
-        // Windows that contain only noise.
         let windows: Vec<(f64, f64)> = e
             .chunks_exact(window)
             .enumerate()
@@ -110,12 +108,12 @@ fn normal(chi_squared: f64, n: f64) -> f64 {
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the largest excess of a level over the median of all levels, as a standard normal
-/// deviate, and the position (time or frequency) of this level. Each level is a mean of `n`
-/// squares; the conversion makes an excess equally rare for every n.
+/// Returns the largest excess of a level over the median of all levels, as a standard normal deviate, and the time
+/// or frequency of this level. Each level is a mean of `n` squares; the conversion makes the same deviate equally
+/// rare for every n.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
-    // The median of χ² is below its mean.
+    // The median of χ² is below its mean, which is used here.
     let middle = median(&values).unwrap_or(0.0) / (1.0 - 2.0 / (9.0 * n)).powi(3);
     levels
         .iter()
@@ -181,7 +179,7 @@ mod tests {
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
         let tests = Tests::run(&time, &[&torque], &white, 1.0);
         assert!(tests.passed(), "{tests:?}");
-        // a tenth of the noise, only in the band of the torque
+        // a tenth of the noise, in the frequency band of the torque only
         let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
         let tests = Tests::run(&time, &[&torque], &leaking, 1.0);
         assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");

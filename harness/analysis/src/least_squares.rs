@@ -25,8 +25,8 @@ pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector
     a.svd(true, true).solve(b, least).ok()
 }
 
-/// Minimises the sum of squares, starting at `x`, by the Levenberg–Marquardt method. Derivatives are
-/// evaluated only where residuals were evaluated last.
+/// Minimises the sum of squares, starting at `x`, by the Levenberg–Marquardt method. `derivatives` is called
+/// only at the point for which `residuals` was called last.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
     let method = LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9);
     minimise_by(&method, residuals, derivatives, x)
@@ -99,7 +99,8 @@ mod tests {
         let residuals = |x: &[f64]| vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let derivatives = |x: &[f64]| Some(differences(&residuals, x, &[1e-5, 1e-5]));
         let found = minimise(&residuals, &derivatives, &[-1.2, 1.0]);
-        // the residual is 0 there, so the last step is quadratic in the step before, of 1e-9 of x
+        // the residual at the minimum is 0, so that convergence is quadratic: the last step before
+        // was 1e-9 of x
         assert!(found.converged && (found.x[0] - 1.0).abs() + (found.x[1] - 1.0).abs() < 1e-8);
     }
 }

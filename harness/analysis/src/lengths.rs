@@ -1,13 +1,13 @@
-//! Lengths of windows, lags and segments. They follow from the band and duration of the torque, so that slosh with a
-//! period of 20 s in a spacecraft is resolved as well as slosh with 0.4 s on a bench. For the thesis's sweep, 1.25 to
-//! 3.5 Hz in 2700 s, they are 24 cycles, 200 s and 20 s.
+//! Lengths of windows, lags and segments. They follow from the frequency band and the duration of the torque, so that
+//! slosh with a period of 20 s in a spacecraft is resolved as well as slosh with 0.4 s on a bench. For the thesis's sweep,
+//! 1.25 to 3.5 Hz in 2700 s, a window has 24 cycles, the longest lag is 200 s, and a segment has 20 s.
 
 use crate::response::BAND;
 use crate::sweep::Sweep;
 use crate::{spa, welch};
 
-/// Number of samples per cycle of the band's highest frequency that an estimate from a whole record needs.
-/// The thesis's sweep has 14.3.
+/// Number of samples per cycle of the band's highest frequency that an estimate from a whole record needs. The thesis's
+/// sweep has 14.3 samples per cycle.
 const SAMPLES: f64 = 14.0;
 const MOST_LAG: f64 = 0.5;
 
@@ -46,7 +46,6 @@ mod tests {
     use crate::demodulation::cycles;
     use crate::sweep::{Law, Sweep};
 
-    /// A lag window of 200 s and segments of 20 s for the sweep from 1.25 to 3.5 Hz in 2700 s.
     #[test]
     fn the_thesis_sweep_has_the_window_lengths_of_the_thesis() {
         for law in [Law::Exponential, Law::Linear] {
@@ -59,13 +58,13 @@ mod tests {
         }
     }
 
-    /// Window lengths for a sweep from 0.01 to 0.3 Hz scale with the mean period; a sweep of 2700 s limits them to half of
-    /// the record.
+    /// The window of a sweep from 0.01 to 0.3 Hz is proportional to the mean period. If the sweep takes only 2700 s, the
+    /// window is half of the record.
     #[test]
     fn a_slow_spacecraft_has_longer_windows_and_a_fast_sweep_fewer_cycles() {
         let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };
         let lengths = Lengths::for_record(slow.band(), Some(&slow), 40_000.0, 0.1);
-        // 200 s times sqrt(1.25 3.5)/sqrt(0.01 0.3); 10 Hz over 0.3 Hz is 33 samples a cycle
+        // lag: 200 s times sqrt(1.25 3.5)/sqrt(0.01 0.3); decimation: 10 Hz divided by 0.3 Hz is 33 samples per cycle
         assert!((lengths.lag - 7637.6).abs() < 0.1, "{lengths:?}");
         assert_eq!(lengths.decimation, 2);
         let fast = Sweep { duration: 2700.0, ..slow };

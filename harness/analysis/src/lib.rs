@@ -1,12 +1,12 @@
-//! Frequency responses from torque to hub rate, from a run's signals, and their features.
+//! Frequency responses from torque to hub rate, estimated from the signals of a run, and their features.
 //!
-//! Three estimators answer different questions, and a fourth is for records that are too short for
-//! them:
-//! * [`demodulation`]: the hub's response while the sweep passes a frequency, like a lock-in
-//!   amplifier. It provides `features.csv`.
-//! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as in the thesis. The report
-//!   compares it with the first.
-//! * [`welch`]: the H1 estimate from averaged segments, the usual transfer function of two records.
+//! Three estimators answer different questions, and a fourth is for records that are too short for them:
+//! * [`demodulation`]: the hub's response while the sweep passes a frequency, as a lock-in amplifier measures
+//!   it. It provides `features.csv`.
+//! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as in the thesis. The report compares
+//!   it with the response from demodulation.
+//! * [`welch`]: the H1 estimate from averaged segments, the usual estimate of a transfer
+//!   function from two signals.
 //! * [`rational`]: a transfer function fitted to the spectra of the whole record.
 
 pub mod allan;

@@ -77,10 +77,10 @@ impl Linear {
         self.propagate(&step, torque, slopes, start)
     }
 
-    /// Simulates the hub's rate for a torque given by its value at the beginning of each step, N·m,
-    /// and its slope over the step, N·m/s. `step` returns the length of each step, s. The result is
-    /// exact, because it uses the matrix exponential of the states and of the torque's value and
-    /// slope. The states are ω, for each mode y = l α and y', and the hub's angle.
+    /// Simulates the hub's rate for a torque given by its value at the beginning of each step, N·m, and its slope over
+    /// the step, N·m/s. `step` returns the length of each step, s. The result is exact, because it uses the matrix
+    /// exponential of the states together with the torque's value and slope. The states are ω, y = l α and y' for each
+    /// mode, and the hub's angle.
     fn propagate(
         &self,
         step: &dyn Fn(usize) -> f64,
@@ -110,7 +110,7 @@ impl Linear {
             flow[(y + 1, y + 1)] -= 2.0 * mode.damping * w;
         }
         flow[(n, n + 1)] = 1.0;
-        // Steps that differ only by rounding share one exponential.
+        // Steps whose lengths differ only by rounding share one exponential.
         let mut flows: BTreeMap<i64, DMatrix<f64>> = BTreeMap::new();
         let mut x = vec![0.0; n];
         x[0] = start;
@@ -155,7 +155,7 @@ impl Linear {
         Self::bench(1.3304311085, 0.7562932719, 2.3436181431, damping)
     }
 
-    /// Returns the thesis's bench with 5 cm of water; otherwise as [`Linear::bench_10_cm`].
+    /// Returns the thesis's bench with 5 cm of water; everything else is as in [`Linear::bench_10_cm`].
     pub fn bench_5_cm(damping: f64) -> Self {
         Self::bench(0.4165810206, 0.6267811696, 2.1335346636, damping)
     }
@@ -180,11 +180,10 @@ mod tests {
     use crate::{demodulation, spa};
     use std::f64::consts::TAU;
 
-    /// The exact simulation of a free hub holds each sample of a torque with jumps; the rate equals the integral.
+    /// Each sample of a torque with jumps is held. The rate of the free hub equals the integral of the torque.
     #[test]
     fn a_torque_jump_is_not_taken_for_a_slope() {
-        // a free hub: 0.2 N·m for a second, 0 for a second, -0.2 for a third; edges between samples
-        // 0.1 s apart
+        // a free hub: 0.2 N·m for 1 s, 0 for 1 s, -0.2 N·m for 1 s; the jumps are between samples 0.1 s apart
         let hub = Linear { inertia: 0.4, arm: 0.2, ..Linear::default() };
         let torque: Vec<f64> = (0..40)
             .map(|k| match k {
@@ -198,7 +197,7 @@ mod tests {
         for (k, expected) in [(5, 0.25), (10, 0.5), (20, 0.5), (25, 0.25), (30, 0.0), (39, 0.0)] {
             assert!((rates[k] - expected).abs() < 1e-14, "{k}: {}", rates[k]);
         }
-        // steps of any length, cut anywhere: 0.2 N·m for 0.25 s
+        // steps of any length, also across the jumps: 0.2 N·m for 0.25 s
         let rates =
             hub.simulate_ramps(&[0.0, 0.05, 0.25, 1.0], &[0.2, 0.2, 0.0, 0.0], &[0.0; 4], 0.0);
         for (rate, expected) in rates.iter().zip([0.0, 0.025, 0.125, 0.125]) {
@@ -215,14 +214,15 @@ mod tests {
                 (0..40_000).map(|k| (TAU * f * f64::from(k) * step).sin()).collect();
             let rate = plant.simulate(step, &torque, 0.0);
             let largest = rate[35_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
-            // after 70 s the initial transient has decayed; error of the sine's chords and the
-            // sampled maximum: (w h)²/8
+            // after 70 s the transient has decayed; the errors of linear interpolation and of the sampled
+            // maximum are (w h)²/8
             assert!((largest / plant.response(f).norm() - 1.0).abs() < 2e-4, "{largest}");
         }
     }
 
-    /// Integrates the linear bench, driven by a sweep sampled at 50 Hz and joined by lines, with RK4 in 2.5
-    /// ms (phase error over a whole sweep: 2e-5 rad). Returns time, torque and rate.
+    /// Integrates the linear bench by the Runge–Kutta method of fourth order with steps of 2.5 ms (phase error
+    /// over a whole sweep: 2e-5 rad). The torque is a sweep, sampled at 50 Hz and interpolated linearly. Returns
+    /// time, torque and rate.
     fn swept(plant: &Linear, sweep: &Sweep) -> [Vec<f64>; 3] {
         let mode = plant.modes[0];
         let (w, r) = (TAU * mode.frequency, plant.arm);
@@ -260,7 +260,8 @@ mod tests {
         signals
     }
 
-    /// Sweeps from 3.5 to 1.25 Hz of the exact linear bench, evaluated by lock-in demodulation and by spectral analysis.
+    /// Sweeps from 3.5 to 1.25 Hz on the exact linear bench are evaluated by lock-in demodulation
+    /// and by spectral analysis.
     #[test]
     fn a_downward_sweep_finds_the_same_antiresonance_and_a_resonance_shifted_downwards() {
         let grid = logarithmic_grid(BAND, 2000);
@@ -273,21 +274,20 @@ mod tests {
             assert_eq!(lock_in.frequency.len(), grid.len());
             let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
             let (lock_in, spa) = (Features::find(&lock_in), Features::find(&spa));
-            // the whole-record estimate does not depend on direction: the bounds of the upward
-            // sweep
+            // the estimate from the whole record does not depend on the direction: same limits as for the upward sweep
             assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
             assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{law:?}: {spa:?}");
-            // the resonance was passed 125 s before the antiresonance and still rings with
-            // exp(-0.0525 * 125) of its 2.2 (rad/s)/(N.m); near the antiresonance |H| grows by 1.5
-            // per hertz: 2 mHz
+            // the resonance was passed 125 s before the antiresonance, and still oscillates with exp(-0.0525 * 125) of
+            // its 2.2 (rad/s)/(N.m); near the antiresonance |H| grows by 1.5 per hertz, so that the shift is 2 mHz
             assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-3, "{law:?}: {lock_in:?}");
-            // the shift of the upward sweep with opposite sign
+            // same shift as in the upward sweep, in the opposite direction
             let shift = f_res - lock_in.f_res.unwrap();
             assert!((0.014..0.020).contains(&shift), "{law:?}: {lock_in:?}");
         }
     }
 
-    /// Sweeps from 1.25 to 3.5 Hz of the exact linear bench, evaluated by lock-in demodulation and by spectral analysis.
+    /// Sweeps from 1.25 to 3.5 Hz on the exact linear bench are evaluated by lock-in demodulation
+    /// and by spectral analysis.
     #[test]
     fn both_estimators_find_the_antiresonance_and_the_sweep_shifts_the_resonance_upwards() {
         let grid = logarithmic_grid(BAND, 2000);
@@ -303,15 +303,13 @@ mod tests {
                         .responses;
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
                 let (lock_in, spa) = (Features::find(&lock_in), Features::find(&spa));
-                // the acceptance limit for the antiresonance is 2 mHz; both are several times
-                // better
+                // the required accuracy of the antiresonance is 2 mHz; both estimators are several times better
                 assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {lock_in:?}");
                 assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
-                // the whole-record estimate does not depend on the sweep rate: the resonance is
-                // right to a fraction of the 5 mHz resolution
+                // the estimate from the whole record does not depend on the sweep rate: the resonance is correct to a
+                // fraction of the 5 mHz resolution
                 assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{law:?}: {spa:?}");
-                // while the sweep passes, the resonance appears late by about its half-power width,
-                // 14 and 15 mHz
+                // in the lock-in estimate the resonance appears late by about its half-power width, 14 and 15 mHz
                 let shift = lock_in.f_res.unwrap() - f_res;
                 assert!((0.014..0.020).contains(&shift), "{law:?}: {lock_in:?}");
             }

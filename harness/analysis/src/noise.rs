@@ -1,10 +1,11 @@
-//! Estimates the part of an output that no linear response to the input explains: gyro noise, and the effects
-//! of dry friction and a nonlinear liquid. It determines the uncertainty of a frequency response.
+//! Estimates the part of an output that no linear response to the input explains: noise of the
+//! gyro, and the effects of dry friction and a nonlinear liquid. This part determines the
+//! uncertainty of a frequency response.
 //!
 //! The method is the local rational method (McKelvey and Guérin, *Non-parametric frequency response
 //! estimation using a local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A
-//! Frequency Domain Approach*, 2nd ed., 2012, chapter 7). At line k of the whole record's spectra and n lines
-//! on either side,
+//! Frequency Domain Approach*, 2nd ed., 2012, chapter 7). At line k of the whole record's spectra and n
+//! lines on either side,
 //!
 //! ```text
 //! (1 + a r) Y(k + r) = (b0 + b1 r + b2 r²) U(k + r) + t0 + t1 r + t2 r² + (1 + a r) V(k + r),   |r| ≤ n
@@ -23,12 +24,13 @@ const LINES: usize = 2 * SIDE + 1;
 /// Number of unknowns of the local rational model: b0, b1, b2, t0, t1, t2, a.
 const UNKNOWNS: usize = 7;
 
-/// Returns the two-sided power spectral density of V (unit of the output squared, times s) at `frequencies`
-/// (Hz), for signals sampled every `step` s. It is NaN where no estimate is possible. It is the mean of five
-/// residuals around the frequency, because a single one has only six degrees of freedom; with five a
-/// deviation is known to 20 %.
+/// Returns the two-sided power spectral density of the unexplained part V (unit of the output squared, times
+/// s) at `frequencies` (Hz), for signals sampled every `step` s. It is NaN where no estimate is possible. It
+/// is the mean of five residuals around the frequency, because a single residual has only six degrees of
+/// freedom; five determine a standard deviation to 20 %.
 pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
-    // N steps have N + 1 samples. N is usually a round number, whose transform is twice as fast.
+    // A record of N steps has N + 1 samples. N is used because it is usually a round number, whose transform
+    // is twice as fast.
     let count = input.len() / 2 * 2;
     let transform = Forward::new(count);
     let (u, y) = (
@@ -91,8 +93,8 @@ mod tests {
 
     const STEP: f64 = 0.02;
 
-    /// Returns the thesis's sweep with this torque amplitude, N·m, its torque, and the rate of the
-    /// linear bench under it.
+    /// Returns the thesis's sweep with this torque amplitude, N·m, the torque, and the rate
+    /// of the linear bench.
     fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
         let sweep = Sweep { amplitude, ..Sweep::THESIS };
         let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();
@@ -107,19 +109,20 @@ mod tests {
         let clean = power(STEP, &torque, &rate, &grid);
         // the thesis's gyro: 5.75e-5 rad/s/√Hz
         let density = 5.75e-5_f64.powi(2);
-        // antiresonance and resonance included: four decades below the gyro's noise
+        // also at antiresonance and resonance, the estimate is four decades below the gyro's noise
         assert!(clean.iter().all(|s| *s < 1e-4 * density), "{clean:?}");
         let mut random = crate::random::Random::new(3, 0);
         rate.iter_mut().for_each(|rate| *rate += (density / STEP).sqrt() * random.normal());
         let noisy = power(STEP, &torque, &rate, &grid);
         let mean = noisy.iter().sum::<f64>() / noisy.len() as f64;
-        // 200 of 2,700 lines, six degrees of freedom of each: 4 %; neighbours share lines
+        // 200 of 2,700 lines with six degrees of freedom each determine the mean to 4 %, and less accurately
+        // because neighbours share lines
         assert!((mean / density - 1.0).abs() < 0.15, "{mean:e}");
     }
 
     #[test]
-    fn the_scatter_of_the_features_over_24_noise_seeds_equals_the_stated_standard_deviation() {
-        // a small one of the thesis's torques, at which the gyro's noise is seen; 24 noises
+    fn the_predicted_standard_deviation_of_the_features_equals_their_scatter_over_24_noise_seeds() {
+        // one of the thesis's smaller torques, with which the gyro's noise matters; 24 seeds of the noise
         let (sweep, torque, rate) = sweep(0.05);
         let near = logarithmic_grid((2.25, 2.6), 300);
         let lag = lengths::Lengths::for_record(BAND, Some(&sweep), 2700.0, STEP).lag;
@@ -157,7 +160,7 @@ mod tests {
             let stated = stated.iter().sum::<f64>() / 24.0;
             ratios.push(stated / scatter);
         }
-        // 24 noise records determine a scatter to 15 %; the limit is three times that
+        // 24 seeds determine a standard deviation to 15 %; three times that is allowed
         assert!(ratios.iter().all(|ratio| (0.6..1.7).contains(ratio)), "{ratios:?}");
     }
 }

@@ -1,5 +1,4 @@
-//! Computes the share of the liquid's force that does not act about the hub's axis (thesis 6.3.6, as far as
-//! it shows on a hub that cannot tilt).
+//! Computes the fraction of the liquid's force that does not act about the hub's axis (thesis 6.3.6).
 //!
 //! The thesis uses the rates of a gyro about x and y, because the liquid's force tilts a platform. On a hub
 //! that cannot tilt, the tangential force F_t turns the hub, and the radial force F_r only loads the bearing.
@@ -10,7 +9,7 @@
 //! ```
 //!
 //! The leakage uses the Fourier coefficients at the sweep's phase (from demodulation); r is the tank's
-//! distance from the axis. The radial force of a planar wave, which is its centripetal force, is only at
+//! distance from the axis. The radial force of a planar wave, which is its centripetal force, oscillates at
 //! twice the sweep's frequency and causes no leakage. A circular wave has the fraction 1/2 on average.
 
 use crate::response::FrequencyResponse;
@@ -55,12 +54,14 @@ impl OffAxis {
 }
 
 /// Computes the figures for a platform that may tilt, from its rates (rad/s) about the hub's axis and about
-/// other axes, each with its response to the torque. As in the thesis, CEF = Σω_i²/(Σω_i² + ω²) and L =
-/// √(Σ|H_i|²)/|H|. Returns the leakage at the responses' frequencies first, and `None` without another rate.
+/// other axes, each with its response H to the torque. As in the thesis, the cross-axis energy fraction is
+/// CEF = Σω_i²/(Σω_i² + ω²), and the leakage L = √(Σ|H_i|²)/|H|. Returns the leakage at the responses'
+/// frequencies, then the figures; `None` without a rate about another axis.
 ///
-/// Each rate is used relative to its mean. Otherwise a gyro's bias would count as energy: a bias of 1 deg/s
-/// about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`] keeps the means of
-/// the forces, because no sensor measures them and the centripetal force of a wave has a mean.
+/// The mean of each rate is subtracted. Otherwise the bias of a gyro would count as energy: a bias of 1
+/// deg/s about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`] does not
+/// subtract the means of the forces, because they are not measured by a biased sensor, and the centripetal
+/// force of a wave has a mean.
 pub fn off_axis_from_rates(
     response: &FrequencyResponse,
     rate: &[f64],
@@ -113,8 +114,8 @@ mod tests {
         assert_eq!(off_axis_from_rates(&all, &rate, &[]), (Vec::new(), None));
     }
 
-    /// The rates are 0.1 rad/s about the axis and a twentieth about x and y, with a gyro's bias of up to 5
-    /// deg/s on each axis.
+    /// The rates are 0.1 rad/s about the axis and a twentieth of that about x and y, with a gyro's bias of up
+    /// to 5 deg/s on each axis.
     #[test]
     fn a_bias_of_up_to_5_deg_s_on_any_axis_does_not_change_the_cross_axis_energy_fraction() {
         let wave = |size: f64, phase: f64| -> Vec<f64> {
@@ -130,27 +131,26 @@ mod tests {
             off_axis_from_rates(&none, &rate, &[(&none, &x), (&none, &y)]).1.unwrap()
         };
         let without = found([0.0; 3]);
-        // 2 * 0.05^2 over all three
+        // 2 * 0.05² divided by the sum over all three axes
         assert!((without.energy - 0.005 / 1.005).abs() < 1e-4, "{}", without.energy);
         for axis in 0..3 {
             for bias in [-5.0, 0.1, 1.0, 5.0] {
                 let mut biases = [0.0; 3];
                 biases[axis] = bias;
                 let with = found(biases);
-                // rounding of a bias 17 times the rate is 1e-14
+                // rounding of a bias that is 17 times the rate: 1e-14
                 assert!((with.energy / without.energy - 1.0).abs() < 1e-9, "{biases:?}: {with:?}");
                 assert!((with.median / without.median - 1.0).abs() < 1e-9, "{biases:?}: {with:?}");
             }
         }
     }
 
-    /// The cross-axis energy fraction of a force on a circle is 0.5, of a force along the tangent 0.
     #[test]
     fn half_of_a_circling_force_is_off_axis_and_none_of_a_tangential_force() {
         let turn = |k: usize| (k as f64 * std::f64::consts::TAU / 1000.0).sin_cos();
         let (sine, cosine): (Vec<f64>, Vec<f64>) = (0..1000).map(turn).unzip();
         let circle = OffAxis::from_forces(&sine, &cosine, &[3.0, 4.0]);
-        // the median lies between two samples' fractions, 6e-3 apart there
+        // the median is between the fractions of two samples, which differ by 6e-3
         assert!((circle.energy - 0.5).abs() < 1e-12 && (circle.median - 0.5).abs() < 1e-2);
         assert!((circle.leakage - 12.5_f64.sqrt()).abs() < 1e-12);
         let line = OffAxis::from_forces(&[0.0; 1000], &cosine, &[]);

@@ -11,7 +11,8 @@ pub struct Random(Pcg64);
 impl Random {
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = Pcg64::new(seed.into(), stream.into());
-        // Seeds and streams that differ in few bits begin similarly, so the first numbers are dropped.
+        // The first numbers are dropped, because seeds and streams that differ in few bits
+        // begin with similar numbers.
         for _ in 0..16 {
             generator.next_u64();
         }
@@ -36,7 +37,7 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_random_numbers_on_every_machine() {
-        // the same from PCG's definition in Python's integers
+        // the same numbers were computed from PCG's definition with Python's integers
         let mut random = Random::new(1, 2);
         let bits = [random.uniform(), random.normal()].map(f64::to_bits);
         assert_eq!(bits, [4607160018058674131, 13828960616544136822]);

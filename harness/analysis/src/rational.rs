@@ -21,8 +21,7 @@ use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use fourier::Complex64;
 
-/// Largest number of spectral lines in a fit. If the band has more, lines at equal distances are
-/// selected.
+/// Largest number of spectral lines in a fit. From a band with more lines, equally spaced ones are selected.
 const POINTS: usize = 1500;
 const LEAST: usize = 20;
 const ROUNDS: usize = 20;
@@ -30,7 +29,7 @@ const ROUNDS: usize = 20;
 type Spread = [[f64; 6]; 9];
 
 /// The fitted transfer function, with s in units of the band's centre `unit`, rad/s. `misfit` is the root
-/// mean square of the fit's residual, relative to |Y|; `spread` is the square root of the covariance of
+/// mean square of the fit's residual, relative to |Y|. `spread` is the square root of the covariance of
 /// numerator and denominator, with one column for each unknown of the fit.
 #[derive(Clone, Debug)]
 pub struct Rational {
@@ -41,9 +40,8 @@ pub struct Rational {
 }
 
 impl Rational {
-    /// Fits the transfer function to torque, N·m, and rate, rad/s, sampled every `step` s, with
-    /// their spectra between the frequencies `from` and `to`, Hz. Returns `None` if the spectra
-    /// have no lines in between.
+    /// Fits the transfer function to torque, N·m, and rate, rad/s, sampled every `step` s, from their spectra
+    /// between the frequencies `from` and `to`, Hz. Returns `None` if the spectra have no lines in this band.
     pub fn fit(step: f64, torque: &[f64], rate: &[f64], (from, to): (f64, f64)) -> Option<Self> {
         let count = torque.len();
         let bin = 1.0 / (step * count as f64);
@@ -73,8 +71,8 @@ impl Rational {
     }
 
     /// Returns the relative standard deviation of the response at `frequencies` (Hz), and the standard
-    /// deviations of its antiresonance and resonance. They follow from the response's changes when each
-    /// column of the covariance's root is added to the coefficients.
+    /// deviations of its antiresonance and resonance. They are computed by adding each column of the
+    /// covariance's square root to the coefficients.
     pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
         let nominal = self.frequency_response(frequencies);
         let found = Features::find(&nominal);
@@ -113,8 +111,8 @@ impl Rational {
     }
 }
 
-/// Solves least squares for nine unknowns. Also returns the root mean square residual, and a root of the
-/// covariance of the first and the last three unknowns.
+/// Solves the least-squares problem of nine unknowns. Also returns the root mean square residual, and the
+/// rows of a square root of the covariance for the first and the last three unknowns.
 fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, Spread))> {
     let sizes = DVector::from_iterator(9, a.column_iter().map(|column| column.norm().max(1e-300)));
     for (mut column, size) in a.column_iter_mut().zip(&sizes) {
@@ -143,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_short_record_still_separates_antiresonance_from_resonance() {
-        // 800 kg m2: poles of the same plant as zeros and poles of a transfer function
+        // a craft of 800 kg m2: its poles are given as zeros and poles of the transfer function
         let tf = TransferFunction {
             numerator: [1.0 / 800.0, 2.0 * 0.004 * 0.2752 / 800.0, 0.2752 * 0.2752 / 800.0],
             real_pole: 1e-4,
@@ -158,8 +156,8 @@ mod tests {
         let found = Rational::fit(step, &torque, &rate, band).unwrap();
         let features = Features::find(&found.frequency_response(&logarithmic_grid(band, 2000)));
         let (antiresonance, resonance) = (0.2752 / TAU, 0.2827 / TAU);
-        // a separation of 1.1 mHz is little more than one period of the record; the error of a
-        // thousandth of the frequency is due to sampling
+        // the separation of 1.1 mHz is little more than one period in the record; sampling causes an error of
+        // a thousandth of the frequency
         assert!((features.f_dip.unwrap() / antiresonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!((features.f_res.unwrap() / resonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!(found.misfit < 0.2, "{}", found.misfit);

@@ -19,9 +19,9 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Fits the model to the measured response and simulates it with the run's own torque. Signals are
-    /// sampled every `step` s. Returns the fit together with the spectra of torque and residual in segments
-    /// of `segment` s, or `None` without a response.
+    /// Fits the model to the measured response, and simulates it with the run's torque. Signals are sampled
+    /// every `step` s. Returns the fit together with the spectra of torque and residual in segments of
+    /// `segment` s, or `None` without a response.
     pub fn fit(
         step: f64,
         segment: f64,

@@ -1,4 +1,4 @@
-//! Frequency responses and their grids.
+//! Frequency responses and their frequency grids.
 
 use fourier::Complex64;
 

@@ -1,6 +1,6 @@
-//! Statistics of a gyro's record at rest: Allan variances, and checks of their assumption of normal, white and
-//! stationary noise (thesis 5.5.3). The checks are quantiles, histogram and Kolmogorov and Smirnov's distance compared with the
-//! normal distribution, autocorrelation, and statistics of chunks.
+//! Statistics of a gyro's record at rest: Allan variances, and checks whether the noise is normal, white and stationary, as
+//! they assume (thesis 5.5.3). The checks are quantiles, histogram and Kolmogorov–Smirnov distance compared with the normal
+//! distribution, autocorrelation, and statistics of chunks.
 
 use fourier::{Forward, Inverse};
 
@@ -9,8 +9,7 @@ use crate::statistics::{deviation, mean, variance};
 
 const QUANTILES: usize = 200;
 const CHUNKS: usize = 1000;
-/// Largest magnitude that the histogram shows, and the usual width of its bins, both in standard
-/// deviations of the readings.
+/// Range of the histogram to both sides, and the usual width of its bins, both in standard deviations of the readings.
 const BINS: (f64, f64) = (5.0, 0.1);
 /// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat.
 /// Assoc. 69, 1974, table 1A, case 3: mean and variance estimated).
@@ -49,8 +48,8 @@ pub struct Chunk {
     pub from: f64,
     pub mean: f64,
     pub variance: f64,
-    /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance,
-    /// multiplied by √n − 0.01 + 0.85/√n (Stephens). Quantisation alone makes it Δ √n/(2σ√(2π)).
+    /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance, multiplied by √n
+    /// − 0.01 + 0.85/√n (Stephens). Quantisation with the step Δ alone makes it Δ √n/(2σ√(2π)).
     pub kolmogorov: f64,
     /// Kolmogorov–Smirnov distance evaluated only midway between the levels of the readings, where quantisation has no
     /// effect. The variance of the readings is reduced by the variance of the quantisation error, Δ²/12 (Sheppard).
@@ -124,15 +123,15 @@ impl Rest {
         12.0 * (self.deviation / self.quantum).powi(2)
     }
 
-    /// Returns the numbers of chunks that exceed [`KOLMOGOROV`], by the distance at the readings and by the
-    /// distance between their levels.
+    /// Returns how many chunks are not normal, because their distance exceeds [`KOLMOGOROV`]: first with the distance at the
+    /// readings, then with the distance between their levels.
     pub fn not_normal(&self) -> [usize; 2] {
         let count =
             |of: fn(&Chunk) -> f64| self.chunks.iter().filter(|c| of(c) > KOLMOGOROV).count();
         [count(|chunk| chunk.kolmogorov), count(|chunk| chunk.between_levels)]
     }
 
-    /// Returns half of the 95 % interval of white noise's autocorrelation, 1.96/√n.
+    /// Returns half of the width of the 95 % interval of white noise's autocorrelation, 1.96/√n.
     pub fn white_bound(&self) -> f64 {
         1.96 / (self.count as f64).sqrt()
     }
@@ -145,10 +144,9 @@ impl Rest {
         out as f64 / rest.len().max(1) as f64
     }
 
-    /// Returns two ratios for chunks of `chunk` samples: the standard deviation of the chunks'
-    /// means over the value that white noise would have, and the standard deviation of the chunks'
-    /// variances over the value that normal noise would have (√(2/n) of the variance). Both are 1
-    /// for white, stationary noise.
+    /// Returns two ratios for chunks of `chunk` samples: the standard deviation of the chunks' means divided by its value for
+    /// white noise, and the standard deviation of the chunks' variances divided by its value for normal noise (√(2/n) of the
+    /// variance). Both are 1 for white, stationary noise.
     pub fn scatter(&self, chunk: usize) -> [f64; 2] {
         let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
         let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();
@@ -226,8 +224,7 @@ fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Returns the quantile of the standard normal distribution for the probability `part`, by Newton's method on
-/// erfc.
+/// Returns the quantile of the standard normal distribution for the probability `part`, by Newton's method for erfc.
 pub fn normal_quantile(part: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..60 {
@@ -259,18 +256,18 @@ mod tests {
         assert!((rest.deviation / 4e-4 - 1.0).abs() < 0.01);
         assert!(rest.skewness.abs() < 0.03 && rest.kurtosis.abs() < 0.06);
         assert_eq!((rest.chunks.len(), rest.autocorrelation.len()), (20, 501));
-        // 500 lags of which 5 % lie outside, ± 1 %
+        // 5 % of 500 lags are outside, ± 1 %
         assert!(rest.outside() < 0.09, "{}", rest.outside());
-        // 20 chunks: the scatter of a scatter is 1/√40 = 16 %
+        // with 20 chunks a standard deviation is known to 1/√40 = 16 %
         let scatter = rest.scatter(rest.chunk_length());
         assert!(scatter.iter().all(|s| (0.5..1.5).contains(s)), "{scatter:?}");
-        // quantiles between ±2 scatter by 5e-3 or less
+        // quantiles between ±2 are accurate to 5e-3
         let off = rest.quantiles.iter().filter(|(x, _)| x.abs() < 2.0).map(|(x, y)| (x - y).abs());
         assert!(off.fold(0.0, f64::max) < 0.03);
     }
 
-    /// The thesis's gyro has noise of 0.4 mrad/s in steps of 0.15 mrad/s: the readings are not normal, the
-    /// noise is.
+    /// The noise of the thesis's gyro is normal, with a standard deviation of 0.4 mrad/s, but the readings have steps of 0.15
+    /// mrad/s and are not.
     #[test]
     fn quantised_normal_noise_is_normal_between_its_levels() {
         let mut random = Random::new(3, 0);
@@ -282,10 +279,10 @@ mod tests {
         // (σ² + Δ²/12)/(Δ²/12), known to √(2/n) = 0.5 %
         let expected = 1.0 + 12.0 * (4.066e-4_f64 / step).powi(2);
         assert!((rest.quantisation_ratio() / expected - 1.0).abs() < 0.02);
-        // at most 1 of 10 by chance with a probability of 0.91, at most 3 with 0.999
+        // of 10 chunks with normal noise, at most 1 exceeds the limit with a probability of 0.91, and at most 3 with 0.999
         let [read, between] = rest.not_normal();
         assert!(read == 10 && between <= 3, "{read} {between}: {:?}", rest.chunks);
-        // Δ √n/(2σ√(2π)) with n = 9,000, and chance of less than one
+        // Δ √n/(2σ√(2π)) with n = 9,000, plus a random part below 1
         let jump = 9000f64.sqrt() * step / (2.0 * 4.066e-4 * std::f64::consts::TAU.sqrt());
         assert!(
             rest.chunks.iter().all(|c| (c.kolmogorov - jump).abs() < 1.0),
@@ -294,7 +291,7 @@ mod tests {
         );
         let sum: f64 = rest.histogram.windows(2).map(|b| (b[1].0 - b[0].0) * b[1].1).sum();
         assert!((sum - 1.0).abs() < 0.01, "{sum}");
-        // of an exponential distribution both say that it is not
+        // with an exponential distribution both distances exceed the limit
         let skew: Vec<f64> = samples.iter().map(|x| (x / 4e-4).exp() * 1e-4).collect();
         assert_eq!(Rest::analyse(0.02, &skew, 180.0, 1.0).not_normal(), [10, 10]);
     }

@@ -1,13 +1,13 @@
-//! Detection of rotary slosh. From the radial and the tangential slosh angle, both demodulated at
-//! the sweep's phase, with Fourier coefficients X and Y, the *swirl number*
+//! Detection of rotary slosh. X and Y are the Fourier coefficients of the radial and the tangential slosh angle,
+//! both demodulated at the phase of the sweep. The *swirl number*
 //!
 //! ```text
 //! S = 2 Im(X conj(Y)) / (|X|² + |Y|²)
 //! ```
 //!
-//! is 0 for motion in a plane and ±1 for a circle, + counter-clockwise seen from above (from
-//! outwards towards +θ). Under any other torque the same number follows from the angles in windows
-//! of time, by their angular momentum.
+//! is 0 for motion in a plane, +1 for a counter-clockwise circle seen from above (from outwards towards +θ), and −1
+//! for a clockwise circle. Under any other torque the swirl number is computed in windows of time, from the angular
+//! momentum of the angles.
 
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
@@ -15,15 +15,14 @@ use fourier::Complex64;
 /// Swirl number above which motion counts as rotary; this is an ellipse with axes 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
 
-/// Smallest slosh angle, rad, at which the swirl number is evaluated. At smaller angles the small
-/// radial part of a planar wave would make it meaningless.
+/// Smallest slosh angle, rad, at which the swirl number is evaluated. At smaller angles the small radial part of a
+/// planar wave would dominate it.
 pub const LEAST: f64 = 0.02;
 
 const PERIODS: f64 = 10.0;
 
-/// Rotary motion in a run: its duration, s, the swirl number with the largest magnitude, and for a
-/// sweep the first and the last frequency, Hz, at which the slosh was rotary; `None` if there was
-/// none.
+/// Rotary motion in a run: its duration, s; the swirl number with the largest absolute value; and for a sweep the
+/// first and the last frequency, Hz, at which the slosh was rotary, `None` if it never was.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
     pub from: Option<f64>,
@@ -32,9 +31,9 @@ pub struct Rotary {
     pub swirl: f64,
 }
 
-/// Returns the swirl number at each frequency of the responses of the slosh angles, radial and
-/// tangential, to the torque. It is 0 where the slosh angle under a torque with the amplitude
-/// `torque`, N·m, is below [`LEAST`].
+/// Returns the swirl number at each frequency of the responses, which are those of the radial and the
+/// tangential slosh angle to the torque. It is 0 where a torque with the amplitude `torque`, N·m, causes a
+/// slosh angle below [`LEAST`].
 pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque: f64) -> Vec<f64> {
     let number = |(x, y): (&Complex64, &Complex64)| {
         let power = x.norm_sqr() + y.norm_sqr();
@@ -46,7 +45,7 @@ pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque:
 impl Rotary {
     pub fn from_sweep(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
         let turning: Vec<usize> = (0..swirl.len()).filter(|&i| swirl[i].abs() > ROTARY).collect();
-        // Each point represents the time up to half-way to its neighbours.
+        // Each frequency represents the time of the sweep up to half-way to the neighbouring frequencies.
         let share = |i: usize| {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(time.len() - 1));
             (time[after] - time[before]).abs() / 2.0
@@ -59,9 +58,9 @@ impl Rotary {
         }
     }
 
-    /// Measures rotary slosh in slosh angles (rad) at equal steps (s), for a liquid with this natural frequency (Hz)
-    /// under any torque. The result has the largest swirl number and the time in rotary slosh. In a window with the
-    /// positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ v²).
+    /// Measures rotary slosh under any torque, from slosh angles (rad) at equal steps (s), for a liquid with this
+    /// natural frequency (Hz). The result contains the largest swirl number and the duration of rotary slosh. In a
+    /// window with the positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ v²).
     pub fn from_angles(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
         let length = (PERIODS / frequency / step).ceil() as usize;
         let window = |(x, y): (&[f64], &[f64])| {
@@ -107,7 +106,7 @@ mod tests {
             response: values.to_vec(),
         };
         let one = Complex64::new(1.0, 0.0);
-        // x = cos φ has the coefficient 1, y = sin φ −i: from outwards towards +θ.
+        // x = cos φ has the coefficient 1, y = sin φ has −i: a rotation from outwards towards +θ
         let radial = response(&[one, one, one * 1e-4]);
         let tangential =
             response(&[Complex64::new(0.0, -1.0), one * 0.3, Complex64::new(0.0, 1e-4)]);
@@ -127,12 +126,12 @@ mod tests {
             let tangential: Vec<f64> = (0..5000).map(|i| b * phase(i).sin()).collect();
             Rotary::from_angles(step, 2.3, &radial, &tangential)
         };
-        // 22 windows of 218 steps in 100 s
+        // 100 s contain 22 windows of 218 steps
         let circle = run(0.1, 0.1);
         assert!((circle.swirl - 1.0).abs() < 1e-3, "{circle:?}");
         assert!((circle.time - 22.0 * 218.0 * step).abs() < 1e-9, "{circle:?}");
         let flat = run(0.02, -0.2);
-        // 2ab/(a² + b²), clockwise
+        // 2ab/(a² + b²), negative because the motion is clockwise
         assert!((flat.swirl + 0.198).abs() < 1e-3, "{flat:?}");
         assert_eq!((flat.time, flat.from), (0.0, None));
         assert_eq!(run(0.01, 0.01).swirl, 0.0, "too small");

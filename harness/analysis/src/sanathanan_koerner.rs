@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector};
 
 use fourier::Complex64;
 
-/// Spectra at one frequency: s = jω in a unit near the middle of the lines (for the condition of the
-/// equations), U and Y, and the divisor `scale` that weights the equation.
+/// Spectra at one frequency: s = jω in a unit near the middle of all lines (which conditions the equations
+/// well), the spectra U and Y, and the divisor `scale` that weights the equation.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     pub s: Complex64,
@@ -42,9 +42,9 @@ impl Coefficients {
     }
 }
 
-/// Fits spectra in `rounds` iterations, with the leakage T if `transient`. `solve` solves the last equations
-/// by least squares and may return further results, which are returned together with the coefficients.
-/// Returns `None` without data.
+/// Fits spectra in `rounds` iterations, with the leakage T if `transient` is true. `solve` solves the
+/// equations of the last iteration by least squares and may return further results, which are returned
+/// together with the coefficients. Returns `None` without data.
 pub fn fit<S>(
     lines: &[Line],
     transient: bool,
@@ -110,7 +110,7 @@ mod tests {
             let parts = |c: Coefficients| c.numerator.into_iter().chain(c.denominator);
             parts(found).zip(parts(plant)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
-        // exact data: rounding times the condition of some hundred
+        // exact data: the error is rounding times a condition number of some hundred
         assert!(error(0.0, false) < 1e-12 && error(0.3, true) < 1e-12);
         assert!(error(0.3, false) > 1e-3, "a transient that is left out spoils the fit");
         assert!(fit(&lines(0.0)[..8], true, 10, solve).is_none());

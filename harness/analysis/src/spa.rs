@@ -12,12 +12,12 @@ use crate::response::FrequencyResponse;
 use crate::statistics;
 use fourier::Complex64;
 
-/// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s hardly change
+/// Longest lag for the thesis's band, s. The resolution of `spa` is about 1/lag: 100 s give 10 mHz. 200 s hardly change
 /// the shape of the antiresonance, whose half-power width is 14 mHz.
 pub const LAG: f64 = 200.0;
 
-/// A frequency response with the data from which its uncertainty follows; `input` is the two-sided power
-/// spectral density of the input at the response's frequencies, its unit squared times s.
+/// A frequency response with the data from which its uncertainty follows. `input` is the two-sided power spectral
+/// density of the input at the response's frequencies, in the input's unit squared times s.
 pub struct Estimate {
     pub response: FrequencyResponse,
     pub input: Vec<f64>,
@@ -57,9 +57,9 @@ impl Estimate {
         each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
     }
 
-    /// Returns the rate of change of the error along the frequency, relative to the error, 1/Hz: 2π times the
-    /// root mean square of the lag under the squared window, which is (1/2 − 15/(4π²)) 2/3 M² for Hann's
-    /// window.
+    /// Returns the rate of change of the response's error along the frequency, relative to the error, 1/Hz. It is
+    /// 2π times the root mean square of the lag, weighted with the squared window, which is (1/2 − 15/(4π²)) 2/3
+    /// M² for Hann's window.
     pub fn slope(&self) -> f64 {
         let pi = std::f64::consts::PI;
         2.0 * pi * self.lag * ((0.5 - 3.75 / (pi * pi)) * 2.0 / 3.0).sqrt()
@@ -96,8 +96,8 @@ fn estimate(
         padded.resize(length, 0.0);
         forward.transform(padded)
     };
-    // Sum and difference of the covariances at +k and −k steps, multiplied by the Hann lag window: these are
-    // the factors of cosine and sine. At 0 there is only one covariance.
+    // Sum and difference of the covariances at +k and −k steps, multiplied by the Hann lag window, are the factors of
+    // cosine and sine. At 0 there is only one covariance.
     let tapered = |cross: Vec<Complex64>| -> Vec<(f64, f64)> {
         let covariance = inverse.transform(cross);
         let weight = |k: usize| (1.0 + (std::f64::consts::PI * k as f64 / lags as f64).cos()) / 2.0;
@@ -117,19 +117,19 @@ fn estimate(
     let lags: Vec<[f64; 3]> =
         yu.iter().zip(&uu).map(|(&(even, odd), &(auto, _))| [even, odd, auto]).collect();
     let response = frequencies.chunks(TOGETHER).flat_map(|chunk| {
-        let mut angles = [0.0; TOGETHER]; // those of a last, shorter chunk are not looked at
+        let mut angles = [0.0; TOGETHER]; // the unused angles of a last, shorter chunk are 0
         for (angle, frequency) in angles.iter_mut().zip(chunk) {
             *angle = -std::f64::consts::TAU * frequency * step;
         }
         transformed(&lags, angles).into_iter().take(chunk.len())
     });
-    // The transforms are not normalised.
+    // scale factor, because the transforms are not normalised
     let unit = step / (length as f64 * input.len() as f64);
     response.map(|(h, power)| (h, power * unit)).unzip()
 }
 
-/// Number of frequencies summed together. Each sum waits for the previous one; sixteen independent sums keep
-/// the processor busy and are six times as fast.
+/// Number of frequencies that are summed at the same time. One sum alone would wait for its last addition each time;
+/// sixteen independent sums are six times as fast.
 const TOGETHER: usize = 16;
 
 /// Returns the frequency response from correlation functions, for each angle φ per lag (rad): Σ even cos kφ + j odd sin
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_spectral_estimate_equals_its_definition() {
-        // noise through a short filter; 40 samples, lags up to 9 samples, summed by definition
+        // noise through a short filter; 40 samples with lags up to 9 samples, and the sum of the definition
         let step = 0.1;
         let u: Vec<f64> = (0..40u32).map(|k| f64::from(k * k * 7919 % 101) / 50.0 - 1.0).collect();
         let y: Vec<f64> =

@@ -34,14 +34,13 @@ pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     sorted.get((sorted.len() as f64 * part) as usize).copied()
 }
 
-/// Returns the median; for an even number of values the upper of the two middle ones. `None` without values.
+/// Returns the median; for an even number of values the larger of the two middle ones. `None` without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Returns the standard deviation of a signal's white noise from its third differences, in which a motion of
-/// a few hertz almost vanishes. The result is at least the rounding to the smallest step of the signal,
-/// step/√12.
+/// Returns the standard deviation of a signal's white noise, computed from its third differences, in which a motion of a
+/// few hertz almost vanishes. The result is at least step/√12, the rounding error for the smallest step of the signal.
 pub fn noise_level(signal: &[f64]) -> f64 {
     let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
     let squares: Vec<f64> = third.map(|d| d * d).collect();
@@ -73,7 +72,8 @@ mod tests {
             .map(|k| 0.02 * (0.3 * f64::from(k)).sin() + 4e-4 * random.normal())
             .collect();
         let quantised: Vec<f64> = noisy.iter().map(|y| (y / 0.01).round() * 0.01).collect();
-        // relative standard error of the median of 15,000 squares: 2 %; the motion's third difference is 0.3^3 of 20 mrad/s
+        // the median of 15,000 squares has a relative standard error of 2 %; the third difference of the motion is
+        // 0.3³ of 20 mrad/s
         let level = noise_level(&noisy);
         assert!((level / 4e-4 - 1.0).abs() < 0.2, "{level}");
         assert!(noise_level(&quantised) >= 0.01 / 12f64.sqrt());

@@ -1,4 +1,4 @@
-//! A sine sweep, whose phase is known exactly.
+//! A sine sweep, a torque whose phase is a known function of time.
 
 use std::f64::consts::TAU;
 
@@ -90,10 +90,10 @@ mod tests {
 
     const LAWS: [Law; 2] = [Law::Exponential, Law::Linear];
 
-    /// 5900 cycles of the exponential and 6412.5 cycles of the linear sweep from 1.25 to 3.5 Hz in 2700 s.
     #[test]
     fn the_sweeps_have_the_cycles_of_the_thesis() {
-        // 5900.24 and 6412.5 cycles from 1.25 to 3.5 Hz in 2700 s, by hand from the formulas
+        // 5900.24 cycles (exponential) and 6412.5 cycles (linear) from 1.25 to 3.5 Hz in 2700 s, computed by
+        // hand from the formulas
         for (law, cycles) in LAWS.into_iter().zip([5900.24, 6412.5]) {
             let sweep = Sweep { law, ..Sweep::THESIS };
             assert!((sweep.phase(2700.0) / TAU - cycles).abs() < 5e-3, "{law:?}");
@@ -113,7 +113,7 @@ mod tests {
             for f in [1.25, 2.0, 3.5] {
                 let (t_up, t_down) =
                     (up.time_at_frequency(f).unwrap(), down.time_at_frequency(f).unwrap());
-                // rounding of times up to 100 s, of phases up to 1500 rad
+                // rounding errors of times up to 100 s and of phases up to 1500 rad
                 assert!((t_up + t_down - 100.0).abs() < 1e-11, "{law:?}, {f} Hz");
                 assert!((up.rate_at(f) + down.rate_at(f)).abs() < 1e-15);
                 let behind = up.phase(100.0) - up.phase(t_up);

@@ -1,12 +1,13 @@
-//! The thesis's parametric model (6.1.3): a transfer function with three poles and two zeros,
-//! fitted to a frequency response, and the quality of the fit (6.3.2).
+//! The thesis's parametric model (6.1.3): a transfer function with three poles and two zeros, fitted to a frequency
+//! response, and the quality of the fit (6.3.2).
 //!
 //! ```text
 //! H(s) = (b2 s² + b1 s + b0) / ((s + p) (s² + 2 ζ ω s + ω²))
 //! ```
 //!
-//! [Sanathanan and Koerner's iteration](crate::sanathanan_koerner) gives the start. Levenberg–Marquardt minimises Σ
-//! |H_meas − H_mod|², the quantity in Fit_freq. p, ω and ζ are fitted as logarithms, so the poles are stable.
+//! [Sanathanan and Koerner's iteration](crate::sanathanan_koerner) gives the start. Levenberg–Marquardt then
+//! minimises Σ |H_meas − H_mod|², on which the thesis's Fit_freq is based. p, ω and ζ are fitted as logarithms, so
+//! that the poles are stable.
 
 use std::f64::consts::TAU;
 
@@ -80,7 +81,7 @@ impl TransferFunction {
             (found.cost.is_finite() && fitted.pole_omega.is_finite())
                 .then_some((found.cost, fitted))
         });
-        // Of two equally good fits the first one is kept, so that the choice does not depend on rounding.
+        // Of two equally good fits the first one is returned, so that rounding errors do not decide.
         let best = fitted.reduce(|a, b| if b.0 < 0.999 * a.0 { b } else { a });
         best.map(|(_, fitted)| fitted)
     }
@@ -124,18 +125,18 @@ impl TransferFunction {
         answer
     }
 
-    /// Returns the free response of the model from the initial state for which it is closest (least squares)
-    /// to a signal sampled every `step` s.
+    /// Returns the free response of the model (without input) that is closest to a signal sampled every `step` s, in
+    /// the sense of least squares over its initial state.
     ///
-    /// The initial state is needed because the measured band hardly determines the real pole, whose time
-    /// constant may be fitted as a minute or an hour. From rest the torque's first half cycle would then
-    /// leave an offset that the model keeps for the whole record, whereas the hub loses it in seconds.
-    /// MATLAB's `compare` estimates the initial state for the same reason.
+    /// The initial state is needed because the measured band hardly determines the real pole, whose time constant may
+    /// be fitted as a minute or an hour. From rest, the torque's first half cycle would then leave an offset that the
+    /// model keeps for the whole record, whereas the hub loses it in seconds. MATLAB's `compare` estimates the initial
+    /// state for the same reason.
     pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
         let decay = self.pole_damping * self.pole_omega;
         let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();
-        // From sample to sample the response decays and rotates by the same factor. Over a million samples
-        // this recurrence is exact to 1e-10, and it takes a tenth of the time.
+        // From sample to sample the response decays and rotates by the same factor. This recurrence is accurate to
+        // 1e-10 over a million samples, and takes a tenth of the time.
         let (slower, turned) = (
             (-self.real_pole * step).exp(),
             Complex64::from_polar((-decay * step).exp(), turn * step),
@@ -172,7 +173,7 @@ pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     100.0 * (1.0 - (miss / spread).sqrt())
 }
 
-/// Returns a start with lightly damped poles at the measured resonance and the zeros that fit best with them.
+/// Returns a start with lightly damped poles at the measured resonance, and the zeros that fit best with these poles.
 /// It is needed because the weights of the other start may hide a narrow resonance.
 fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let pole_omega = TAU * Features::find(measured).f_res?;
@@ -183,7 +184,7 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let (mut a, mut b) = (DMatrix::zeros(2 * count, 3), DVector::zeros(2 * count));
     for (k, (&f, h)) in measured.frequency.iter().zip(&measured.response).enumerate() {
         let s = Complex64::new(0.0, TAU * f / pole_omega);
-        // N/D with N = 1
+        // response N/D of the start with the numerator N = 1
         let over = start.response(f) / (s * s * pole_omega * pole_omega);
         for (j, power) in [s * s, s, Complex64::ONE].into_iter().enumerate() {
             let entry = power * over;
@@ -212,7 +213,7 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
             scale: 1.0,
         })
         .collect();
-    // If the response does not determine all coefficients, those of smallest norm are taken.
+    // If the response does not determine all coefficients, the solution with the smallest norm is used.
     let solve = |a: DMatrix<f64>, b: DVector<f64>| Some((smallest(a, &b, 1e-14)?, ()));
     let (Coefficients { numerator: [b2, b1, b0], denominator }, ()) =
         sanathanan_koerner::fit(&lines, false, ROUNDS, solve)?;
@@ -328,8 +329,8 @@ mod tests {
         let input: Vec<f64> = (0..60_000).map(|k| (TAU * f * k as f64 * step).sin()).collect();
         let answer = tf.simulate(step, &input);
         let largest = answer[55_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
-        // Chords of the sine: (w h)²/12 = 1.3e-5; the start has decayed by e^(-27); the
-        // maximum falls between samples by (w h)²/8.
+        // errors of linear interpolation (w h)²/12 = 1.3e-5 and of the sampled maximum (w h)²/8; the transient
+        // has decayed by e^(-27)
         assert!((largest / tf.response(f).norm() - 1.0).abs() < 5e-5);
     }
 
@@ -348,7 +349,7 @@ mod tests {
 
     #[test]
     fn a_fit_recovers_a_free_response_from_the_whole_signal() {
-        // 2700 s of a slowly turning pair with a slow real pole; and a pair of equal real poles
+        // 2700 s: a slowly rotating pole pair with a slow real pole, and a pair of equal real poles
         for (pole_damping, real_pole) in [(2e-5, 1e-4), (1.0, 0.1)] {
             let tf = TransferFunction {
                 numerator: [1.0, 2.0, 3.0],
@@ -365,7 +366,7 @@ mod tests {
                     + (-decay * t).exp() * (0.5 * (turn * t).cos() - 0.2 * second)
             };
             let signal: Vec<f64> = (0..135_001).map(free).collect();
-            // 135,000 roundings of 1e-16 each, all the same way
+            // 135,000 rounding errors of 1e-16 in the same direction
             for (found, given) in tf.free_answer(0.02, &signal).iter().zip(&signal) {
                 assert!((found - given).abs() < 2e-11, "{found} instead of {given}");
             }

@@ -1,16 +1,15 @@
-//! Welch's averaged spectra: Hamming windows with half overlap and the means removed (thesis 6.3.3).
+//! Welch's averaged spectra: Hamming windows with half overlap, and means removed (thesis 6.3.3).
 //!
-//! The thesis does not state the length of the segments, which is decisive for a sweep: a sweep is at one
-//! frequency only for a moment, and if only one segment contains this moment, nothing is averaged, and the
-//! coherence is 1 for any two signals. The sweep stays within the resolution 1/L of a segment for 1/(L rate),
-//! and half-overlapping segments follow each other by L/2, so that 2/(rate L²) segments contain each
-//! frequency.
+//! The thesis does not state the length L of the segments, which is decisive for a sweep: a sweep is at each frequency
+//! only for a moment. If only one segment contains this moment, nothing is averaged, and the coherence of any two signals
+//! is 1. The sweep passes the resolution 1/L of a segment in 1/(L rate), and half-overlapping segments follow each other
+//! by L/2, so that 2/(rate L²) segments contain each frequency.
 //!
-//! * for coherence [`SEGMENT`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then shows whether
-//!   the ratio of the two signals stays the same while the sweep passes 50 mHz.
-//! * [`RESPONSE`], a ninth of twice the record (MATLAB's default): 600 s of the thesis's sweep, which resolves
-//!   the antiresonance. It is used for the H1 estimate, which needs no average there, and for the
-//!   signal-to-noise ratio: one segment contains the sweep, and the others only noise.
+//! * [`SEGMENT`], 20 s, is the length for coherence: six segments at the thesis's 1/1200 Hz/s. The coherence then shows
+//!   whether the ratio of the two signals stays the same while the sweep passes 50 mHz.
+//! * [`RESPONSE`], a ninth of twice the record (MATLAB's default), is 600 s of the thesis's sweep and resolves the
+//!   antiresonance. It is used for the H1 estimate, which needs no average with a sweep, and for the signal-to-noise
+//!   ratio: one segment contains the sweep at a frequency, and the others contain only noise.
 
 use fourier::Forward;
 
@@ -23,8 +22,7 @@ pub const SEGMENTS: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
-    /// A length in seconds. It is reduced if [`SEGMENTS`] segments of this length do not fit into
-    /// the record.
+    /// A length in seconds. It is reduced if the record is shorter than [`SEGMENTS`] segments of this length.
     Seconds(f64),
     Longest,
 }
@@ -33,8 +31,8 @@ pub const SEGMENT: f64 = 20.0;
 
 pub const RESPONSE: Segments = Segments::Longest;
 
-/// Each segment is padded with zeros to this multiple of its length, so that several bins lie even between
-/// antiresonance and resonance.
+/// Each segment is padded with zeros to this multiple of its length, so that several bins are
+/// between antiresonance and resonance.
 const PADDING: usize = 4;
 
 /// Averaged auto- and cross-spectra of two signals U and Y, in an arbitrary common unit: |U|², |Y|² and
@@ -49,7 +47,7 @@ pub struct Spectra {
 
 impl Spectra {
     pub fn estimate(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
-        // With half overlap SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
+        // With half overlap, SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
         let longest = (2 * input.len() / (SEGMENTS + 1)).max(2);
         let length = match segments {
             Segments::Seconds(seconds) => ((seconds / step).round() as usize).clamp(2, longest),
@@ -161,8 +159,8 @@ mod tests {
         let through = Spectra::estimate(0.02, &u, &gained, RESPONSE);
         assert!((through.mean_coherence(1.0, 20.0) - 1.0).abs() < 1e-12);
         assert!((through.h1((5.0, 5.1)).response[0].re + 3.0).abs() < 1e-9);
-        // K averages of unrelated spectra have the mean coherence 1/K; half-overlapping
-        // Hamming segments count as some 7 of 8.
+        // The mean coherence of K averages of independent spectra is 1/K; half-overlapping Hamming segments are
+        // equivalent to about 7 of 8 averages.
         let strangers = Spectra::estimate(0.02, &u, &v, RESPONSE).mean_coherence(1.0, 20.0);
         assert!((0.11..0.17).contains(&strangers), "{strangers}");
     }
@@ -175,21 +173,21 @@ mod tests {
         let snr = spectra.snr_db();
         let bins = (1..200).map(|k| spectra.value_at(&snr, k as f64 * 0.1));
         let mean = bins.sum::<f64>() / 199.0;
-        // 20 dB; the mean of a logarithm of few averages lies some 0.7 dB off.
+        // 20 dB; the mean of the logarithm of few averages is wrong by about 0.7 dB
         assert!((mean - 20.0).abs() < 1.5, "{mean}");
     }
 
-    /// Two sweeps with unrelated phases: with a single segment of 267 s their coherence is high, with segments of 20 s it
-    /// is low.
+    /// The phases of the two sweeps are unrelated. With a single segment of 267 s their coherence is high, with segments
+    /// of 20 s it is low.
     #[test]
-    fn a_sweep_and_independent_noise_seem_coherent_only_with_too_few_segments() {
-        // 1 to 2 Hz at the thesis's rate: six segments of 20 s see each frequency, or one of 267 s
+    fn two_unrelated_sweeps_seem_coherent_only_with_too_few_segments() {
+        // 1 to 2 Hz at the thesis's rate: six segments of 20 s contain each frequency, but only one segment of 267 s
         let sine = |turns: fn(f64) -> f64| -> Vec<f64> {
             let time = (0..60_000).map(|k| k as f64 * 0.02);
             time.map(|t| (std::f64::consts::TAU * turns(t)).sin()).collect()
         };
         let sweep = sine(|t| t + t * t / 2400.0);
-        // its phase goes on by half a turn every 10 s against the sweep's: nothing in common
+        // its phase advances by half a turn every 10 s against the other sweep, so that the two have nothing in common
         let other = sine(|t| 1.05 * t + t * t / 2400.0);
         let mean =
             |segments| Spectra::estimate(0.02, &sweep, &other, segments).mean_coherence(1.2, 1.8);

@@ -15,8 +15,8 @@ use super::covariance::Covariance;
 use super::{LONGEST, Noise, Term, overlapping};
 
 const NORMAL: f64 = 1.96;
-/// Standard normal deviate of the fit's χ² above which the fit is rejected. If the noise model is
-/// true, 1 record in 1,000 exceeds it.
+/// Limit of the fit's χ², as a standard normal deviate, above which the fit is rejected. If the noise model is true, 1
+/// record in 1,000 exceeds it.
 const MISFIT: f64 = 3.1;
 const ITERATIONS: usize = 12;
 /// Largest number of short averaging times that a fit may leave out, and the longest averaging
@@ -26,13 +26,13 @@ const LEFT_OUT: (usize, f64) = (8, 2.0);
 /// makes the fit pass its test. The effect of a filter on the variance halves with each octave, so
 /// that an octave which passes the test can still shift N by several standard deviations.
 const BEYOND: usize = 2;
-/// Shortest correlation time of a Gauss–Markov bias, in averaging times. A shorter one cannot be
+/// Shortest correlation time of a Gauss–Markov bias, relative to the shortest averaging time. A shorter one cannot be
 /// distinguished from white noise.
 const SHORTEST: f64 = 10.0;
 
-/// Overlapping Allan variances of one record, or the means of several, at 1, 2, 4, … samples up to a tenth of
-/// a record. `step` is the time between samples, s, `count` the number of samples per record, and `factors`
-/// the numbers of samples per average.
+/// Overlapping Allan variances of one record, or their means over several records, at 1, 2, 4, … samples up to a tenth of
+/// a record. `step` is the time between samples, s, `count` the number of samples per record, and `factors` the numbers
+/// of samples per average.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octaves {
     step: f64,
@@ -45,18 +45,18 @@ pub struct Octaves {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
-    /// Lower end of the 95 % interval of the coefficient; 0 if the record does not show this noise,
-    /// NaN if no value could be tested.
+    /// Lower end of the 95 % interval of the coefficient; 0 if the record does not show this noise, NaN if the test failed
+    /// for every tried value.
     pub low: f64,
-    /// Upper end of the 95 % interval of the coefficient; infinite if the record is too short, NaN
-    /// if no value could be tested.
+    /// Upper end of the 95 % interval of the coefficient; infinite if the record is too short, NaN if the test failed
+    /// for every tried value.
     pub high: f64,
     /// Standard error of the coefficient; NaN if its estimate is 0.
     pub error: f64,
 }
 
-/// The averaging time, s, at which a fit deviates most from the record, with the record's Allan deviation divided by the
-/// fit's at this time.
+/// The averaging time, s, at which a fit deviates most from the record, and the ratio of the record's to the fit's Allan
+/// deviation at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     pub tau: f64,
@@ -113,9 +113,9 @@ impl Octaves {
         Problem { octaves: self, terms, from }.fit()
     }
 
-    /// Fits N, B and K. If this fit is rejected, tries to leave out short averaging times, at which filters of a gyro
-    /// act, or to add a ramp or a Gauss–Markov bias. If every fit is rejected, returns the fit of N, B and K to all
-    /// octaves. Returns `None` in the cases of [`Octaves::fit`].
+    /// Fits N, B and K. If this fit is rejected, tries to leave out short averaging times, which a filter of the gyro
+    /// affects, or to add a ramp or a Gauss–Markov bias. If every fit is rejected, returns the fit of N, B and K to all
+    /// octaves. Returns `None` if [`Octaves::fit`] does.
     pub fn describe(&self) -> Option<Fit> {
         const BASIC: [Term; 3] = [Term::White, Term::Flicker, Term::Walk];
         let first = self.fit(&BASIC, 0)?;
@@ -189,12 +189,12 @@ impl Problem<'_> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns the best fit of the coefficients with the same relative error assumed for every
-    /// octave. The iterations of the weights start from it.
+    /// Returns the best fit of the coefficients if every octave has the same relative error. It is the start of the
+    /// iteration of the weights.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
-        // Inverse variance of a relative error: the number of intervals of this length in the record.
+        // Inverse variance of the relative error: the number of intervals of this length in the record.
         let weights = DVector::from_iterator(
             taus.len(),
             measured.iter().zip(&taus).map(|(value, tau)| 1.0 / (value * tau.sqrt())),
@@ -222,8 +222,8 @@ impl Problem<'_> {
         Some(((SHORTEST * first).min(*last), *last))
     }
 
-    /// Repeats the generalized least squares with weights from the last result until the weights no longer change. If
-    /// `fixed` is given, this coefficient and the correlation time keep their values.
+    /// Repeats the generalized least squares with weights from the last result until the weights converge. If `fixed` is
+    /// given, this coefficient and the correlation time keep their values.
     fn iterate_weights(
         &self,
         mut state: State,
@@ -233,8 +233,7 @@ impl Problem<'_> {
         let (low, high) = self.times()?;
         for iteration in 0..ITERATIONS {
             let lower = factored(&self.covariance(tables, &state))?.l();
-            // The first weights are those of the start, because with only the fixed value there might be no
-            // noise.
+            // The first weights come from the start, because with only the fixed coefficient the noise might be 0.
             if let (0, Some((place, value))) = (iteration, fixed) {
                 state.coefficients[place] = value;
             }
@@ -337,7 +336,7 @@ impl Problem<'_> {
         let bias_time = self.markov().filter(|_| spread.nrows() > self.terms.len()).map(|_| {
             let relative = spread[(self.terms.len(), self.terms.len())].sqrt();
             let around = |sign: f64| state.time * (sign * NORMAL * relative).exp();
-            // If there may be no bias, its correlation time can have any value.
+            // If the bias may be absent, its correlation time can have any value.
             let is_shown = terms.iter().any(|(term, e)| *term == Term::Markov && e.low > 0.0);
             let (low, high) =
                 if is_shown { (around(-1.0), around(1.0)) } else { (0.0, f64::INFINITY) };
@@ -382,7 +381,7 @@ impl Problem<'_> {
         let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {
             let there = self.iterate_weights(state.clone(), Some((place, value)), tables);
             let there = there.unwrap_or_else(|| {
-                // With this value no other noise is left.
+                // no other noise is left with this value: the other coefficients keep their estimates
                 let mut alone = state.clone();
                 alone.coefficients[place] = value;
                 alone
@@ -411,7 +410,7 @@ impl Problem<'_> {
         let low = match beyond(0.0)?.0 {
             above_none if above_none > 0.0 => {
                 let mut within = if above > 0.0 { value + 4.0 * step } else { value };
-                // Downwards from the estimate, because for a bias with a correlation time values near 0 may
+                // Searched downwards from the estimate, because for a bias with a correlation time values near 0 may
                 // pass the test again.
                 let mut out = DOWN * within;
                 while beyond(out)?.0 <= 0.0 && out > LEAST * value {
@@ -447,8 +446,8 @@ impl Problem<'_> {
 }
 
 const BISECTIONS: usize = 14;
-/// Ratio of successive coefficients that are tested below an estimate to find the lower end of its
-/// interval; the second number is the smallest tested coefficient relative to the estimate.
+/// Ratio of each tested coefficient to the one tested before, in the search for the lower end of an interval; and the
+/// smallest tested coefficient relative to the estimate.
 const DOWN: f64 = 0.7;
 const LEAST: f64 = 1e-4;
 
@@ -480,8 +479,8 @@ fn pearson(normal: f64, skewness: f64) -> f64 {
     2.0 / skewness * (base.powi(3) - 1.0)
 }
 
-/// Returns the least-squares solution in which no coefficient is negative, except those at
-/// `either`, which may be, and its squared error. All subsets of the columns are tried.
+/// Returns the least-squares solution without negative coefficients, and its squared error. Only coefficients listed in
+/// `either` may be negative. All subsets of the columns are tried.
 fn not_negative(
     columns: &DMatrix<f64>,
     values: &DVector<f64>,
@@ -580,7 +579,7 @@ mod tests {
     const COUNT: usize = 1 << 16;
 
     /// Counts the simulated records whose interval contains the true value, separately for N, B and K, and the records
-    /// that the fitted noise model describes.
+    /// whose fit passes its test.
     fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
         let (mut held, mut described) = ([0; 3], 0);
         for seed in 0..draws {
@@ -594,11 +593,9 @@ mod tests {
         (held, described)
     }
 
-    /// 40 simulated gyro records with white noise, flicker noise and rate random walk; the 95 % intervals contain the true
-    /// coefficients in at least 33.
     #[test]
     fn intervals_of_the_allan_fit_contain_the_simulated_noise() {
-        // a binomial of 40 draws at 0.95 is below 33 once in 3,000 times
+        // with an interval of 95 %, fewer than 33 of 40 have a probability of 1 in 3,000
         let (held, described) = covered(&ALL, 40);
         assert!(held.iter().all(|count| *count >= 33) && described >= 37, "{held:?} {described}");
     }
@@ -612,7 +609,7 @@ mod tests {
         for noise in [ALL, white, walk, plateau] {
             let (held, described) = covered(&noise, 400);
             println!("{noise:?}: {held:?} of 400, {described} described");
-            // 400 draws determine a share of 0.95 to 0.011
+            // 400 draws determine a fraction of 0.95 to 0.011
             assert!(
                 held.iter().all(|count| *count >= 366) && described >= 384,
                 "{held:?} {described}"
@@ -632,7 +629,7 @@ mod tests {
         let bias = Noise { bias_instability: 5e-5, bias_time: 5.0, ..white };
         let basic = [Term::White, Term::Flicker, Term::Walk];
         let with_bias = [Term::White, Term::Markov, Term::Walk];
-        // widths: of N 1 % in 1600 s; of B of 330 correlation times 30 %
+        // relative widths of the intervals: N is known to 1 % in 1600 s, B to 30 % in 330 correlation times
         for (noise, terms, shown, widths) in [
             (white, basic, vec![Term::White], [0.04, 0.0]),
             (bias, with_bias, vec![Term::White, Term::Markov], [0.06, 1.5]),
@@ -651,7 +648,7 @@ mod tests {
                     _ => noise.coefficient(*term).sqrt(),
                 };
                 let held = found.iter().filter(|e| (e.low..=e.high).contains(&truth)).count();
-                // a binomial of 100 draws at 0.95 is below 87 once in 1,000 times
+                // with an interval of 95 %, fewer than 87 of 100 have a probability of 1 in 1,000
                 assert!(held >= 87, "{term:?}: {held} of {draws}");
                 assert!(found.iter().all(|e| e.low < e.high), "{term:?}: an interval is a point");
                 let tiny = found.iter().filter(|e| e.low > 0.0 && e.low < 0.01 * e.value);
@@ -676,7 +673,8 @@ mod tests {
 
     #[test]
     fn the_predicted_covariance_of_allan_variances_equals_the_scatter_over_300_records() {
-        // variance of each octave over 300 records: √(2/300) = 8 %; χ² of few degrees of freedom scatter more
+        // 300 records determine the variance of an octave to √(2/300) = 8 %, and less accurately if its χ² has
+        // few degrees of freedom
         let records: Vec<Octaves> = (0..300)
             .map(|seed| Octaves::from_samples(STEP, &record(&ALL, 1 << 12, seed)))
             .collect();
@@ -697,7 +695,7 @@ mod tests {
             assert!((0.7..1.4).contains(&ratio), "{i}: {ratio}");
             for j in 0..i {
                 let size = (expected[(i, i)] * expected[(j, j)]).sqrt();
-                // a correlation of 300 records scatters by 6 %
+                // 300 records determine a correlation to 6 %
                 let off = (covariance(i, j) - expected[(i, j)]) / size;
                 assert!(off.abs() < 0.25, "{i}, {j}: {off}");
             }
@@ -705,7 +703,8 @@ mod tests {
     }
 
     #[test]
-    fn a_misfit_of_the_noise_model_is_named_with_its_cause() {
+    fn the_allan_fit_adds_a_bias_or_a_ramp_or_leaves_out_filtered_times_and_otherwise_reports_a_misfit()
+     {
         let bias = Noise { bias_instability: 1e-4, bias_time: 40.0, ..ALL };
         let bias = Noise { flicker: 0.0, rrw: 0.0, ..bias };
         let fit = Octaves::from_samples(STEP, &record(&bias, 1 << 17, 1)).describe().unwrap();
@@ -715,14 +714,14 @@ mod tests {
         let ramp = Noise { ramp: 1e-6, ..ALL };
         let fit = Octaves::from_samples(STEP, &record(&ramp, COUNT, 2)).describe().unwrap();
         assert!(fit.fits && (fit.noise.ramp / 1e-6 - 1.0).abs() < 0.1, "{fit:?}");
-        // a sine of 100 s is none of these
+        // a sine with a period of 100 s is none of the noise terms
         let mut sine = record(&ALL, COUNT, 3);
         for (k, value) in sine.iter_mut().enumerate() {
             *value += 1e-4 * (0.0628 * STEP * k as f64).sin();
         }
         let fit = Octaves::from_samples(STEP, &sine).describe().unwrap();
         assert!(!fit.fits && (10.0..200.0).contains(&fit.worst.tau), "{fit:?}");
-        // means of two neighbours: a filter
+        // means of two neighbouring samples, as a filter makes them
         let smooth: Vec<f64> =
             record(&ALL, COUNT, 4).windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
         let fit = Octaves::from_samples(STEP, &smooth).describe().unwrap();
