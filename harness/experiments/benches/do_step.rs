@@ -1,8 +1,9 @@
-//! CPU time for 20 ms of motion: one fmi2DoStep compared with two explicit integrators on the same equations. Each time is
-//! the best of five. Only the ratios of these times have a meaning; the unit is the time of a fixed-step RK4 of 5 ms.
+//! Compares the CPU time of one fmi2DoStep for 20 ms of motion with two explicit integrators of the same equations.
+//! Each time is the best of five. Only ratios are printed: the unit is the time of a Runge–Kutta integration with fixed
+//! steps of 5 ms.
 //!
-//! All integrators receive the same torque, straight lines between knots 20 ms apart. The torque is a sweep of 0.1 N·m from
-//! 2.2 to 2.6 Hz over antiresonance and resonance (10 cm fill).
+//! All integrators receive the same torque, which is linear between knots 20 ms apart. It is a sweep of 0.1 N·m from 2.2 to
+//! 2.6 Hz over antiresonance and resonance (10 cm fill).
 //!
 //! `cargo bench -p experiments`
 
@@ -23,8 +24,8 @@ const DURATION: f64 = 200.0;
 /// rate, rad/s.
 type State = SVector<f64, 4>;
 
-/// Equations of the hub with one linear pendulum of the thesis's bench. The sign of ω in the dry friction is smoothed to
-/// tanh(ω/ε).
+/// Equations of the hub with one linear pendulum, for the thesis's bench. The sign of ω in the dry friction
+/// is smoothed to tanh(ω/ε).
 struct Smooth {
     knots: Vec<f64>,
 }
@@ -69,8 +70,8 @@ fn rk4(system: &Smooth, parts: usize) -> State {
     x
 }
 
-/// Integrates with MATLAB's ode45 method over the whole sweep, with the tolerances of the thesis
-/// (6.2.3) and dense output at every knot.
+/// Integrates by the method of MATLAB's ode45 over the whole sweep, with the tolerances of the thesis (6.2.3) and dense
+/// output at every knot.
 fn dopri5(system: Smooth) -> State {
     let end = (system.knots.len() - 1) as f64 * STEP;
     let mut solver = Dopri5::new(system, 0.0, end, STEP, State::zeros(), 1e-5, 1e-7);
@@ -103,7 +104,7 @@ fn main() {
 
     let fmu = Fmu::open(packed_for_tests()).expect("the FMU opens");
     let reference = fmu.description().variable("tau_cmd").expect("it is there").reference;
-    // only fmi2DoStep is timed, not the calls that hand the torque over
+    // only fmi2DoStep is timed, not the calls that set the torque
     let steps_of = |instance: &mut Instance| {
         let mut total = Duration::ZERO;
         for (k, knots) in knots.windows(2).enumerate() {

@@ -1,19 +1,20 @@
-//! Computes one point of the work-precision diagram, for one method at one tolerance: CPU time for 20 ms of motion, and the
+//! Computes one point of a work-precision diagram, for one method at one tolerance: CPU time for 20 ms of motion, and the
 //! error over the thesis's sweep (0.1 N·m, 10 cm of water, dry friction).
 //!
 //! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints `ns per 20 ms,largest error of omega in rad/s`. The
-//! motion is solved RUNS times. For each piece of 10 s (for the whole sweep, if a solver takes it in one call) the smallest
-//! CPU time counts, which excludes other load of the machine. METHOD is one of:
+//! motion is simulated RUNS times. For each piece of 10 s (for the whole sweep, if a solver takes it in one call) the
+//! smallest CPU time counts, which excludes other load of the machine. METHOD is one of:
 //!
-//! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`) with the slosh model of this name and set-valued friction.
-//!   Without REFERENCE the rates are written to a file, with which later results are compared (`work_precision linear 1e-13
-//!   2700 1 --write FILE`). `linear/12` reads the first 12 outputs after every step, in one call, instead of only omega.
+//! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`) with the slosh model of this name and set-valued
+//!   friction. With `--write FILE` the rates are written to a file, which is the REFERENCE of later calls
+//!   (`work_precision linear 1e-13 2700 1 --write FILE`). `linear/12` reads the first 12 outputs after every step, in one
+//!   call, instead of only omega.
 //! * `dopri5`, `dop853`: ode_solvers on the linear model with sgn(omega) smoothed to tanh(omega/1e-5), over the whole sweep
 //!   in one call; `dopri5@1e-8` smooths over 1e-8 rad/s instead of 1e-5 rad/s.
 //! * `rk4`: classical fixed-step Runge-Kutta on the smoothed model; TOLERANCE is the step in s.
 //! * `torque`: computes only the torque, so that its instructions can be subtracted from those of each method.
 //!
-//! All methods receive the same torque: straight lines between knots 20 ms apart.
+//! All methods receive the same torque, which is linear between knots 20 ms apart.
 
 use std::path::Path;
 use std::time::Duration;
@@ -26,7 +27,7 @@ use ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 
 const STEP: f64 = 0.02;
 const AMPLITUDE: f64 = 0.1;
-/// Number of steps of 20 ms in one piece of a run whose time is measured.
+/// Number of steps of 20 ms in a piece of a run whose CPU time is measured.
 const PIECE: usize = 500;
 
 fn torque(seconds: f64) -> Vec<f64> {
@@ -43,7 +44,7 @@ fn cpu_time() -> Duration {
     now.map_or(Duration::ZERO, Duration::from)
 }
 
-/// Returns the time since the first call, on systems that do not report the CPU time of a thread.
+/// Returns the time since the first call. It is used on systems that do not report the CPU time of a thread.
 #[cfg(not(unix))]
 fn cpu_time() -> Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
@@ -87,8 +88,8 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
     Ok((rates, took))
 }
 
-/// Hub and one linear pendulum on the bench with 10 cm of water and smoothed friction, as differential equations for the
-/// solvers other than the FMU.
+/// Differential equations of the hub and one linear pendulum on the bench with 10 cm of water, with smoothed friction, for
+/// the solvers other than the FMU.
 struct Smooth<'a> {
     torque: &'a [f64],
     /// Rate over which the sign of the hub's rate is smoothed in the friction, rad/s.
@@ -175,7 +176,7 @@ fn main() -> Result<()> {
     ensure!(runs > 0, "RUNS = 0 (allowed: 1 or more)");
     let torque = torque(seconds);
     let end = (torque.len() - 1) as f64 * STEP;
-    // Numbers of steps without bound, no detection of stiffness; the rest as it comes.
+    // without a limit of the number of steps and without detection of stiffness; other options have their defaults
     macro_rules! whole_sweep {
         ($solver:ident, $max:expr, $min:expr, $beta:expr) => {{
             let start = cpu_time();

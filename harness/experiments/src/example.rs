@@ -1,5 +1,5 @@
-//! The example of each FMU: histories of inputs, and the FMU's outputs. The files have the names of
-//! the FMI project's rules for exchanged reference results.
+//! The example of each FMU: histories of inputs, and the FMU's outputs. The file names follow the rules of the FMI project
+//! for exchanged reference results.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -22,11 +22,11 @@ pub struct Example {
     inputs: &'static [(&'static str, f64, Course)],
 }
 
-/// Time function of an input, with the largest value 1; t in s.
+/// Shape of an input over time t, s, with the largest value 1.
 type Course = fn(t: f64) -> f64;
 
-/// A sine of 2 Hz, below the slosh frequency of the bench, that grows and fades within ten seconds, followed by no torque.
-/// The hub slips, reverses and comes to rest while the liquid still loads it.
+/// A sine of 2 Hz, below the slosh frequency of the bench, that grows and fades within ten seconds; the torque is 0
+/// afterwards. The hub slips, reverses and comes to rest while the liquid still oscillates.
 const BENCH: Course = |t| swell(t) * (TAU * 2.0 * t).sin();
 const THRUST: Course = |_| 1.0;
 /// A sine of 0.4 Hz, near the slosh frequency of the default tank under 1.5 m/s² (0.42 Hz with the tank held), that grows
@@ -40,8 +40,8 @@ fn swell(t: f64) -> f64 {
     (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0)
 }
 
-/// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, an acceleration of
-/// 1.5 m/s², for which its tank's damping holds.
+/// The examples, one for each FMU. A thrust of 2340 N accelerates the default craft with its liquid, 1562 kg, by 1.5 m/s²,
+/// for which the damping of its tank is valid.
 pub const EXAMPLES: [Example; 3] = [
     Example { model: "HubSlosh", inputs: &[(TAU_CMD, 0.1, BENCH)] },
     Example {
@@ -69,7 +69,7 @@ pub const EXAMPLES: [Example; 3] = [
 const STOP: f64 = 20.0;
 const STEP: f64 = 0.02;
 const EVERY: usize = 5;
-/// Tolerance of the reference. Results with the FMU's default tolerance are within 1e-6 of it.
+/// Tolerance of the reference result. Results with the FMU's default tolerance differ from it by less than 1e-6.
 const TOLERANCE: f64 = 1e-12;
 
 impl Example {
@@ -99,7 +99,7 @@ impl Example {
         let none = BTreeMap::new();
         let input = folder.join(self.input());
         self.histories().write(&input, &none)?;
-        // the reference uses the written file, with its digits
+        // the reference is computed from the written file, whose numbers are rounded
         let answer = replay(fmu, &input, Some(TOLERANCE), false)?;
         thinned(fmu.description(), &answer).write(&folder.join(self.reference()), &none)?;
         let options =

@@ -1,5 +1,5 @@
-//! Tests the simulated gyro as on a bench: hours at rest, the Allan deviation, and its estimated
-//! noise compared with the specified one. [`allan`] has the formulas.
+//! Tests the simulated gyro as on a bench: simulates hours at rest, computes the Allan deviation, and
+//! compares the estimated with the specified noise. The formulas are in [`allan`].
 
 use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
@@ -15,13 +15,13 @@ use names::hubslosh::{OMEGA, OMEGA_IMU, imu};
 use signals::table::Table;
 
 const MOST_RECORDS: usize = 10_000;
-/// Length of the shortest record from which a Gauss–Markov bias can be estimated, in correlation
-/// times of the bias. The Allan deviation of the bias has its maximum at 1.89 correlation times,
-/// and the longest averaging time is a tenth of the record.
+/// Length of the shortest record from which a Gauss–Markov bias can be estimated, in correlation times of the
+/// bias. The Allan deviation of the bias has its maximum at 1.89 correlation times, and the longest averaging
+/// time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
 
-/// A recording of the gyro to simulate. `settings` are start values by their names in the FMU, as
-/// text; `imu.enabled` and `imu.seed` must not be among them.
+/// Records of a gyro to simulate. `settings` are start values by their names in the FMU, as text,
+/// without `imu.enabled` and `imu.seed`.
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub settings: Vec<(String, String)>,
@@ -40,8 +40,10 @@ pub struct Characteristics {
 }
 
 impl Recording {
-    /// Simulates the records, several in parallel, and analyses them. Fails if the hub does not rest, if the
-    /// gyro has no noise, or if the records are too short for its bias.
+    /// Simulates the records, several in parallel, and analyses them.
+    ///
+    /// # Errors
+    /// If the hub is not at rest, the gyro has no noise, or the records are too short for its bias.
     pub fn characterise(
         &self,
         fmu: &Fmu,
@@ -135,7 +137,7 @@ fn record(
     let column = |name| table.column(name).unwrap_or_default();
     ensure!(
         column(OMEGA).iter().all(|omega| *omega == 0.0),
-        "the hub does not rest: leave its start, its torques and the friction of the bearing alone"
+        "the hub is not at rest: do not set its initial state, its torques or the friction of the bearing"
     );
     let readings = column(OMEGA_IMU);
     Ok((allan::variances(run.step, readings), Octaves::from_samples(run.step, readings)))

@@ -1,4 +1,4 @@
-//! Drives FMUs: torque histories, single runs, plans of many runs, and campaigns with their tables.
+//! Drives FMUs: torque histories, single runs, plans with many runs, and campaigns with their tables.
 
 pub mod campaign;
 pub mod example;

@@ -3,9 +3,9 @@ use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};
 use names::hubslosh;
 
-/// Returns the names of the parameters whose start values are not at rest, so that an FMU moves
-/// although nothing is set. HubSlosh begins with the liquid displaced, so that a first plot in any
-/// host shows something; with the value 0 it begins at rest.
+/// Returns the names of the parameters whose start values are not at rest, so that an FMU moves without any
+/// setting. HubSlosh begins with the liquid displaced, so that a first plot in any host shows a motion; if
+/// these parameters are 0, it begins at rest.
 pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     match description.model_name.as_str() {
         "HubSlosh" => vec![hubslosh::init::SLOSH_ANGLE.into()],
@@ -13,7 +13,7 @@ pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     }
 }
 
-/// Creates an instance in which all [`moving_starts`] are 0, so that only the settings move it.
+/// Creates an instance in which all [`moving_starts`] are 0, so that it moves only because of the settings.
 ///
 /// # Errors
 /// If the FMU refuses a call.

@@ -1,4 +1,4 @@
-//! One run: a torque history through one instance of the FMU.
+//! A single run: the simulation of one instance of the FMU under a torque history.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ pub struct Run {
     pub hold: bool,
 }
 
-/// Name of the input that the torque drives if an FMU has it.
+/// Name of the input that the torque drives, if the FMU has this input.
 pub const TORQUE: &str = TAU_CMD;
 
 /// Returns the name of the input that the torque drives: `chosen` if given, otherwise [`TORQUE`], otherwise
@@ -75,14 +75,14 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
 /// [`TORQUE`] until the next row, N·m/s.
 pub const SLOPE: &str = "tau_slope";
 
-/// Reads a file's histories of inputs: every column that is an input of the FMU, and [`SLOPE`] with
-/// [`TORQUE`]. Integers, enumerations (by value) and Booleans (true and false, or 1 and 0) hold from row to
-/// row. Other columns except `time` are an error, or ignored with `ignore`. The first history is the input
-/// `chosen`, else [`TORQUE`], else the file's first. `done` receives messages about the units in which the
-/// columns are read.
+/// Reads histories of inputs from a file: every column that is an input of the FMU, and [`SLOPE`] together with
+/// [`TORQUE`]. Integers, enumerations (by value) and Booleans (true and false, or 1 and 0) are held from row to row.
+/// Other columns except `time` are an error, unless `ignore` is true. The first returned history is the input
+/// `chosen`, otherwise [`TORQUE`], otherwise the first input in the file. `done` receives messages about the units in
+/// which the columns are read.
 ///
 /// # Errors
-/// If the file has no such column, or other columns. The error lists all problems of the columns.
+/// If the file has no column of an input, or other columns. The error lists all problems of the columns.
 pub fn histories(
     description: &ModelDescription,
     path: &Path,
@@ -105,7 +105,7 @@ pub fn histories(
         })
         .collect();
     signals.extend([signal("time", None), signal(SLOPE, Some("N.m/s"))]);
-    // By the names of the inputs, with any unit.
+    // recognised by the names of the inputs, with any unit
     let there = recording::assigned(path, &signals)?;
     let columns: Vec<&str> = there
         .iter()
@@ -231,19 +231,18 @@ impl Run {
         self.torque.span().0
     }
 
-    /// Returns the number of steps between rows of the result, the last of which may be shorter; 0 if
-    /// [`Run::check`] fails.
+    /// Returns the number of steps between rows of the result, the last of which may be shorter. Returns
+    /// 0 if [`Run::check`] fails.
     pub fn steps(&self) -> usize {
         budget::steps(self.stop - self.start(), self.step).unwrap_or(0)
     }
 
-    /// Estimates the memory, bytes, that the communication points of the run and the histories of
-    /// its inputs take.
+    /// Estimates the memory, bytes, for the communication points of the run and the histories of its inputs.
     pub fn course_bytes(&self) -> u64 {
         let all = [&self.torque].into_iter().chain(self.others.iter().map(|(_, other)| other));
         let counts =
             all.map(|torque| torque.row_count(self.sample, self.stop, self.hold).unwrap_or(0));
-        // Each has time, value and slope, and a communication point; growing lists take twice as much.
+        // Each point has time, value and slope, and growing lists take twice as much memory.
         (counts.sum::<usize>() + self.steps()) as u64 * 100
     }
 
@@ -259,8 +258,8 @@ impl Run {
         Ok((histories, schedule))
     }
 
-    /// Returns the torque as the run passes it to the FMU: at every communication point `time` (s), `tau_cmd`
-    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s). The schedule says which points are
+    /// Returns the torque as the run passes it to the FMU: at every communication point `time` (s), `tau_cmd` (N·m) and
+    /// `tau_slope`, its derivative until the next point (N·m/s). The returned schedule contains the points that are
     /// rows of the result.
     ///
     /// # Errors
@@ -347,8 +346,8 @@ impl Run {
         Ok(instance)
     }
 
-    /// Adds to `columns` the variables in `needs` that the caller must also record, each once. Time and the driven
-    /// inputs are in the table anyway.
+    /// Adds to `columns` those variables of `needs` that have to be recorded in addition, each only once. Time and the
+    /// driven inputs are in the table anyway.
     pub fn columns_with<'n>(
         &self,
         columns: &[&'n str],
@@ -367,10 +366,10 @@ impl Run {
         all
     }
 
-    /// Steps an initialised instance to the stop time, with a communication point at every row of an input
-    /// and of the result. The table has `time`, the driven inputs and the variables `columns` every
-    /// [`Run::step`] seconds; [`schedule::ROWS`] says which values of inputs and outputs a row pairs.
-    /// `progress` receives the number of rows since its last call.
+    /// Steps an initialised instance to the stop time, with a communication point at every row of an input and of the
+    /// result. The table has `time`, the driven inputs and the variables `columns` every [`Run::step`] seconds;
+    /// [`schedule::ROWS`] explains which values of inputs and outputs are in the same row. `progress` receives the
+    /// number of rows since its last call.
     ///
     /// # Errors
     /// If the FMU refuses a call, or a recorded value is not finite.
@@ -394,7 +393,7 @@ impl Run {
         let mut time = Vec::with_capacity(rows);
         let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(rows)).collect();
         let inputs = self.inputs(instance.description())?;
-        // Without an input there is no torque to follow.
+        // an FMU without an input is not driven
         let mut cursors: Vec<_> = histories.iter().map(|history| history.cursor()).collect();
         let mut point = 0;
         inputs.drive(instance, self.start(), |instance, t, course| {
@@ -429,8 +428,8 @@ impl Run {
     }
 }
 
-/// Reads the recorded variables of each type with one call; `places` are the columns of the values, first of the reals,
-/// then of the other types.
+/// Reads the recorded variables with one call for each type. `places` are the columns of the values, first for the
+/// Reals, then for the other types.
 struct Recorder {
     reals: Vec<u32>,
     others: Vec<Variable>,
@@ -468,8 +467,8 @@ impl Recorder {
         })
     }
 
-    /// Adds the present values of the recorded variables as a row. Returns the position of the
-    /// first value that is NaN or infinite, if there is one.
+    /// Adds the current values of the recorded variables as a row. Returns the position of the first value that is NaN
+    /// or infinite, if there is one.
     fn record(&mut self, instance: &mut Instance) -> Result<Option<usize>> {
         instance.get_real(&self.reals, &mut self.values)?;
         for (value, place) in self.values.iter().zip(&self.places) {

@@ -1,8 +1,9 @@
-//! Similarity of a bench and a flight tank: Bond numbers, the tank with equal Bond numbers, Froude's factors.
-//! Sources: `formulas::similarity`; Rubaga's thesis 2.5, 2.6 and 7.2, with corrected numbers.
+//! Similarity of a bench and a flight tank: Bond numbers, the flight tank with the same Bond number as the
+//! bench, and the factors of Froude similarity. Sources: `formulas::similarity`; Rubaga's thesis 2.5, 2.6 and
+//! 7.2, with corrected numbers.
 //!
-//! For an angular acceleration there are two different Bond numbers. The thesis's 45.87 is Bo_i of its bench,
-//! but its equivalent tank follows from Bo_r.
+//! There are two different Bond numbers of an angular acceleration: Bo_i with the distance from the axis, and Bo_r with
+//! the radius only. The thesis's 45.87 is Bo_i of its bench, but its equivalent tank was computed from Bo_r.
 
 use std::fmt::Write;
 
@@ -90,8 +91,8 @@ pub fn bond(
     Ok(Found { text, json })
 }
 
-/// Computes Bond, Weber and Froude numbers of a liquid that moves at `velocity` (m/s), and names the dominant
-/// force. Also computes the times that gravity and surface tension take over the radius (thesis 2.28, 2.29).
+/// Computes Bond, Weber and Froude numbers of a liquid that moves at `velocity` (m/s), and names the dominant force.
+/// Also computes the time scales of gravity and of surface tension for this radius (thesis 2.28, 2.29).
 ///
 /// # Errors
 /// If a value is not positive.
@@ -130,8 +131,8 @@ pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result
     Ok(Found { text, json })
 }
 
-/// Computes the bench's rotational Bond numbers at the angular acceleration `alpha` (rad/s²) and rate `omega`
-/// (rad/s), and the tanks that have the same numbers at the angular acceleration `target` in flight.
+/// Computes the bench's rotational Bond numbers at the angular acceleration `alpha` (rad/s²) and rate `omega` (rad/s),
+/// and the flight tanks that have the same numbers at the angular acceleration `target`, rad/s².
 ///
 /// # Errors
 /// If a value is not positive.
@@ -180,8 +181,8 @@ pub fn rotation(
     Ok(Found { text, json })
 }
 
-/// Computes the factors of Froude similarity (the thesis's Table 2.3) for the ratios of length, density and
-/// gravity of full size to model.
+/// Computes the factors of Froude similarity (the thesis's Table 2.3) from the ratios of length, density and gravity
+/// between full size and model.
 ///
 /// # Errors
 /// If a ratio is not positive, or a factor overflows.
@@ -212,8 +213,8 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     Ok(Found { text, json })
 }
 
-/// A number of the thesis's scaling: its place and name, the value as printed, the value that follows from
-/// the thesis's own data with its unit, and the reason for a difference.
+/// A number of the thesis's scaling: section and name, the value as printed, the value that follows from the thesis's
+/// own data with its unit, and the reason for a difference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     pub what: &'static str,
@@ -308,7 +309,7 @@ mod tests {
         thesis().into_iter().find(|f| f.what.starts_with(what)).expect(what).value
     }
 
-    /// Each number of section 7.2 of the thesis, corrected where the thesis is wrong, is reproduced to half a unit of
+    /// Each value of section 7.2 of the thesis, corrected where the thesis is wrong, is reproduced to half a unit of
     /// its last printed digit.
     #[test]
     fn numbers_of_the_thesis_are_reproduced_with_their_corrections() {
@@ -332,13 +333,12 @@ mod tests {
         }
     }
 
-    /// `hubslosh scale bond`: an oxygen tank that is computed from the Bond number of the bench with water has this Bond
-    /// number.
+    /// A flight tank of oxygen that is computed from the Bond number of the bench with water has the same Bond number.
     #[test]
     fn the_equivalent_tank_has_the_bench_s_bond_number() {
         let same = WATER.bond(9.81, BENCH.0);
         let g = OXYGEN.acceleration(same, 2.0425);
-        // rounding of a handful of products
+        // rounding errors of a few products
         assert!((OXYGEN.bond(g, 2.0425) / same - 1.0).abs() < 1e-14);
         assert!((OXYGEN.radius(same, g) / 2.0425 - 1.0).abs() < 1e-14);
         let cube = OXYGEN.rotational_bond(0.3, 0.7, 0.7);

@@ -1,5 +1,5 @@
-//! Detects runs in which weight does not dominate the liquid, from Bond, Weber and Froude numbers (Rubaga's
-//! thesis 2.5), for the bench's tank and for tanks in six axes.
+//! Detects runs in which weight does not dominate the liquid, from Bond, Weber and Froude numbers (Rubaga's thesis 2.5). It
+//! is used for the bench's tank and for tanks of the six-axis FMUs.
 
 use anyhow::{Result, ensure};
 use formulas::cylinder::{self, XI};
@@ -9,7 +9,7 @@ use host::fmu::Instance;
 use names::{sloshtank, spacecraft};
 use signals::table::Table;
 
-/// Bond number below which none of the project's models represents the liquid (thesis 2.5, 8.2.2).
+/// Bond number below which none of the project's models is valid (thesis 2.5, 8.2.2).
 const LEAST_BOND: f64 = 30.0;
 
 /// Surface tension of water at 24 degC, N/m: HubSlosh's start value of `fluid.sigma`.
@@ -21,8 +21,8 @@ pub struct Contents {
     pub radius: f64,
 }
 
-/// Bond and Weber number of the row in which weight dominates least. The Bond number is negative if the
-/// specific force points out of the liquid.
+/// Bond and Weber number of the row in which weight dominates least. The Bond number is negative if the specific force
+/// points out of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weightless {
     bond: f64,
@@ -30,17 +30,16 @@ pub struct Weightless {
 }
 
 impl Contents {
-    /// Returns the Bond and Weber number of the row in which weight dominates the liquid least, or
-    /// `None` if it dominates in every row. A row has the specific force towards the bottom of the
-    /// tank, m/s², and the speed of the free surface, m/s. A row's Weber number uses the radius and
-    /// the highest speed up to it.
+    /// Returns the Bond and Weber number of the row in which weight dominates the liquid least, or `None` if it dominates
+    /// in every row. A row contains the specific force towards the bottom of the tank, m/s², and the speed of the free
+    /// surface, m/s. The Weber number of a row uses the radius, and the highest speed in this row and all rows before.
     pub fn without_weight(&self, rows: impl IntoIterator<Item = (f64, f64)>) -> Option<Weightless> {
         let (mut speed, mut worst) = (0.0f64, None::<(f64, Weightless)>);
         for (g, v) in rows {
             speed = speed.max(v);
             let bond = self.liquid.bond(g, self.radius);
             let weber = self.liquid.weber(speed, self.radius);
-            // The distance from dominance: Bond number against 30, and weight against inertia.
+            // Measure of dominance: Bond number divided by 30, or weight divided by inertia if this is smaller.
             let rules = (bond / LEAST_BOND).min(bond / weber.max(1.0));
             if rules < 1.0 && worst.is_none_or(|(other, _)| rules < other) {
                 worst = Some((rules, Weightless { bond, weber }));
@@ -68,7 +67,7 @@ impl std::fmt::Display for Weightless {
             }
             // Weight still dominates, but the surface is curved.
             gravity if gravity.starts_with("gravity") => {
-                "the surface is curved, and where the liquid is, is uncertain"
+                "the surface is curved, and the position of the liquid is uncertain"
             }
             other => other,
         };
@@ -80,10 +79,9 @@ impl std::fmt::Display for Weightless {
     }
 }
 
-/// A tank of Spacecraft or SloshTank: the prefix of its variables' names (`tank[1]`, `tank`), the hinge of
-/// mode 1 relative to O, m, and the direction out of the liquid, in axes of craft or host, and the wall
-/// elevation per slosh angle of each mode, m. `has_ball` is true if the FMU models detached liquid, but not
-/// in this tank.
+/// A tank of Spacecraft or SloshTank: the prefix of its variables' names (`tank[1]`, `tank`), the hinge of mode 1 relative
+/// to O, m, and the direction out of the liquid, both in the axes of the craft or the host, and the wall elevation per
+/// slosh angle of each mode, m. `has_ball` is true if the FMU can model detached liquid, but does not in this tank.
 #[derive(Clone, Debug)]
 struct Tank {
     name: String,
@@ -94,8 +92,8 @@ struct Tank {
     has_ball: bool,
 }
 
-/// The tanks of Spacecraft or SloshTank in which only weight holds the liquid. `accelerometer` is the
-/// specific force at O: `specific_force`, or SloshTank's input `a`.
+/// The tanks of Spacecraft or SloshTank in which only weight holds the liquid at the bottom. `accelerometer` is the
+/// variable of the specific force at O: `specific_force`, or SloshTank's input `a`.
 #[derive(Clone, Debug)]
 pub struct Tanks {
     tanks: Vec<Tank>,
@@ -109,9 +107,10 @@ fn components(name: &str) -> [String; 3] {
 impl Tanks {
     /// Reads the tanks of an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
     ///
-    /// The density is the tank's `density`. The radius is half of the tank's `diameter`, or the radius of the cylinder in
-    /// which the wave is equally high, R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it.
-    /// Tanks without modes, with unknown dimensions (`wave` = 0), and those whose liquid a stiffness k holds are left out.
+    /// The density is the tank's `density`. The radius is half of the tank's `diameter`, or the radius R = wave (ξ² − 1)/2
+    /// of the cylinder with an equally high wave. The surface `tension` is in N/m; the six-axis FMUs do not have this
+    /// parameter. Tanks without modes, with unknown dimensions (`wave` = 0), and tanks whose liquid is held by a stiffness
+    /// k are left out.
     ///
     /// # Errors
     /// If the tension is not positive, or a variable cannot be read.
@@ -150,8 +149,8 @@ impl Tanks {
         if self.tanks.is_empty() { Vec::new() } else { host.chain(tanks).collect() }
     }
 
-    /// Describes the tanks of a run in which weight does not dominate the liquid. The table must have the
-    /// variables of [`Tanks::required_variables`].
+    /// Describes the tanks of a run in which weight does not dominate the liquid. The table must contain
+    /// the variables of [`Tanks::required_variables`].
     pub fn without_weight(&self, table: &Table) -> Vec<String> {
         self.tanks
             .iter()
@@ -189,7 +188,7 @@ impl Tank {
         if real("k[1]")? > 0.0 {
             return Ok(None);
         }
-        // In a tank that drains the hinge moves; the origin of the tank is used instead.
+        // the hinge moves in a tank that drains, so that the origin of the tank is used instead
         let height = match (drains, diameter > 0.0) {
             (true, _) => 0.0,
             (_, true) => cylinder(1).hinge,
@@ -215,9 +214,8 @@ impl Tank {
         modes.flat_map(|n| [1, 2].map(|i| format!("{}.p_dot[{n},{i}]", self.name))).collect()
     }
 
-    /// Describes how weight fails to dominate in this tank, from the specific force along the axis at the
-    /// hinge of mode 1, f_O + ω' × ρ + ω × (ω × ρ), and the speed of the surface at the wall, summed over all
-    /// modes.
+    /// Describes how weight fails to dominate in this tank. It uses the specific force along the axis at the hinge of mode
+    /// 1, f_O + ω' × ρ + ω × (ω × ρ), and the speed of the surface at the wall, summed over all modes.
     fn without_weight(&self, table: &Table, accelerometer: &str) -> Option<String> {
         let column = |name: &String| table.column(name);
         let vector = |name: &str| {
@@ -252,8 +250,8 @@ impl Tank {
     }
 }
 
-/// Returns the unit vector of a frame's z axis in the outer axes, from the frame's attitude: a
-/// quaternion of any norm with the scalar first.
+/// Returns the unit vector of a frame's z axis in the outer axes. The attitude of the frame is a quaternion of any norm
+/// with the scalar first.
 fn third_axis([w, x, y, z]: [f64; 4]) -> [f64; 3] {
     let norm2 = w * w + x * x + y * y + z * z;
     [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z]
@@ -270,8 +268,8 @@ mod tests {
 
     const WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
 
-    /// Returns a tank of radius 0.45 m at 1 m along x, with its axis along y (a quarter turn about -x) and
-    /// its hinge 0.5 m up that axis.
+    /// Returns a tank with a radius of 0.45 m at 1 m along x, with its axis along y (a quarter turn about -x) and its hinge
+    /// 0.5 m up that axis.
     fn tank(has_ball: bool) -> Tanks {
         let upwards = third_axis([1.0, -1.0, 0.0, 0.0]);
         assert_eq!(upwards, [0.0, 1.0, 0.0]);
@@ -286,9 +284,8 @@ mod tests {
         Tanks { tanks: vec![tank], accelerometer: "specific_force" }
     }
 
-    /// Returns the warnings about the tanks for a run whose rows have the specific force along y,
-    /// the angular acceleration about z, the rate about x, and the rates of the first modes along
-    /// x.
+    /// Returns the warnings about the tanks for a run. Its rows contain the specific force along y, the angular
+    /// acceleration about z, the rate about x, and the rates of the first two modes along x.
     fn warnings(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
         let names: Vec<String> =
             ["time".to_string()].into_iter().chain(tanks.required_variables()).collect();
@@ -308,12 +305,12 @@ mod tests {
     }
 
     #[test]
-    fn a_tank_s_numbers_equal_those_of_its_hinge_and_of_all_its_modes() {
+    fn bond_and_weber_numbers_use_the_acceleration_of_the_hinge_and_the_speed_of_all_modes() {
         let tanks = tank(true);
         // 0.02 m/s²: Bo = 1000 0.02 0.45²/0.072 = 56.3; 0.4 0.05 + 0.1 0.1 = 0.03 m/s: We = 5.6, Fr = 0.1
         assert_eq!(warnings(&tanks, &[[0.02, 0.0, 0.0, 0.05, 0.1]; 2]), [""; 0]);
-        // Cut off at O, what is left is ω' x = 0.004 1 m/s², less ω² 0.5 = 0.002 m/s²: Bo = 1000 0.002 0.45²/0.072 = 5.625.
-        // The surface was at 0.4 0.2 m/s before: We = 1000 0.08² 0.45/0.072 = 40, Fr = 7.11.
+        // With no thrust the specific force is ω' x = 0.004 1 m/s² minus ω² 0.5 = 0.002 m/s²: Bo = 1000 0.002 0.45²/0.072 =
+        // 5.625. The surface moved at 0.4 0.2 m/s before: We = 1000 0.08² 0.45/0.072 = 40, Fr = 7.11.
         let omega = 0.004f64.sqrt();
         let rows = [[0.2, 0.0, 0.0, 0.2, 0.0], [0.0, 0.004, omega, 0.0, 0.0]];
         let [cut] = <[String; 1]>::try_from(warnings(&tanks, &rows)).unwrap();
@@ -325,12 +322,12 @@ mod tests {
         }
         let [without] = <[String; 1]>::try_from(warnings(&tank(false), &rows)).unwrap();
         assert!(!without.contains("ball"), "{without}");
-        // The bench's words where weight still rules: at 0.01 m/s², Bo = 28.1, and nothing moves.
+        // Weight still dominates at 0.01 m/s², Bo = 28.1, with nothing moving: same warning as for the bench.
         let [low] =
             <[String; 1]>::try_from(warnings(&tanks, &[[0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
         assert!(low.contains("Bond number 28.125") && low.contains("curved"), "{low}");
         assert!(!low.contains("ball"), "{low}");
-        // Reversed: it falls.
+        // With the opposite direction of the specific force the liquid falls.
         let [back] =
             <[String; 1]>::try_from(warnings(&tanks, &[[-0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
         for words in ["Bond number -28.125", "Froude number infinite", "other end", "ball.travel"] {

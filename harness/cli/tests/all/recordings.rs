@@ -170,7 +170,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     std::fs::write(directory.join("logger.csv"), text.replace('.', ",")).unwrap();
     let columns = ["--columns", "time=t,tau_cmd=T_cmd,omega=gyro z"];
     let (found, said) = analyse("logger.csv", &columns);
-    assert!(said.contains("the torque begins at 7.00 s of it"), "{said}");
+    assert!(said.contains("the torque begins at 7.00 s of the recording"), "{said}");
     // a row in 500 on a line between its neighbours: of a 2.4 Hz sine at 50 Hz, 4.5 % of its size too little
     for (name, most) in
         [("f_res_hz", 2e-4), ("f_dip_hz", 2e-4), ("notch_db", 0.3), ("fit_time_pct", 0.5)]

@@ -222,5 +222,5 @@ fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {
     let list = std::fs::read_to_string(&manifest).unwrap();
     std::fs::write(&manifest, list.replace("amplitude = 0.1", "amplitude = -0.1")).unwrap();
     let said = text(&analyse(folder).stderr);
-    assert!(said.contains("with the other sign"), "{said}");
+    assert!(said.contains("with the opposite sign"), "{said}");
 }

@@ -1,12 +1,12 @@
 //! A campaign: the runs of a plan, simulated in parallel, each stored and analysed.
 //!
-//! A stored run is reused, whichever program wrote it, if three conditions hold: the file `runs/<name>.parquet` is
+//! A stored run is reused, whichever program wrote it, if three conditions are met: the file `runs/<name>.parquet` is
 //! complete, its metadata (Parquet key-value pairs) contain the run's [recipe](recipe::recipe), and its hash is the one in
-//! the manifest ([`Store`]). All tables follow from the [columns](STORED) of the runs, so that another importer that writes
-//! the columns and metadata of [`Campaign::list`] gets the same tables.
+//! the manifest ([`Store`]). All tables are computed from the [columns](STORED) of the runs. Therefore another program that
+//! simulates the runs of [`Campaign::list`] and writes their columns and metadata gets the same tables.
 //!
 //! The analysis is that of the thesis's bench. For an FMU without the bench's variables, all outputs are stored, and
-//! `runs.csv` has only the settings of each run.
+//! `runs.csv` contains only the settings of each run.
 
 mod onset;
 mod outcome;
@@ -47,9 +47,9 @@ use crate::rest;
 use crate::run::Run;
 use crate::sensors::Sensors;
 
-/// Columns of a stored run of the bench, SI units, at every communication point from the torque's start to
-/// the stop time. Other columns may follow. The first six are for plots. Wave height, energy, work,
-/// dissipated energy, stuck time and the liquid's force on the tank are for the tables.
+/// Columns of a stored run of the bench, SI units, at every communication point from the torque's start to the stop time.
+/// Other columns may follow. The first six are for plots; wave height, energy, work, dissipated energy, stuck time and the
+/// liquid's force on the tank are for the tables.
 pub const STORED: [&str; 13] = [
     "time",
     TAU_CMD,
@@ -86,7 +86,7 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
     }
-    // and the slosh angles of a six-axis FMU, which are local variables
+    // outputs, and the slosh angles of a six-axis FMU, which are local variables
     let outputs = description
         .variables
         .iter()
@@ -97,8 +97,8 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
 }
 
-/// Lists the columns of a run's file: [`stored_columns`], and the variables with the reasons for which its
-/// tanks are out of range.
+/// Lists the columns of a run's file: [`stored_columns`], and the variables that show whether the run left the range of
+/// validity of its tanks' models.
 fn recorded_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     let mut columns = stored_columns(description, input);
     let limits = warning_limits(description);
@@ -110,9 +110,9 @@ fn warning_limits(description: &ModelDescription) -> Limits {
     Limits::find(|name| description.variable(name).is_ok())
 }
 
-/// A plan with the settings for its execution. `force` simulates stored runs again; `jobs` is the number of
-/// runs simulated and analysed in parallel, 0 for the number of cores; `compare` is the directory of another
-/// campaign that the report compares with.
+/// A plan with the settings for its execution. If `force` is true, stored runs are simulated again. `jobs` is the number of
+/// runs that are simulated and analysed in parallel, 0 for the number of cores. `compare` is the directory of another
+/// campaign with which the report compares this one.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     pub plan: Plan,
@@ -132,18 +132,16 @@ pub struct Failure {
     pub reason: String,
 }
 
-/// A run of an FMU that is not the bench, with its stored columns. These are thinned, except the last rows in
+/// A run of an FMU that is not the bench, with its stored columns. The columns are thinned, except their last rows in
 /// `tail`, and empty for most runs of a large campaign ([`keeps_curves`]).
 #[derive(Clone, Debug)]
 pub struct Unanalysed {
     pub case: Case,
     pub history: History,
     pub tail: History,
-    /// Largest slosh angle of the run, rad, and the name of the variable that has it; `None` if the
-    /// FMU has no slosh angles.
+    /// Largest slosh angle of the run, rad, and the name of its variable; `None` if the FMU has no slosh angles.
     pub largest_angle: Option<(f64, String)>,
-    /// Sentences about the tanks that left the range in which their model is valid, one for each
-    /// such tank.
+    /// Sentences about tanks that left the range of validity of their model, one for each such tank.
     pub limits: Vec<String>,
     pub reused: bool,
 }
@@ -166,11 +164,11 @@ impl Results {
     }
 }
 
-/// Number of runs whose curves are kept for the report. The others keep only numbers, which bounds the memory
-/// of a campaign.
+/// Number of runs whose curves are kept for the report. Of all other runs only numbers are kept, which limits the
+/// memory of a campaign.
 pub const CURVES: usize = 400;
 
-/// Returns true if the curves of run `i` of `runs` are kept. The kept runs are spread over the plan and
+/// Returns true if the curves of run `i` of `runs` are kept. The kept runs are spread evenly over the plan and
 /// include its last run.
 pub fn keeps_curves(i: usize, runs: usize) -> bool {
     i.is_multiple_of(runs.div_ceil(CURVES).max(1)) || i + 1 == runs
@@ -235,7 +233,7 @@ impl Campaign {
         let jobs = jobs.min(cases.len().max(1));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
         let warned = Mutex::new(BTreeSet::new());
-        // once for many runs, whose warnings differ at most in numbers
+        // only one warning of several that differ only in numbers
         let warn = |case: &Case, warning: String| {
             let words: String = warning.chars().filter(|c| !c.is_ascii_digit()).collect();
             let mut warned = warned.lock().unwrap_or_else(PoisonError::into_inner);
@@ -284,9 +282,9 @@ impl Campaign {
         )
     }
 
-    /// Returns the expanded runs for simulation by another program. Each has its name, its file in the
-    /// campaign's directory, settings, the torque (as text for `hubslosh torque`) and times. It also has the
-    /// metadata that the analysis requires in its Parquet file.
+    /// Returns the runs of the plan for simulation by another program. Each has its name, its file in the campaign's
+    /// directory, settings, the torque (as text for `hubslosh torque`) and times, and the metadata that its Parquet file
+    /// must contain for the analysis.
     pub fn list(&self, fmu: &Fmu) -> Result<serde_json::Value> {
         let description = fmu.description();
         let (mut columns, mut kept) = (Vec::<String>::new(), Vec::new());
@@ -295,7 +293,7 @@ impl Campaign {
         for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
             kept = recorded_columns(description, run.input.as_deref());
-            // signals for sensors are recorded with the rest; readings are computed when the run is read
+            // the variables that sensors need are recorded; their readings are computed when the run is read
             let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step)?;
             for name in kept.iter().map(String::as_str).chain(sensors.required_variables()) {
                 if !columns.iter().any(|column| column == name) {
@@ -308,7 +306,7 @@ impl Campaign {
                 at_rest.map(|name| (name, json!(0.0))).collect();
             for (name, text) in &case.settings {
                 let value = match description.value(description.variable(name)?, text)? {
-                    // an enumeration keeps the name of its item
+                    // an enumeration is given by the name of its item
                     Value::Integer(i) if i.to_string() == *text => json!(i),
                     Value::Integer(_) => json!(text),
                     Value::Real(x) => json!(x),
@@ -371,7 +369,7 @@ impl Campaign {
         let put = |table: &Table, notes: &BTreeMap<String, String>| {
             store.add(&case.name, |path| table.write(path, notes))
         };
-        // before a simulation that may take hours
+        // checked before a simulation that may take hours
         let work = match is_bench(fmu.description()) && case.recording.is_none() {
             true => outcome::check_work(&case.torque, run.step, run.steps() + 1),
             false => Ok(()),
@@ -434,7 +432,7 @@ impl Campaign {
                 }
             }
             None => {
-                // time and the driven input are always columns
+                // without time and the driven input, which are always recorded
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
                 let others: Vec<&str> = others.map(String::as_str).collect();
                 let others = run.columns_with(&others, sensors.required_variables());
@@ -485,9 +483,9 @@ impl Campaign {
         })
     }
 
-    /// Returns the tables with their names: `features.csv`, and `features_spa.csv` and `features_h1.csv` with
-    /// the same columns from the `spa` and H1 responses. `runs.csv` has every run, also failed ones, with its
-    /// settings and all features. Without a run of the bench there is only `runs.csv`.
+    /// Returns the tables with their names: `features.csv`, and `features_spa.csv` and `features_h1.csv` with the same
+    /// columns from the `spa` and H1 responses. `runs.csv` contains every run, also failed ones, with its settings and all
+    /// features. If the plan has no run of the bench, there is only `runs.csv`.
     pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let plan = sha256(self.plan.text.as_bytes());
         let Results { outcomes, unanalysed, failures } = results;
@@ -518,7 +516,7 @@ impl Campaign {
     }
 }
 
-/// Writes a CSV table row by row, because all rows of a large campaign at once would take more
+/// Writes a CSV table row by row, because all rows of a large campaign at the same time would take more
 /// memory than its results.
 fn written(header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());

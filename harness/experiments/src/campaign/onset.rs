@@ -1,7 +1,8 @@
-//! Search for the onset of rotary slosh: the smallest torque at which a dwell at some frequency becomes rotary.
+//! Search for the onset of rotary slosh: the smallest amplitude of a sine torque with which the slosh becomes
+//! rotary at any frequency.
 //!
-//! At each torque the search dwells at all frequencies of a grid, and it bisects the torque. The dwells are those of the
-//! plan: same settings, same duration, from the same start.
+//! At each amplitude the search simulates dwells (runs at constant frequency) at all frequencies of a grid, and it bisects
+//! the amplitude. The dwells have the settings, the duration and the initial state of the plan.
 
 use anyhow::{Result, ensure};
 use files::budget;
@@ -16,7 +17,7 @@ use crate::progress::Progress;
 
 const APART: f64 = 0.0025;
 const WITHIN: f64 = 0.0025;
-/// Number of grid steps by which the frequencies with rotary slosh at a smaller torque may lie outside the range of
+/// Number of grid steps by which the frequencies with rotary slosh at a smaller torque may be outside the range of such
 /// frequencies at a larger torque.
 const MARGIN: usize = 3;
 
@@ -27,17 +28,17 @@ struct Dwell {
 }
 
 /// Result of a search for the onset of rotary slosh: its frequency, Hz, the largest torque without rotary slosh and the
-/// smallest torque with it, N·m. If no torque makes the slosh rotary, there are no torques, and the frequency is where the
-/// slosh angle is largest.
+/// smallest torque with it, N·m. If no torque makes the slosh rotary, there are no torques, and the frequency is that of
+/// the largest slosh angle.
 #[derive(Debug, PartialEq)]
 struct Found {
     frequency: f64,
     torques: Option<[f64; 2]>,
 }
 
-/// Replaces the `[onset]` of a plan by dwells, sine torques of constant frequency, at the onset of
-/// rotary slosh that it finds. Does nothing for a plan without `[onset]`. `jobs` dwells are
-/// simulated in parallel; 0 for the number of cores.
+/// Replaces the `[onset]` of a plan by dwells, which are sine torques of constant frequency, at the onset of rotary slosh
+/// that it finds. Does nothing for a plan without `[onset]`. `jobs` dwells are simulated in parallel, or as many as there
+/// are cores if it is 0.
 pub fn seek_onset(
     plan: &mut Plan,
     fmu: &Fmu,
@@ -98,7 +99,7 @@ fn search(
     [mut low, mut high]: [f64; 2],
     dwell: &(dyn Fn(f64, f64) -> Result<Dwell> + Sync),
 ) -> Result<Found> {
-    // without the dust of binary fractions
+    // removes rounding errors of binary fractions
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
     let steps = ((band[1] - band[0]) / APART).round() as usize;
     let grid: Vec<f64> = (0..=steps).map(|k| rounded(band[0] + k as f64 * APART)).collect();
@@ -143,7 +144,8 @@ mod tests {
 
     #[test]
     fn the_onset_is_the_smallest_torque_with_rotary_slosh() {
-        // a leaning tongue: from 0.06 N·m at 2.4 Hz, wider with the torque
+        // the range of frequencies with rotary slosh begins with 0.06 N·m at 2.4 Hz, and becomes wider and
+        // shifts with the torque
         let dwell = |frequency: f64, torque: f64| {
             let (low, high) = (2.4 - 0.8 * (torque - 0.06), 2.4 + 0.3 * (torque - 0.06));
             let rotary = torque >= 0.06 && (low - 1e-9..high + 1e-9).contains(&frequency);

@@ -1,5 +1,5 @@
-//! Results of a run of the bench: totals and, if its torque allows, its
-//! frequency response by three estimators, a fitted model, and the motion of the liquid.
+//! Results of a run of the bench: maxima and totals, the motion of the liquid and, if the torque allows it, the frequency
+//! response by three estimators and a fitted model.
 
 use std::borrow::Cow;
 
@@ -32,26 +32,24 @@ use names::hubslosh::{
 };
 use signals::table::Table;
 
-/// Number of frequencies of the responses, which are 1.2 mHz apart at the antiresonance of the thesis's
-/// sweep.
+/// Number of frequencies of the responses. They are 1.2 mHz apart at the antiresonance of the thesis's sweep.
 const GRID_POINTS: usize = 2000;
 
-/// Smallest distance of antiresonance and resonance, in units of the estimate's frequency
-/// resolution, at which both count as resolved.
+/// Smallest separation of antiresonance and resonance, in units of the estimate's frequency resolution, at which
+/// both count as resolved.
 const RESOLVED: f64 = 3.0;
-/// Largest residual of a fitted transfer function that counts as valid, relative to the rate. With
-/// 0.3, a tenth of the power of the rate does not follow from the torque.
+/// Largest residual of a fitted transfer function, relative to the rate, at which the fit counts as valid. With 0.3, a tenth
+/// of the power of the rate does not follow from the torque.
 const MOST_MISFIT: f64 = 0.3;
-/// Largest shift of the resonance by a passing sweep, relative to the distance of antiresonance and
-/// resonance, that counts as valid; also the largest such difference of two estimates from a whole
-/// record. The shift is 0.6 times the root of the sweep's rate, Hz/s, if the resonance is narrower
-/// than that.
+/// Largest shift of the resonance by a passing sweep, relative to the separation of antiresonance and resonance, at which the
+/// estimate counts as valid; also the largest such difference of two estimates from a whole record. If the resonance is
+/// narrow, the shift is 0.6 times the square root of the sweep's rate in Hz/s.
 const MOST_SHIFT: f64 = 0.25;
 
 const LEAST_SNR: f64 = 0.0;
 
-/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. If the
-/// band begins far below one cycle in the whole run, the windows of most frequencies hold all rows.
+/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. The work is large if
+/// the band begins far below one cycle per run, because the windows of most frequencies then contain all rows.
 pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> {
     let Some((profile, band)) = torque.profile().and_then(|p| Some((p, p.band()?))) else {
         return Ok(());
@@ -67,7 +65,7 @@ pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> 
     ensure!(
         work <= budget::PRODUCTS,
         "the frequency responses of {rows} rows, {step:?} s apart, from {:?} to {:?} Hz take {work:.1e} products (allowed: {:.0e}). \
-         A higher first frequency, a longer step or a shorter run takes less",
+         A higher first frequency, a longer step or a shorter run needs less work",
         band.0,
         band.1,
         budget::PRODUCTS
@@ -75,13 +73,12 @@ pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> 
     Ok(())
 }
 
-/// Maxima and totals of a run; NaN where a recording has no value.
+/// Maxima and totals of a run; NaN for quantities that a recording does not contain.
 ///
-/// - `peak_slosh_angle`, rad; `peak_rate`, rad/s: of |gyro rate minus bias|, where the bias is the mean under
-///   a sweep or noise.
+/// - `peak_slosh_angle`, rad; `peak_rate`, rad/s: largest |gyro rate − bias|. The bias is the mean under a sweep or noise.
 /// - `peak_acceleration`, rad/s²: from central differences of the gyro's rate, as in Rubaga's thesis (7.2.2).
-/// - `gyro_errors`: true if the gyro's errors were on, so that its reading differs from the rate.
-/// - `max_energy_residual`: largest |E(t) − E(0) − work + heat| over the energy throughput Σ|Δwork| + heat.
+/// - `gyro_errors`: true if the gyro's errors were enabled, so that its reading differs from the rate.
+/// - `max_energy_residual`: largest |E(t) − E(0) − work + heat|, divided by the energy throughput Σ|Δwork| + heat.
 /// - `stuck`: time in stiction, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
@@ -131,9 +128,9 @@ impl Totals {
     }
 }
 
-/// Rates measured by a gyro, minus their biases, rad/s: about the hub's axis, and about x and y if a
-/// recording has them. `bias` is that about the hub's axis, 0 for a gyro without errors; `warnings` are about
-/// the means of the rates.
+/// Rates measured by a gyro, minus their biases, rad/s: about the hub's axis, and about x and y if a recording contains
+/// them. `bias` is the bias about the hub's axis, 0 for a gyro without errors; `warnings` are about large or drifting
+/// means of the rates.
 struct Rates {
     about_axis: Vec<f64>,
     others: [Option<Vec<f64>>; 2],
@@ -141,14 +138,14 @@ struct Rates {
     warnings: Vec<String>,
 }
 
-/// Ratio of a rate's mean to its standard deviation above which a warning reports the mean, because
-/// it would add 1 % to the energy of the rate.
+/// Ratio of a rate's mean to its standard deviation above which a warning reports the mean. A mean of this size would add 1 %
+/// to the energy of the rate.
 const NOTABLE_MEAN: f64 = 0.1;
 const PARTS: usize = 8;
 
 impl Rates {
-    /// Measures the rates and their biases. For a sweep or noise, which turn the hub to and fro, the bias is the mean of
-    /// the record. With any other torque the mean also contains motion. Then the bias of a simulated gyro is its mean
+    /// Measures the rates and their biases. Under a sweep or noise, with which the hub oscillates, the bias is the mean of
+    /// the record. Under any other torque the mean also contains motion. Then the bias of a simulated gyro is its mean
     /// difference from the true rate, and the bias of a recorded gyro is unknown and not removed.
     fn measure(table: &Table, alternates: bool, is_recording: bool) -> Rates {
         let column = |name| table.column(name).unwrap_or_default();
@@ -207,8 +204,8 @@ fn peak_slope(time: &[f64], signal: &[f64]) -> f64 {
     slopes.fold(0.0, |most, slope| f64::max(most, slope.abs()))
 }
 
-/// Signals of a run by name, thinned for plots: the smallest and the largest value of each of at most
-/// [`History::STRETCHES`] stretches, in the order of time.
+/// Signals of a run by name, thinned for plots. The run is divided into at most [`History::STRETCHES`] time intervals, of
+/// which the smallest and the largest value of each signal remain, in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     pub time: Vec<f64>,
@@ -251,9 +248,8 @@ impl History {
     }
 }
 
-/// Residual motion at a run's end: the largest |rate|, rad/s, and |slosh_angle|, rad, after the manoeuvre, or
-/// in the last fifth of the run. `manoeuvre` is the time at which the torque ends, s, if the run continues
-/// without torque.
+/// Residual motion at the end of a run: the largest |rate|, rad/s, and |slosh_angle|, rad, after the manoeuvre, or in the
+/// last fifth of the run. `manoeuvre` is the time at which the torque ends, s, if the run continues without torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ending {
     pub manoeuvre: Option<f64>,
@@ -281,9 +277,8 @@ fn manoeuvre(torque: &Curve) -> Option<f64> {
     (end < 0.9 * whole).then_some(end)
 }
 
-/// Path of the surface's crest seen from above, in two short stretches of a run: around the largest wave, and
-/// around the onset of rotary slosh if there is one. Points are time, s, and angles outwards and towards +θ,
-/// rad.
+/// Path of the wave crest seen from above, in two short time intervals of a run: around the largest wave, and around the
+/// onset of rotary slosh if there is one. A point is the time, s, and the slosh angles outwards and towards +θ, rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SloshPath {
     pub largest: Vec<[f64; 3]>,
@@ -291,9 +286,9 @@ pub struct SloshPath {
 }
 
 impl SloshPath {
-    /// Length of the stretch around the largest wave, in slosh periods.
+    /// Length of the time interval around the largest wave, in slosh periods.
     pub const LARGEST: f64 = 7.0;
-    /// Length of the stretch around the onset, in slosh periods.
+    /// Length of the time interval around the onset of rotary slosh, in slosh periods.
     pub const ONSET: f64 = 38.0;
 
     fn around_extremes(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
@@ -319,25 +314,24 @@ impl SloshPath {
 pub struct Outcome {
     pub case: Case,
     pub range: Range,
-    /// Exact linear plant with viscous friction for the run, from the FMU's calculated parameters.
+    /// Exact linear model with viscous friction, from the FMU's calculated parameters in this run.
     pub linear: Linear,
     pub totals: Totals,
-    /// Estimates from the whole record at once, for example by `spa`; `None` if the torque is neither a sweep nor noise.
+    /// Estimates from the whole record, for example by `spa`; `None` if the torque is neither a sweep nor noise.
     pub record: Option<Record>,
-    /// Estimates along the sweep, as it passes each frequency; `None` if the torque is not a sweep.
+    /// Estimates at the moments at which a sweep passes each frequency; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
-    /// Rotary slosh; `None` for a recording, which has no angles of the liquid.
+    /// Rotary slosh; `None` for a recording, which contains no angles of the liquid.
     pub rotary: Option<Rotary>,
-    /// Torque, rate, slosh angles, and the residual, which is the rate minus its bias and minus the rate of
-    /// the exact linear plant under the same torque.
+    /// Torque, rate, slosh angles, and the residual. The residual is the rate minus its bias and minus the rate of the exact
+    /// linear model under the same torque.
     pub history: History,
     pub path: SloshPath,
     pub ending: Ending,
     /// Name of the force that dominates the liquid, if gravity does not
     /// ([`Range::without_weight`]).
     pub weightless: Option<String>,
-    /// Sentence about the reasons why the tank was out of the range of its model; empty if it was
-    /// not.
+    /// Sentence about how the run left the range of validity of the tank's model; empty if it did not.
     pub limits: Vec<String>,
     pub reused: bool,
     pub warnings: Vec<String>,
@@ -346,7 +340,7 @@ pub struct Outcome {
 #[derive(Clone, Debug)]
 pub struct Estimate {
     pub response: FrequencyResponse,
-    /// Antiresonance and resonance of the response; both missing if they are not valid.
+    /// Antiresonance and resonance of the response, both missing if they are not valid.
     pub features: Features,
     pub resolution: f64,
     /// Relative standard deviation of the magnitude, and of the phase, rad, from the part of the rate that no
@@ -358,7 +352,7 @@ pub struct Estimate {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
-    /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
+    /// The sweep shifts the resonance by more than a quarter of the separation from the antiresonance.
     TooFast,
     TooShort,
     Noise,
@@ -380,8 +374,8 @@ impl std::fmt::Display for Doubt {
 }
 
 impl Estimate {
-    /// Creates an estimate from a response with the features between two frequencies, Hz; `doubt` returns the
-    /// reason to reject them, if any.
+    /// Creates an estimate from a response with its features between two frequencies, Hz. `doubt` returns the reason to
+    /// reject the features, if there is one.
     fn new(
         response: FrequencyResponse,
         inner: (f64, f64),
@@ -395,9 +389,8 @@ impl Estimate {
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
-    /// Adds the uncertainties of the response and of its features. `slope` returns, for a
-    /// frequency, the rate at which the response's error changes along the frequency, relative to
-    /// the error, 1/Hz.
+    /// Adds the uncertainties of the response and of its features. For a frequency, `slope` returns the rate of change of the
+    /// response's error along the frequency, relative to the error, 1/Hz.
     fn with_uncertainties(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }
@@ -414,8 +407,8 @@ impl Estimate {
     }
 }
 
-/// Returns true if the distance between antiresonance and resonance is less than `than`, Hz, the
-/// resolution of the estimate. Returns false if one of the two is missing.
+/// Returns true if the separation of antiresonance and resonance is less than `than`, Hz. Returns false if one of
+/// the two is missing.
 fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
@@ -439,29 +432,28 @@ pub struct Record {
     /// torque; `None` if `spa` finds no valid resonance and antiresonance.
     pub snr_db: Option<[f64; 2]>,
     pub snr_over_band: Curve,
-    /// A fitted transfer function, which is computed if neither `spa` nor H1 nor the estimate along
-    /// the sweep is valid.
+    /// A fitted transfer function. It is computed only if neither `spa` nor H1 nor the estimate of the
+    /// passing sweep is valid.
     pub rational: Option<Estimate>,
-    /// The thesis's linear model, fitted to the `spa` response, and over the band the coherence of its
-    /// residual with the torque; `None` if nothing can be fitted.
+    /// The thesis's linear model, fitted to the `spa` response, and the coherence of its residual with the torque over the
+    /// band; `None` if nothing can be fitted.
     pub fit: Option<(ModelFit, Curve)>,
 }
 
-/// Estimates while a sweep passes, by sweep-synchronous demodulation.
+/// Estimates at the moments at which a sweep passes each frequency, by sweep-synchronous demodulation.
 #[derive(Clone, Debug)]
 pub struct Passing {
     pub rate: Estimate,
-    /// Share of the liquid's force that does not act about the hub's axis. For a recording it is
-    /// the share of the hub's rates about other axes, if these were recorded.
+    /// Fraction of the liquid's force that does not act about the hub's axis. For a recording it is the fraction of the hub's
+    /// rates about other axes, if these were recorded.
     pub off_axis: Option<OffAxis>,
     pub leakage: Vec<f64>,
 }
 
 impl Record {
-    /// Estimates the frequency response from the whole record of torque `tau` (N·m) and rate `omega` (rad/s).
-    /// `enough` is true if there is a valid estimate already, which makes a fitted transfer function
-    /// unnecessary. `unexplained` is the power that no linear response explains, at the frequencies of the
-    /// responses.
+    /// Estimates the frequency response from the whole record of torque `tau` (N·m) and rate `omega` (rad/s). If `enough` is
+    /// true, another estimate is already valid, so that no transfer function is fitted. `unexplained` is the power spectral
+    /// density of the rate that no linear response explains, at the frequencies of the responses.
     fn estimate(
         profile: &Profile,
         step: f64,
@@ -480,13 +472,13 @@ impl Record {
         let spectra = Spectra::estimate(step, &tau, &omega, welch::RESPONSE);
         let snr = spectra.snr_db();
         let noisy = |features: &Features| {
-            // what the segments do not resolve looks like noise
+            // details that the segments do not resolve look like noise
             let resolved = !closer(features, RESOLVED / spectra.length);
             resolved && features.f_res.is_some_and(|f| spectra.value_at(&snr, f) < LEAST_SNR)
         };
         let estimate = |response: FrequencyResponse, length: f64| {
             let resolution = 1.0 / length;
-            // at its ends the band is cut off, which rings
+            // the band is reduced at its ends, where the estimate oscillates because the band is cut off
             let inner = (band.0 + resolution, band.1 - resolution);
             Estimate::new(response, inner, resolution, |features| match features {
                 features if closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
@@ -497,7 +489,7 @@ impl Record {
         let spa = spa::Estimate::new(step, &tau, &omega, &frequencies, lengths.lag);
         let (deviation, slope) = (spa.deviation(unexplained), spa.slope());
         let mut spa = estimate(spa.response, lengths.lag).with_uncertainties(deviation, |_| slope);
-        // after a sweep that was too fast to see anything while it passed, a second opinion
+        // a further estimate if the sweep was too fast for the estimate at the moment of passing
         let fast = profile.sweep().is_some() && !enough;
         let mut rational = (fast || !enough && !spa.features.has_any())
             .then(|| Rational::fit(step, &tau, &omega, band))
@@ -536,8 +528,8 @@ impl Record {
 }
 
 impl Passing {
-    /// Estimates the frequency response while the sweep passes, and finds rotary slosh. `arm` is the distance
-    /// of the tank from the axis, m; `unexplained` as for [`Record`].
+    /// Estimates the frequency response at the moments at which the sweep passes each frequency, and finds rotary slosh.
+    /// `arm` is the distance of the tank from the axis, m. `unexplained` is as for [`Record`].
     fn demodulate(
         sweep: &Sweep,
         table: &Table,
@@ -548,7 +540,7 @@ impl Passing {
         let column = |name| table.column(name).unwrap_or_default();
         let is_recording = table.column(F_RADIAL).is_none();
         let about_axis = &rates.about_axis[..];
-        // where a recording has no such rate, another stands in its place, and is not looked at
+        // a missing rate is replaced by the rate about the axis, whose result is not used
         let other = |k: usize| rates.others[k].as_deref().unwrap_or(about_axis);
         let signals = match is_recording {
             false => {
@@ -567,7 +559,7 @@ impl Passing {
             &grid,
         );
         let [rate, second, third, fourth] = responses;
-        // of the frequencies that the sweep passes
+        // unexplained power at the frequencies that the sweep passes
         let unexplained: Vec<f64> = (rate.frequency.iter())
             .map(|f| unexplained.get(grid.partition_point(|g| g < f)).copied().unwrap_or(f64::NAN))
             .collect();
@@ -591,7 +583,7 @@ impl Passing {
             let off_axis = OffAxis::from_forces(column(F_RADIAL), column(F_TANGENTIAL), &leakage);
             (leakage, Some(off_axis))
         };
-        // where a window would begin before the sweep or end after it
+        // true if the window is completely within the sweep
         let whole = |f: f64| {
             let half = demodulation::cycles(sweep, f) / f / 2.0;
             sweep
@@ -616,14 +608,15 @@ impl Passing {
     }
 }
 
-/// Returns the rotary slosh of a stored run whose torque is not a sweep; `frequency` is the liquid's, Hz.
+/// Returns the rotary slosh of a stored run whose torque is not a sweep; `frequency` is the natural frequency
+/// of the liquid, Hz.
 pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary {
     let column = |name| table.column(name).unwrap_or_default();
     Rotary::from_angles(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
 }
 
-/// Returns the rate of the linear model under the torque of a run, in the rows of the result. A recording has
-/// its own rows.
+/// Returns the rate of the linear model under the torque of a run, in the rows of the result. For a sweep that was recorded,
+/// the recorded torque is used.
 fn modelled(
     run: &Run,
     case: &Case,
@@ -640,7 +633,7 @@ fn modelled(
     if is_sweep && schedule.rows.is_none() {
         return Ok(linear.simulate(run.step, recorded, start));
     }
-    // edges of the torque are no slopes
+    // jumps of the torque must not be taken for slopes
     let column = |name| torque.column(name).unwrap_or_default();
     let rates = linear.simulate_ramps(column("time"), column(TORQUE), column(SLOPE), start);
     let rows = rates.into_iter().enumerate().filter(|(k, _)| schedule.is_row(*k));
@@ -648,8 +641,8 @@ fn modelled(
 }
 
 impl Outcome {
-    /// Computes the outcome of a stored run. The FMU's calculated parameters, such as the mass of the liquid,
-    /// come from an initialised instance.
+    /// Computes the outcome of a stored run. `instance` is an initialised instance of the FMU, from which calculated
+    /// parameters, such as the mass of the liquid, are read.
     pub(super) fn analyse(
         case: &Case,
         run: &Run,
@@ -671,7 +664,7 @@ impl Outcome {
             None => (None, None),
             Some(profile) => {
                 let (tau, omega) = (column(TAU_CMD), &rates.about_axis[..]);
-                // in every fourth of the frequencies: it changes little between them
+                // at every fourth frequency, because it changes little between them
                 let unexplained = profile.band().map_or(Vec::new(), |band| {
                     let grid = logarithmic_grid(band, GRID_POINTS);
                     let some: Vec<f64> = grid.into_iter().skip(1).step_by(4).collect();
@@ -686,7 +679,7 @@ impl Outcome {
                 (Record::estimate(profile, run.step, tau, omega, &unexplained, enough), swept)
             }
         };
-        // of a recording, the true rate at the start is the measured one less the bias
+        // the initial rate of a recording is the measured rate minus the bias
         let start = column(OMEGA).first().copied().unwrap_or(0.0)
             - if is_recording { rates.bias } else { 0.0 };
         let modelled = modelled(run, case, column(TAU_CMD), start, &linear)?;
@@ -727,7 +720,7 @@ impl Outcome {
         })
     }
 
-    /// Drops the curves of the run, which take a quarter of a megabyte; all numbers stay.
+    /// Removes the curves of the run, which take a quarter of a megabyte; all numbers remain.
     pub fn without_curves(mut self) -> Outcome {
         (self.history, self.path) = Default::default();
         if let Some(record) = &mut self.record {
@@ -749,8 +742,9 @@ impl Outcome {
     }
 
     /// Returns the estimate of a sweep for `features.csv`, and its name. The first choice is the demodulated
-    /// response, the hub's response while the sweep passed, with the sweep's shift of the resonance (see the
-    /// report). If it is not valid, the choice is `spa`, and after that a fitted transfer function.
+    /// response, which is the hub's response at the moment at which the sweep passes a frequency; it includes the
+    /// sweep's shift of the resonance (see the report). If it is not valid, `spa` is chosen, and if this is not valid
+    /// either, a fitted transfer function.
     pub fn estimate(&self) -> Option<(&Estimate, &'static str)> {
         let passing = self.passing.as_ref()?;
         match (&passing.rate.doubt, &self.record) {
@@ -783,7 +777,7 @@ impl Outcome {
         Some(self.record.as_ref()?.fit.as_ref()?.0)
     }
 
-    /// Returns the share of the liquid's force off the axis, which is known only for sweeps.
+    /// Returns the fraction of the liquid's force that does not act about the axis. It is known only for sweeps.
     pub fn off_axis(&self) -> Option<OffAxis> {
         self.passing.as_ref()?.off_axis
     }
@@ -806,10 +800,9 @@ impl Outcome {
 
 pub const WAVE: &str = WAVE_HEIGHT;
 
-/// Quantities that determine the range in which a model of the liquid is valid: radius of the tank, m, fill,
-/// m (`None` if the modes come from a table, which does not state it), density and surface tension of the
-/// liquid, `g_axial` at the start, m/s², and the length of mode 1, m (0 if nothing sloshes). `model` is the
-/// value of `slosh.model`.
+/// Quantities that determine the range of validity of a liquid's model: radius of the tank, m; fill, m (`None` if the modes
+/// come from a table, which does not state it); density and surface tension of the liquid; `g_axial` at the start, m/s²; and
+/// the pendulum length of mode 1, m (0 if nothing sloshes). `model` is the value of `slosh.model`.
 #[derive(Clone, Debug)]
 pub struct Range {
     pub model: String,
@@ -821,7 +814,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// Reads the range of an initialised instance; `None` if the FMU is not the bench.
+    /// Reads these quantities from an initialised instance; `None` if the FMU is not the bench.
     pub fn read(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
         if !super::is_bench(description) {
             return Ok(None);
@@ -842,9 +835,9 @@ impl Range {
         }))
     }
 
-    /// Returns the dominant force on the liquid, if it is not gravity, at the smallest specific force of a
-    /// run with these wave heights, m. Bond, Weber and Froude numbers use the tank's radius and the fastest
-    /// wave before, V = η √(g/l) (thesis 2.5). `g` is `g_axial` at each row, m/s², of a run that drives it.
+    /// Returns a sentence about the dominant force on the liquid, if this force is not gravity, at the smallest specific
+    /// force of a run with these wave heights, m. Bond, Weber and Froude numbers use the tank's radius and the highest speed
+    /// of the surface until then, V = η √(g/l) (thesis 2.5). `g` is `g_axial` at each row, m/s², if the run drives it.
     pub fn without_weight(&self, waves: &[f64], g: Option<&[f64]>) -> Option<String> {
         if self.length <= 0.0 {
             return None;
@@ -857,9 +850,9 @@ impl Range {
         contents.without_weight(rows).map(|numbers| numbers.to_string())
     }
 
-    /// Describes how a run with these wave heights, m, left the range of its model. A linear liquid leaves it
-    /// in waves above a quarter of the tank's radius (thesis 2.3.5), any liquid if a trough would be below
-    /// the tank's bottom.
+    /// Describes how a run with these wave heights, m, left the range of validity of its model. A linear model is not
+    /// valid in waves above a quarter of the tank's radius (thesis 2.3.5), and no model is valid if a trough would be
+    /// below the tank's bottom.
     pub fn left(&self, waves: &[f64]) -> Option<String> {
         let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
         let mm = |length: f64| format!("{:.1} mm", length * 1e3);
@@ -876,9 +869,8 @@ impl Range {
     }
 }
 
-/// Returns the selected item of an enumeration of an initialised instance. If `kind`, the integer
-/// twin of the enumeration, is not 0, it selects the item. Returns `None` if the FMU has no such
-/// enumeration, because it is of an older version.
+/// Returns the selected item of an enumeration of an initialised instance. `kind` is the integer parameter that selects the
+/// item instead, unless it is 0. Returns `None` if the FMU has no such enumeration, because its version is older.
 fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
     let description = instance.description();
     let Ok(variable) = description.variable(name) else { return Ok(None) };
@@ -892,20 +884,20 @@ fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String
     Ok(found.map(|item| item.name.clone()))
 }
 
-/// Computes the linear model with the FMU's own (calculated) parameters, with viscous friction unless the FMU
-/// has none, and with the line from which the bench hangs.
+/// Computes the linear model from the FMU's own calculated parameters, with viscous friction unless the FMU has none, and
+/// with the stiffness of the line on which the bench hangs.
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
     let arm = real(tank::R)?;
-    // Share of the modes' masses that is carried across the direction of the mode.
+    // Fraction of the modes' masses that moves with the tank across the direction of the mode.
     let (mut modes, mut carried) = (Vec::new(), 0.0);
     for n in 1..=slosh::MOST_MODES {
         let mass = real(&slosh::MASS.element([n]))?;
         if mass <= 0.0 {
             continue;
         }
-        // Versions before 0.5 have only tangential modes. A mode at an angle to the tangent has the arm r cos. To first order
-        // it is a tangential mode of mass m cos^2, and its remaining mass moves with the tank.
+        // Versions before 0.5 have only tangential modes. A mode at an angle to the tangent has the lever arm r cos. To first
+        // order it is a tangential mode of mass m cos^2, and its remaining mass moves with the tank.
         let direction = real(&slosh::table::DIRECTION.element([n])).unwrap_or(0.0);
         let across = mass * direction.sin().powi(2);
         carried += across;
@@ -921,7 +913,7 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let viscous = real(friction::B)?;
     let law = item(instance, friction::MODEL, friction::KIND)?;
     let bearing = if law.as_deref() == Some(FrictionModel::None.name()) { 0.0 } else { viscous };
-    // In versions before 0.4 the bench does not hang from a line.
+    // In versions before 0.4 the bench does not hang on a line.
     let mut line = |name: &str| instance.real(name).unwrap_or(0.0);
     let (stiffness, friction) = (line(hub::K), bearing + line(hub::C));
     Ok(Linear { inertia, friction, stiffness, arm, modes })
@@ -932,13 +924,14 @@ mod tests {
     use super::{Liquid, Range, check_work};
     use crate::profile::Written;
 
-    /// At 1e-9 Hz one analysis window contains all 20 million rows of a run, so that the analysis would take hours.
+    /// With a sweep from 1e-9 Hz one analysis window contains all 20 million rows of a run, so that the
+    /// analysis would take hours.
     #[test]
-    fn a_sweep_whose_windows_hold_all_of_a_long_run_is_refused() {
+    fn a_sweep_whose_analysis_windows_contain_the_whole_long_run_is_refused() {
         let work = |profile: &str, step: f64, rows: usize| {
             check_work(&profile.parse::<Written>().unwrap().torque().unwrap(), step, rows)
         };
-        // 111 h at 50 Hz in the bench's band, and the thesis's run from 1e-6 Hz
+        // allowed: 111 h at 50 Hz in the bench's band, and the thesis's run from 1e-6 Hz
         work("exp-sweep:f0=1.25,f1=3.5,duration=400000", 0.02, 20_000_000).unwrap();
         work("exp-sweep:f0=1e-6,f1=3.5,duration=2700", 0.02, 135_000).unwrap();
         for profile in ["exp-sweep:f0=1e-9", "noise:f0=1e-9"] {
@@ -950,7 +943,7 @@ mod tests {
 
     #[test]
     fn a_weightless_liquid_is_reported_with_its_numbers() {
-        // water in the bench's tank, mode 1 at 10 cm
+        // water in the bench's tank, filled to 10 cm
         let range = Range {
             model: "spherical".into(),
             radius: 0.0815,
@@ -965,11 +958,11 @@ mod tests {
         for words in ["Bond number 0.923", "Weber number 98.", "Froude number 106.", "inertia"] {
             assert!(cut.contains(words), "{words}: {cut}");
         }
-        // without weight at all, and at rest
+        // without any specific force, and at rest
         let still = range.without_weight(&[0.0; 2], Some(&[9.81, 0.0])).unwrap();
         assert!(still.contains("Froude number infinite"), "{still}");
         assert!(still.contains("surface tension"), "{still}");
-        // at Bo 9 gravity still rules, but no flat surface is left
+        // at a Bond number of 9 gravity still dominates, but the surface is not flat
         let low = Range { g: 0.1, ..range.clone() }.without_weight(&[1e-4], None).unwrap();
         assert!(low.contains("Bond number 9.225") && low.contains("curved"), "{low}");
         let frozen = Range { length: 0.0, ..range };

@@ -1,4 +1,4 @@
-//! Stored runs, and the decision whether they can be reused.
+//! Stored runs, and the decision whether a stored run can be reused.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,19 +11,20 @@ use crate::run::{self, Run};
 use crate::sensors::Sensors;
 use signals::table::{self, Table};
 
-/// Version of the format of stored runs. It is raised when runs that an older version has stored
-/// would be understood differently.
+/// Version of the format of stored runs. It is increased if runs that an older version has stored would be
+/// read with another meaning.
 const FORMAT: &str = "1";
 
-/// Returns everything that determines a run's numbers. Two runs with the same recipe are the same run, independent of
-/// the archive of the FMU. The recipe is metadata of the run's Parquet file, which may have more:
+/// Returns the recipe of a run, which contains everything that determines its numbers. Two runs with the same
+/// recipe are the same run, independent of the archive of the FMU. The recipe is a part of the metadata of
+/// the run's Parquet file:
 ///
-/// * `model`, `binary_sha256`: the model's name and the binary that was loaded,
+/// * `model`, `binary_sha256`: the model's name and the hash of the binary that was loaded,
 /// * `parameters`: every parameter and input with its start value, as a JSON object,
-/// * `settings`: what is set before the start, `name=value` in this order, separated by spaces,
-/// * `profile`: the torque; `torque_sha256`: of the file, if it comes from one,
-/// * `step`, `stop`: s; `tolerance`: the relative tolerance handed to the FMU,
-/// * `torque`: true if the FMU gets the torque's slope over each step,
+/// * `settings`: the start values that the plan sets, `name=value` in the order of setting, separated by spaces,
+/// * `profile`: the torque; `torque_sha256`: the hash of its file, if it comes from a file,
+/// * `step`, `stop`: s; `tolerance`: the relative tolerance passed to the FMU,
+/// * `torque`: whether the torque is linear over each step or held,
 /// * `sensors`: the recorded sensors, as a JSON object, if there are any,
 /// * `columns`: the recorded variables; `format`: version of the recipe.
 pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, String> {
@@ -56,7 +57,7 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
-/// A stored run. `lacks_sensors` is true if the table has the signals for the sensors but not their readings,
+/// A stored run. `lacks_sensors` is true if the table contains the signals for the sensors but not their readings,
 /// because another program wrote it.
 pub struct Stored {
     pub table: Table,
@@ -77,7 +78,7 @@ pub enum Unusable {
     Differs(String),
 }
 
-/// Returns the stored run if it is complete and has this recipe, otherwise the reason.
+/// Returns the stored run if it is complete and has this recipe; otherwise the reason why it cannot be reused.
 pub fn stored(
     path: &Path,
     run: &Run,
@@ -119,10 +120,10 @@ fn difference(
         let text = notes.get("parameters").map_or("", String::as_str);
         serde_json::from_str(text).unwrap_or_default()
     };
-    // causes first; parameters before the settings that set them
+    // the cause first: parameters before the settings that set them
     const ORDER: [&str; 4] = ["format", "model", "binary_sha256", "parameters"];
     let rest = wanted.keys().map(String::as_str).filter(|key| !ORDER.contains(key));
-    // equal parameters from other settings are the same run
+    // runs with equal parameters are the same, even if they were set in another way
     let keys = ORDER.into_iter().chain(rest).filter(|key| *key != "settings");
     for key in keys {
         let (was, is) = (found.get(key), &wanted[key]);
@@ -133,7 +134,7 @@ fn difference(
         return Some(match key {
             "parameters" => {
                 let (was, is) = (read(found), read(wanted));
-                let text = |value: Option<&String>| value.map_or("not there".into(), String::clone);
+                let text = |value: Option<&String>| value.map_or("missing".into(), String::clone);
                 let names = is.keys().chain(was.keys().filter(|name| !is.contains_key(*name)));
                 let differ: Vec<String> = names
                     .filter(|name| was.get(*name) != is.get(*name))

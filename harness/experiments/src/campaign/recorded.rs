@@ -1,4 +1,4 @@
-//! Reads a recording as a run: on an equally spaced grid, from the torque's beginning to its end.
+//! Reads a recording as a run: on an evenly spaced grid, from the beginning of the torque to its end.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -15,8 +15,8 @@ use signals::table::Table;
 use crate::plan::{Case, Recorded};
 use crate::profile::Torque;
 
-/// Signals read from a recording: the rate defines the rows; torque and rates about the other axes are
-/// interpolated linearly.
+/// Signals that are read from a recording. The rows are those with a rate; the torque and the rates about the other
+/// axes are interpolated linearly.
 const SIGNALS: [Signal; 4] = [
     Signal { name: "omega", required: true, between: Between::Line, unit: None },
     Signal { name: "tau_cmd", required: true, between: Between::Line, unit: None },
@@ -24,28 +24,25 @@ const SIGNALS: [Signal; 4] = [
     Signal { name: "omega_y", required: false, between: Between::Line, unit: None },
 ];
 
-/// Smallest correlation coefficient of the recorded torque and the torque of the plan with which a
-/// recording is accepted.
+/// Smallest correlation coefficient of the recorded torque and the plan's torque at which a recording is accepted.
 const LEAST_CORRELATION: f64 = 0.9;
 /// Largest fraction of the run that may be missing at the ends of the recording.
 const MISSING: f64 = 0.5;
-/// Largest fraction of a sweep's time that may lie in gaps of the recording. In gaps torque and
-/// rate are both interpolated linearly, which hardly changes their ratio. A record that lost 3 % of
-/// its rows one by one has 6 % of its time in gaps.
+/// Largest fraction of a sweep's time that may be in gaps of the recording. In gaps torque and rate are both interpolated
+/// linearly, which hardly changes their ratio. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
 const GAPS: f64 = 0.15;
-/// Largest relative difference between the rates of the recorder's clock and of the clock that timed the torque.
+/// Largest relative difference between the rates of the recorder's clock and of the clock that generated the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
-/// Shift of the recorded torque against the sweep at the end of a record, in cycles, that a wrong
-/// clock causes and above which times are corrected.
+/// Shift of the recorded torque relative to the sweep at the end of a record, in cycles, above which the times are
+/// corrected. A wrong clock causes such a shift.
 const SHIFT: f64 = 0.02;
-/// Length of a block, in cycles of the sweep, over which the phase of a record is compared with the
+/// Length of a block, in cycles of the sweep. In each block the phase of the record is compared with the
 /// phase of the sweep.
 const BLOCK_CYCLES: f64 = 6.0;
-/// Number of times that the error of the recorder's clock is estimated, each time starting from the
-/// result before.
+/// Number of iterations in which the error of the recorder's clock is estimated.
 const ROUNDS: usize = 3;
 
-/// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
+/// Reads a recording, and resamples it onto an evenly spaced grid. Returns the step of the grid, s, and the table.
 ///
 /// # Errors
 /// If the recording cannot be used.
@@ -60,10 +57,10 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
         .with_context(|| format!("the recording {name} cannot be used"))
 }
 
-/// Checks that rows of a recording that are `step` s apart can show the torque.
+/// Checks that the rows of a recording, `step` s apart, are dense enough for the torque.
 ///
 /// # Errors
-/// If the torque has frequencies of half of the rows' rate or more.
+/// If the torque has frequencies of at least half of the sampling rate.
 pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     let Some(profile) = torque.profile() else { return Ok(()) };
     let highest = profile.band().map_or(0.0, |band| band.1);
@@ -77,8 +74,8 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     Ok(())
 }
 
-/// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the
-/// torque of the plan. The columns of a stored run are used, as far as the recording has them.
+/// Reads the recording of a run. Times count from the beginning of the torque, which is found by correlation with the
+/// plan's torque. Of the columns of a stored run, those that the recording contains are used.
 ///
 /// # Errors
 /// If the recording cannot be used, or has another torque.
@@ -101,7 +98,7 @@ pub(super) fn table(
             let (clock, correlation) = sought.align(torque);
             ensure!(
                 !sought.is_reversed(torque, (clock, correlation)),
-                "{name}: its torque is {} with the other sign. A factor of -1 in the logger, or another sign of the amplitude, turns it",
+                "{name}: its torque is {} with the opposite sign. Correct the sign in the logger, or change the sign of the amplitude in the plan",
                 case.profile
             );
             ensure!(
@@ -113,16 +110,19 @@ pub(super) fn table(
             );
             clock
         }
-        // of a noise nobody knows which it was
+        // the random noise of the recording is unknown, so that it cannot be correlated
         None => Clock { first: 0.0, rate: 0.0 },
     };
     let Clock { first, rate } = clock;
     if first != 0.0 {
-        done(format!("{name}: the torque begins at {:.2} s of it", time[0] + first * step));
+        done(format!(
+            "{name}: the torque begins at {:.2} s of the recording",
+            time[0] + first * step
+        ));
     }
     if rate != 0.0 {
         done(format!(
-            "{name}: its clock runs {:+.0} ppm against that of the torque; times are those of the torque, so that frequencies are \
+            "{name}: its clock runs {:+.0} ppm against the clock of the torque; times are converted to the clock of the torque, so that frequencies are \
              those of the plan",
             1e6 * rate
         ));
@@ -137,12 +137,12 @@ pub(super) fn table(
     let seconds = rows.len() as f64 * step;
     ensure!(
         seconds > (1.0 - MISSING) * (to - from),
-        "{name}: {seconds:.0} s of it belong to {}, which lasts {:.0} s (allowed: at least {:.0} %)",
+        "{name}: it contains {seconds:.0} s of {}, which lasts {:.0} s (allowed: at least {:.0} %)",
         case.profile,
         to - from,
         100.0 * (1.0 - MISSING)
     );
-    // times that already count from the beginning are kept
+    // times that already count from the beginning of the torque are not changed
     let origin = time[0] + first * recorded_step - from;
     let origin = if origin.abs() < 1e-9 { 0.0 } else { origin };
     let cut = |values: &[f64]| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
@@ -159,22 +159,21 @@ pub(super) fn table(
     for rate in ["omega_x", "omega_y"] {
         columns.extend(table.column(rate).map(|values| (rate, cut(values))));
     }
-    // the plan's own step if it is equal to rounding
+    // a step that equals the plan's step within rounding is set to the plan's step
     let step = if (step / case.step - 1.0).abs() < 1e-6 { case.step } else { step };
     Ok((step, Table::of(columns)))
 }
 
-/// Relation between the recorder's clock and the clock of the torque command: `first` is the row of
-/// the recording at which the torque begins (it may lie before the first row or between two rows),
-/// and 1 + `rate` recorded seconds are one second of the torque.
+/// Relation between the recorder's clock and the clock of the torque command. `first` is the row of the recording at
+/// which the torque begins (it may be before the first row or between two rows), and 1 + `rate` recorded seconds are one
+/// second of the torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Clock {
     first: f64,
     rate: f64,
 }
 
-/// A sweep that is searched in a record whose rows are `step` s apart; `span` is the first and last time of
-/// the sweep, s.
+/// A sweep to be found in a record whose rows are `step` s apart. `span` is the first and last time of the sweep, s.
 struct Sought<'t> {
     step: f64,
     span: (f64, f64),
@@ -182,13 +181,13 @@ struct Sought<'t> {
 }
 
 impl Sought<'_> {
-    /// Finds the sweep in a record. Returns the recorder's clock, and the correlation coefficient of record and sweep with
-    /// this clock.
+    /// Finds the sweep in a record. Returns the recorder's clock, and the correlation coefficient of record and
+    /// sweep with this clock.
     ///
-    /// A clock that is wrong by 50 ppm moves the end of a sweep of 2700 s by half a cycle, so that no stretch of the record
-    /// correlates with the whole sweep. Therefore the phase of the record relative to the sweep is measured in blocks and
-    /// unwrapped. It is 2π f(t) (α + β t) + 2π n, from which follow the error α of the start, the error β of the clock's
-    /// rate, and n whole cycles.
+    /// An error of the clock of 50 ppm shifts the end of a sweep of 2700 s by half a cycle, so that the whole sweep does
+    /// not correlate with the record. Therefore the phase of the record relative to the sweep is measured in blocks and
+    /// unwrapped. It is 2π f(t) (α + β t) + 2π n, which determines the error α of the start, the error β of the clock's
+    /// rate, and the number n of whole cycles.
     fn align(&self, record: &[f64]) -> (Clock, f64) {
         let (from, to) = self.span;
         let count = ((to - from) / self.step).round() as usize;
@@ -209,9 +208,9 @@ impl Sought<'_> {
         if found > correlation { (clock, found) } else { (whole, correlation) }
     }
 
-    /// Returns true if the sweep with the opposite sign explains the record better than the sweep itself. Delay and clock
-    /// can compensate half a cycle, with a correlation of more than 0.9, so that the clock is also fitted for the opposite
-    /// sign before the two fits are compared.
+    /// Returns true if the sweep with the opposite sign explains the record better than the sweep itself. A delay and an
+    /// error of the clock can compensate half a cycle, with a correlation of more than 0.9. Therefore the clock is also
+    /// fitted for the opposite sign before the two are compared.
     fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
         let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
         let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
@@ -236,9 +235,8 @@ impl Sought<'_> {
         product / f64::sqrt(squares * others)
     }
 
-    /// Estimates the clock by least squares: the phases of the record in blocks, against the phases of the
-    /// sweep at the times of `clock`, which is nearly right. Returns `None` if the blocks do not determine a
-    /// clock.
+    /// Estimates the clock by least squares from the phases of the record in blocks, compared with the phases of the sweep
+    /// at the times of `clock`, which must be approximately correct. Returns `None` if the blocks do not determine a clock.
     fn refined(&self, record: &[f64], clock: Clock) -> Option<Clock> {
         let (from, to) = self.span;
         let rows = (BLOCK_CYCLES / self.sweep.band().0 / self.step).ceil() as usize;
@@ -255,7 +253,7 @@ impl Sought<'_> {
                 let phase = self.sweep.phase(self.time(clock, row + k));
                 sum += window * value * Complex64::cis(-phase);
             }
-            // a sine's phase is counted from its cosine
+            // the phase of a sine is a quarter of a turn ahead of its cosine's
             let angle = (sum * self.sweep.amplitude.signum()).arg() / TAU + 0.25;
             let unwrapped = last.map_or(angle, |last: f64| angle - (angle - last).round());
             last = Some(unwrapped);
@@ -280,9 +278,8 @@ impl Sought<'_> {
     }
 }
 
-/// Finds the signal `wanted` in a record by correlation. Returns the row of the record at which it
-/// begins, possibly before the first row, and the correlation coefficient of the two where they
-/// overlap.
+/// Finds the signal `wanted` in a record by correlation. Returns the row of the record at which it begins, possibly before
+/// the first row, and the correlation coefficient in the rows where they overlap.
 fn aligned(record: &[f64], wanted: &[f64]) -> (i64, f64) {
     let length = (record.len() + wanted.len()).next_power_of_two();
     let forward = Forward::new(length);
@@ -314,8 +311,7 @@ mod tests {
     use super::{Clock, LEAST_CORRELATION, Sought, aligned};
     use analysis::sweep::Sweep;
 
-    /// A recording starts 300 rows before the sweep, or 400 rows after its beginning; the correlation with the sweep gives
-    /// the shift.
+    /// The recording begins 300 rows before the sweep, or 400 rows after the sweep's beginning.
     #[test]
     fn a_sweep_is_found_in_a_record_that_begins_before_or_within_it() {
         let sweep = Sweep { duration: 100.0, ..Sweep::THESIS };
@@ -329,19 +325,18 @@ mod tests {
         assert!(lag == -400 && correlation > 0.999_999, "{lag} {correlation}");
         let found =
             |record: &[f64]| Sought { step: 0.02, span: (0.0, 100.0), sweep: &sweep }.align(record);
-        // nothing is changed where the clocks agree
+        // equal clocks are not corrected
         assert_eq!(found(&late).0, Clock { first: 300.0, rate: 0.0 });
         let reversed: Vec<f64> = wanted.iter().rev().copied().collect();
         assert!(aligned(&reversed, &wanted).1 < 0.9);
     }
 
-    /// Recordings of the thesis's sweep with clock errors up to 1e-3 and 3 % lost rows.
     #[test]
     fn a_sweep_is_found_despite_clock_errors_and_lost_rows() {
         let sweep = Sweep::THESIS;
         let sought = Sought { step: 0.02, span: (0.0, 2700.0), sweep: &sweep };
         for (rate, begins) in [(5e-5, 5.13), (-3e-4, 5.13), (1e-3, 0.0), (3e-4, -400.0)] {
-            // recorded seconds of the sweep, lines over 3 % of the rows
+            // recorded times of the sweep; 3 % of the rows are interpolated linearly
             let at = |k: usize| {
                 let t = (0.02 * k as f64 - begins) / (1.0 + rate);
                 if (0.0..2700.0).contains(&t) { sweep.torque(t) } else { 0.0 }
@@ -352,7 +347,7 @@ mod tests {
                 .collect();
             let (clock, correlation) = sought.align(&record);
             assert!(correlation > 0.99, "{rate} {clock:?} {correlation}");
-            // a ppm of 2700 s is 2.7 ms: a hundredth of a cycle
+            // one ppm of 2700 s is 2.7 ms, a hundredth of a cycle
             assert!((clock.rate - rate).abs() < 1e-6, "{rate} {clock:?}");
             assert!((clock.first - begins / 0.02).abs() < 0.2, "{rate} {clock:?}");
             let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();

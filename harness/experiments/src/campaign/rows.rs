@@ -10,8 +10,8 @@ use host::fmu::Fmu;
 
 use self::Column::{Number, Text};
 
-/// A row of `features.csv`: a case, its outcome if it was analysed, the estimate whose features the row has, and how a run
-/// that was not analysed left the range of its model.
+/// A row of `features.csv`: a case, its outcome if it was analysed, the estimate that gives the features of the row, and,
+/// for a run that was not analysed, how it left the range of validity of its model.
 #[derive(Clone, Copy)]
 pub struct Row<'a> {
     pub case: &'a Case,
@@ -20,7 +20,7 @@ pub struct Row<'a> {
     pub limits: &'a [String],
 }
 
-/// Columns of the table of runs. The cell of a value that does not exist, or that the torque cannot show, is empty.
+/// Columns of the table of runs. A cell is empty if the value does not exist, or if the torque cannot show it.
 enum Column {
     Number(fn(&Row) -> Option<f64>),
     Text(fn(&Row) -> Option<String>),
@@ -105,7 +105,7 @@ fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or(String::new(), |value| format!("{value:?}"))
 }
 
-/// Columns of `runs.csv` that describe how a run was simulated or recorded; the features follow.
+/// Columns of `runs.csv` that describe the simulation or recording of a run. The features follow them.
 pub const MADE_FROM: [&str; 10] = [
     "name",
     "error",

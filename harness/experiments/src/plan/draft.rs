@@ -1,4 +1,4 @@
-//! A plan that a command makes from its options.
+//! A plan that a command creates from its options.
 
 use anyhow::Result;
 use toml::{Table, Value};
@@ -30,8 +30,8 @@ impl Draft {
         texts.chain(values).map(|(key, value)| (key.to_string(), value)).collect()
     }
 
-    /// Returns the plan, whose text is what a user would write. Errors have no numbers of lines, because the user has not
-    /// written any.
+    /// Returns the plan. It is parsed from the text that a user would write; errors have no line numbers, because the user
+    /// has not written this text.
     pub fn plan(self) -> Result<Plan> {
         let set = self.set.into_iter().map(|(name, value)| (name, value.into()));
         let vary = self.vary.into_iter().map(|(name, values)| (name.to_string(), values.into()));

@@ -1,4 +1,4 @@
-//! A plan's file. Serde reads each value separately, so that one message can list all problems.
+//! Reads the file of a plan. Serde parses each value separately, so that one message can list all problems.
 
 use std::fmt;
 use std::ops::Range;
@@ -100,7 +100,7 @@ pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Opti
     let vary =
         reader.named("[vary] ", vary, "a list of values, such as [0.05, 0.1]", allowed).into_iter();
     let vary = vary.map(|vary| vary.map(|list| list.iter().map(Scalar::to_string).collect()));
-    // leaves room for a run's number
+    // leaves room for the number of a run
     let most = i64::from(i32::MAX / 2);
     let expected = format!("the whole number to count from, 0 to {most}");
     let count = reader.names(table, "count");
@@ -130,8 +130,8 @@ pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Opti
 
 type Values<'t, 'i> = Vec<(String, &'t Spanned<DeValue<'i>>)>;
 
-/// Returns values by name. In TOML `tank.h = 1` is a table in a table; here it is the name `tank.h`. Tables
-/// that `is_value` accepts are values.
+/// Returns values by name. In TOML `tank.h = 1` is a table within a table; here it becomes the name `tank.h`.
+/// Tables for which `is_value` returns true are values.
 fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) -> Values<'t, 'i> {
     let mut all = Values::new();
     for (key, value) in table {
@@ -252,7 +252,9 @@ impl Reader<'_> {
                 continue;
             };
             let most = budget::NAME;
-            let rule = format!("must have 1 to {most} bytes (without one leave it out)");
+            let rule = format!(
+                "must have 1 to {most} bytes (for a run without a name, leave the key out)"
+            );
             let expected = format!("a text in quotes, which {rule}");
             let allowed = |name: &String| (1..=most).contains(&name.len());
             let name = self.take(&place, table, "name", &expected, allowed);
@@ -278,7 +280,7 @@ impl Reader<'_> {
                 if let Some((key, _)) = table.get_key_value("columns") {
                     self.add(
                         key.span(),
-                        format!("{place}columns are those of a recording, which is not there"),
+                        format!("{place}columns needs a recording, which is missing"),
                     );
                 }
                 None
@@ -376,7 +378,7 @@ impl Reader<'_> {
         for key in [first, second].iter().filter(|key| !table.contains_key(**key)) {
             self.add(value.span(), format!("{place}{kind} expects {key}"));
         }
-        // None: it is wrong; NaN: it is not there
+        // None for a wrong value, NaN for a missing one
         let mut number = |key: &str| match table.contains_key(key) {
             true => self.take(place, table, key, "a number", |v: &f64| v.is_finite()),
             false => Some(Named { name: key.into(), value: f64::NAN, lines: Lines::default() }),

@@ -1,5 +1,5 @@
-//! A campaign's plan: a TOML file that is read, checked and expanded into runs. `book/campaigns.md`
-//! shows the format by example.
+//! The plan of a campaign: a TOML file that is read, checked and expanded into runs. `book/campaigns.md` shows
+//! the format by example.
 
 mod draft;
 mod file;
@@ -27,8 +27,8 @@ pub use self::draft::Draft;
 use self::problems::{Lines, Problems};
 use self::random::Draws;
 
-/// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model closest to
-/// its bench.
+/// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model that is
+/// closest to its bench.
 pub const MODELS: [&str; 2] = [SloshModel::Linear.name(), SloshModel::Spherical.name()];
 pub const FILLS: [f64; 2] = [0.05, 0.10];
 /// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
@@ -47,15 +47,14 @@ pub const BUILT_IN: &[(&str, &str)] = plans! {
     "bench_as_built" "monte_carlo" "low_thrust" "slew"
 };
 
-/// Time between the rows of a result, s, in a plan that does not state it: the period of the
-/// thesis's IMU at 50 Hz.
+/// Time between the rows of a result, s, unless the plan states it: the sampling period of the thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
-/// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
+/// Varied names from which file names `<model>_<fill>mm_<amplitude>` are formed, which are a documented interface.
 const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
 pub const AMPLITUDE: &str = "profile.amplitude";
 const FREQUENCY: &str = "profile.frequency";
 
-/// Value for a name in a plan file: an FMU variable, `profile`, `profile.PARAMETER`.
+/// Value of a name in a plan file. The name is an FMU variable, `profile` or `profile.PARAMETER`.
 #[derive(Clone, Debug)]
 struct Named<T> {
     name: String,
@@ -88,9 +87,9 @@ pub struct Plan {
     sensors: Vec<Sensor>,
 }
 
-/// Range in which a plan seeks the onset of rotary slosh: the smallest and largest frequency, Hz, and at
-/// least two torques in ascending order, N·m. The search is between the first and the last torque; all are
-/// dwells at the onset. `found` is true after [`Plan::dwell`] has replaced the search by dwells.
+/// Range in which a plan seeks the onset of rotary slosh: the smallest and largest frequency, Hz, and at least two torques
+/// in ascending order, N·m. The onset is searched between the first and the last torque; then dwells at its frequency are
+/// simulated with all torques. `found` is true after [`Plan::dwell`] has replaced the search by these dwells.
 #[derive(Clone, Debug)]
 pub(crate) struct Onset {
     pub frequency: [f64; 2],
@@ -114,10 +113,9 @@ pub struct Recorded {
 
 pub const RECORDING: &str = "recording";
 
-/// One run of a plan. `listed` is the name of its `[[run]]`, if the plan gives one; `varied` are the values
-/// of the varied names, in the order of [`Plan::varied`], empty where a `[[run]]` does not set one; `model`,
-/// `fill` (m) and `amplitude` (N·m) are the values of `slosh.model`, of `tank.h` and of the profile's amplitude, if they
-/// exist.
+/// One run of a plan. `listed` is the name of its `[[run]]`, if the plan gives one. `varied` are the values of the varied
+/// names, in the order of [`Plan::varied`], empty if a `[[run]]` does not set the name. `model`, `fill` (m) and
+/// `amplitude` (N·m) are the values of `slosh.model`, of `tank.h` and of the profile's amplitude, if they exist.
 /// `settings` are start values by FMU name.
 #[derive(Clone, Debug)]
 pub struct Case {
@@ -129,7 +127,7 @@ pub struct Case {
     pub amplitude: Option<f64>,
     pub profile: String,
     pub torque: Arc<Torque>,
-    /// SHA-256 of the torque's file, if it comes from one.
+    /// SHA-256 of the torque's file, if the torque comes from a file.
     pub torque_sha256: Option<String>,
     pub input: Option<String>,
     pub settings: Vec<(String, String)>,
@@ -178,7 +176,7 @@ impl Plan {
         Plan::parse(&text).with_context(|| format!("the plan {file}"))
     }
 
-    /// Reads a plan's text. Names are checked against the FMU by [`Plan::cases`].
+    /// Parses the text of a plan. [`Plan::cases`] checks the names against an FMU.
     pub fn parse(text: &str) -> Result<Self> {
         Plan::from_text(text, true)
     }
@@ -234,7 +232,7 @@ impl Plan {
         names
     }
 
-    /// Returns the names that the plan varies systematically, by `[[run]]` and `[vary]`.
+    /// Returns the names that the plan varies systematically, with `[[run]]` and `[vary]`.
     pub fn grouping(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         let listed = self.listed.iter().flat_map(|run| &run.values).map(|one| one.name.as_str());
@@ -246,15 +244,14 @@ impl Plan {
         names
     }
 
-    /// Returns the name of the varied number with the most values in the plan, which becomes the
-    /// axis of figures; of several the last. Returns `None` if no number is varied, or if values
-    /// are drawn at random.
+    /// Returns the name of the varied number with the most values in the plan, which becomes the axis of figures; if
+    /// several have equally many, the last one. Returns `None` if no number is varied, or if values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
         self.axis_of_vary().or_else(|| self.axis_of_listed())
     }
 
-    /// Returns the number in which the listed recordings (or the dwells at the onset of rotary slosh) differ most, for the
-    /// axis of figures.
+    /// Returns the varied number that has the most different values in the listed recordings (or in the dwells at the
+    /// onset of rotary slosh), for the axis of figures.
     fn axis_of_listed(&self) -> Option<&str> {
         let along = |run: &&Listed| run.recording.is_some() || self.onset.is_some();
         let runs = self.listed.iter().filter(along);
@@ -263,7 +260,7 @@ impl Plan {
             values.entry(&one.name).or_default().insert(&one.value);
         }
         let several = values.into_iter().filter(|(_, values)| values.len() > 1);
-        // of several with as many values the torque's amplitude
+        // if several have equally many values, the amplitude of the torque
         let most = several.max_by_key(|(name, values)| (values.len(), *name == NAMING[2]));
         most.map(|(name, _)| name).filter(|_| !self.is_random())
     }
@@ -275,8 +272,8 @@ impl Plan {
         most.map(|vary| vary.name.as_str()).filter(|_| !self.is_random())
     }
 
-    /// Converts values with a unit (`50 mm`) to numbers in the FMU's unit. Unreadable values stay, and
-    /// [`Plan::cases`] refuses them.
+    /// Converts values with a unit (`50 mm`) to numbers in the FMU's unit. Values that cannot be read are not changed,
+    /// and [`Plan::cases`] refuses them.
     pub fn convert_units(&mut self, description: &ModelDescription) {
         let convert = |name: &str, text: &mut String| {
             let variable = description.variable(name).ok();
@@ -306,7 +303,8 @@ impl Plan {
         Plan { onset: None, ..self.clone() }.cases(description)
     }
 
-    /// Replaces the cases of [`Plan::seeking`] by dwells at a frequency (Hz) with several torques (N·m).
+    /// Replaces the cases of [`Plan::seeking`] by dwells. Each case comes with the frequency (Hz) and the torques
+    /// (N·m) of its dwells.
     pub(crate) fn dwell(&mut self, dwells: Vec<(Case, f64, Vec<f64>)>) {
         let names: Vec<String> = self.grouping().into_iter().map(String::from).collect();
         let lines = self.onset.as_ref().map_or(Lines::default(), |onset| onset.lines.clone());
@@ -331,9 +329,9 @@ impl Plan {
         self.draws.is_some()
     }
 
-    /// Returns the plan's runs for an FMU with this description: every `[[run]]` with every combination of
-    /// `[vary]` (the last varies fastest) and every draw. The error lists all problems of the plan. The FMU
-    /// checks the values only when it runs.
+    /// Returns the plan's runs for an FMU with this description: every `[[run]]` with every combination of `[vary]` (the
+    /// last varies fastest) and every draw. The error lists all problems of the plan. The FMU checks the values only
+    /// when it is simulated.
     pub fn cases(&self, description: &ModelDescription) -> Result<Vec<Case>> {
         ensure!(
             self.pending_onset().is_none(),
@@ -379,7 +377,7 @@ impl Plan {
         let mut torques = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut cases = Vec::with_capacity(count);
-        // a recording comes before the simulations of the same run
+        // a recording comes before the simulations with the same values
         for run in &self.listed {
             let Some(recording) = &run.recording else { continue };
             let case = self.case(description, &input, &mut torques, &mut problems, &run.values);
@@ -414,12 +412,12 @@ impl Plan {
                     continue;
                 };
                 case.name = self.name(run, &case, draw, &mut names);
-                // recorded and simulated runs are drawn along their values, not by their names
+                // recorded and simulated runs are plotted over their values, not over their names
                 case.listed = run.name.clone().filter(|_| run.recording.is_none());
                 cases.push(case);
             }
             if problems.len() > 20 {
-                break; // enough to go on with
+                break; // enough to report that there are too many
             }
         }
         problems.check()?;
@@ -473,7 +471,7 @@ impl Plan {
             let item = description.items(variable).iter().find(|i| i.value.to_string() == text);
             Some(item.map_or(text, |item| item.name.clone()))
         };
-        // a table of modes has no dimensions
+        // a table of modes does not depend on the dimensions of the tank
         let from_table = value(slosh::SOURCE).is_some_and(|item| item == SloshSource::Table.name())
             || value(slosh::SOURCE_KIND)
                 .is_some_and(|item| item == (SloshSource::Table as i32).to_string());
@@ -522,12 +520,11 @@ impl Plan {
         (problems.len() == before).then_some(case)
     }
 
-    /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if nothing
-    /// else is varied. Otherwise the name consists of the varied values, as `d_0.111_amplitude_0.1`. Draws
-    /// have numbers.
+    /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if nothing else is
+    /// varied. Otherwise the name consists of the varied values, as in `d_0.111_amplitude_0.1`. Random draws have numbers.
     fn name(&self, run: &Listed, case: &Case, draw: usize, taken: &mut BTreeSet<String>) -> String {
         let mut parts = match &run.name {
-            // a named run with further variation: only the variation is added
+            // a named run with further variation: the varied values are appended to its name
             Some(name) => vec![name.clone()],
             None => Vec::new(),
         };
@@ -551,7 +548,8 @@ impl Plan {
                 for Named { name, value, .. } in values {
                     let name = name.rsplit('.').next().unwrap_or(name);
                     let value = value.split(':').next().unwrap_or(value);
-                    // a word needs no name of its variable, a number or a Boolean does
+                    // the value of an enumeration is clear by itself; before a number or a Boolean the name of
+                    // its variable is added
                     if value.parse::<f64>().is_ok() || value.parse::<bool>().is_ok() {
                         parts.push(format!("{name}_{value}"));
                     } else {
@@ -569,12 +567,12 @@ impl Plan {
         let plain = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
         let mut base: String = parts.join("_").chars().map(plain).collect();
         if base.len() > budget::NAME {
-            // as many letters as fit, and a hash to separate names with the same beginning
+            // long names are cut, with a hash that distinguishes names with the same beginning
             let fits = |(i, c): &(usize, char)| i + c.len_utf8() <= budget::NAME - 17;
             let begin: String = base.char_indices().take_while(fits).map(|(_, c)| c).collect();
             base = format!("{begin}_{}", &sha256(base.as_bytes())[..16]);
         }
-        // some file systems do not distinguish A from a
+        // some file systems do not distinguish upper and lower case
         let mut name = base.clone();
         let mut number = 1;
         while !taken.insert(name.to_lowercase()) {
@@ -585,7 +583,7 @@ impl Plan {
     }
 }
 
-/// Fails unless the FMU has such a parameter or input and can read the value.
+/// Fails unless the FMU has this parameter or input and accepts the format of the value.
 fn settable(
     description: &ModelDescription,
     input: &Option<String>,
@@ -877,7 +875,7 @@ mod tests {
             "line 4: [random] has no table [random.draw]",
             "line 6: [random] seed expects a whole number from 0 on, not 1e3",
             "line 7: [random] there is no key \"set\" (there are runs, seed, draw); did you mean \"seed\"?",
-            "line 9: [[run]] number 1: name expects a text in quotes, which must have 1 to 200 bytes (without one leave it out), not \"\"",
+            "line 9: [[run]] number 1: name expects a text in quotes, which must have 1 to 200 bytes (for a run without a name, leave the key out), not \"\"",
             "line 11: [vary] a.b expects a list of values, such as [0.05, 0.1], not [1, nan]",
         ];
         assert_eq!(lines(text), expected);
@@ -936,7 +934,7 @@ mod tests {
             let m = mean(x);
             (x.iter().map(|v| (v - m).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
         };
-        // four standard errors of 4000 draws: 0.063 deviations for a mean, 4.5 % for a deviation
+        // four standard errors of 4000 draws: 0.063 standard deviations of a mean, 4.5 % of a standard deviation
         let inertia = drawn(0);
         assert!((mean(&inertia) - 0.3).abs() < 0.01 * 0.063, "{}", mean(&inertia));
         assert!((deviation(&inertia) / 0.01 - 1.0).abs() < 0.045);
@@ -946,12 +944,12 @@ mod tests {
         let even = drawn(2);
         assert!(even.iter().all(|b| (0.03..0.05).contains(b)));
         assert!((mean(&even) - 0.04).abs() < 0.02 / 12_f64.sqrt() * 0.063);
-        // friction.c has the FMU's min 0, and the plan's max
+        // the minimum 0 of friction.c is the FMU's, and the maximum is the plan's
         assert!(drawn(3).iter().all(|c| (0.0..=0.02).contains(c)));
         let seeds = drawn(4);
         for seed in 1..=6 {
             let count = seeds.iter().filter(|s| **s == f64::from(seed)).count();
-            // 667 expected; four standard deviations are 94
+            // 667 are expected; four standard deviations are 94
             assert!(count.abs_diff(667) < 94, "{seed}: {count}");
         }
     }

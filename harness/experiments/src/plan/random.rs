@@ -15,7 +15,7 @@ pub(super) struct Draws {
     pub draw: Vec<Named<Distribution>>,
 }
 
-/// Probability distribution of a varied value. Values outside `min` to `max` or the bounds of the
+/// Probability distribution of a varied value. Values outside `min` to `max` or outside the bounds of the
 /// variable are drawn again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distribution {
@@ -74,7 +74,8 @@ impl Family {
         },
     ];
 
-    /// Returns the distribution with these parameters and bounds, or the violated condition.
+    /// Returns the distribution with these parameters and bounds, or an error that
+    /// states the violated condition.
     pub fn distribution(&self, [a, b]: [f64; 2], (min, max): (f64, f64)) -> Result<Distribution> {
         ensure!((self.makes_sense)(a, b), "{}", self.rule);
         ensure!(min < max, "min must be less than max");
@@ -83,8 +84,8 @@ impl Family {
 }
 
 impl Draws {
-    /// Returns the random values of draw `number`. Every draw has its own stream of random numbers,
-    /// so that its values do not depend on the number of runs.
+    /// Returns the random values of draw `number`. Every draw has its own stream of random numbers, so that
+    /// its values do not depend on the number of draws.
     pub fn draw(
         &self,
         description: &ModelDescription,
@@ -131,7 +132,7 @@ impl Distribution {
         for _ in 0..MOST_DRAWS {
             let value = match self.kind {
                 Kind::Normal { mean, deviation } => mean + deviation * random.normal(),
-                // whole numbers from `from` to `to`, both included
+                // whole numbers, including `from` and `to`
                 Kind::Uniform { from, to } if whole => {
                     from + (random.uniform() * (to - from + 1.0)).floor()
                 }

@@ -1,5 +1,5 @@
-//! The table of all profiles. The parser, `--help`, the keys `profile.…` of plans, the page of the
-//! documentation and the torque itself are made from it.
+//! The table of all torque profiles. The parser, `--help`, the keys `profile.…` of plans, a table of the
+//! documentation and the torque functions are all generated from it.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use super::Values;
 use super::noise::Noise;
 use super::shape::{Dwell, Piece, Pieces, Shape};
 
-/// A kind of torque history, with times in s, frequencies in Hz and torques in N·m. `says` describes it for
-/// readers of help and documentation; every kind has the parameter `duration`; `demands` are conditions on
-/// several parameters; `shape` makes the torque from values that are allowed.
+/// A kind of torque history, with times in s, frequencies in Hz and torques in N·m. `description` is for
+/// readers of help and documentation. Every kind has the parameter `duration`. `demands` are conditions on
+/// several parameters, and `shape` creates the torque from allowed values.
 #[derive(Debug)]
 pub struct Kind {
     pub name: &'static str,
-    pub says: &'static str,
+    pub description: &'static str,
     pub parameters: &'static [Parameter],
     pub(super) demands: &'static [Demand],
     pub(super) shape: fn(&Values) -> Arc<dyn Shape>,
@@ -35,7 +35,7 @@ pub struct Parameter {
     pub allowed: Allowed,
 }
 
-/// Allowed values of a parameter, which must all be finite: numbers whose magnitude is at most the limit
+/// Allowed values of a parameter, all of which are finite: numbers with an absolute value up to the limit
 /// (`Within`), whole numbers from 0 to the limit (`Whole`), and others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Allowed {
@@ -113,8 +113,8 @@ const fn sweep_from(first: Allowed) -> [Parameter; 4] {
     ]
 }
 const MOVES: Demand = (|v| v.value("f0") != v.value("f1"), "f0 and f1 are equal; use sine");
-/// Condition on the frequencies of a profile: beyond this range the phase of its sine has no valid
-/// digits.
+/// Condition on the frequencies of a profile. Outside this range the phase of the sine would
+/// have no valid digits.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.value(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",
@@ -153,21 +153,21 @@ fn pieces(list: impl Into<Vec<Piece>>) -> Arc<dyn Shape> {
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "exp-sweep",
-        says: "A sin φ, φ = 2π f0 (e^(at) - 1)/a, a = ln(f1/f0)/duration: a sine whose frequency changes exponentially from f0 to f1, upwards or downwards (thesis 5.1.4)",
+        description: "A sin φ, φ = 2π f0 (e^(at) - 1)/a, a = ln(f1/f0)/duration: a sine whose frequency changes exponentially from f0 to f1, upwards or downwards (thesis 5.1.4)",
         parameters: &sweep_from(Allowed::Positive),
         demands: &[MOVES, BAND],
         shape: |v| sweep(v, Law::Exponential),
     },
     Kind {
         name: "lin-sweep",
-        says: "A sin φ, φ = 2π (f0 t + s t²/2), s = (f1 - f0)/duration: a sine whose frequency changes linearly in time",
+        description: "A sin φ, φ = 2π (f0 t + s t²/2), s = (f1 - f0)/duration: a sine whose frequency changes linearly in time",
         parameters: &sweep_from(Allowed::NotNegative),
         demands: &[MOVES, BAND_FROM_ZERO],
         shape: |v| sweep(v, Law::Linear),
     },
     Kind {
         name: "sine",
-        says: "A sin 2πft: a sine of constant frequency",
+        description: "A sin 2πft: a sine of constant frequency",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             parameter("frequency", 2.4, "Hz", "frequency", Allowed::Within(FREQUENCY)),
@@ -178,7 +178,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "constant",
-        says: "constant torque",
+        description: "constant torque",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             duration(20.0),
@@ -188,7 +188,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "pulse",
-        says: "amplitude for `width` seconds from `start` on, otherwise no torque",
+        description: "amplitude for `width` seconds from `start` on, otherwise no torque",
         parameters: &[
             parameter("amplitude", 0.05, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
@@ -200,7 +200,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "bang-stop-bang",
-        says: "+amplitude for `bang` seconds from `start` on, none for `stop` seconds, -amplitude for `bang` seconds, then none: the hub is spun up, coasts and is brought to rest (thesis 2.7.1)",
+        description: "+amplitude for `bang` seconds from `start` on, none for `stop` seconds, -amplitude for `bang` seconds, then none: the hub is spun up, coasts and is brought to rest (thesis 2.7.1)",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
@@ -220,7 +220,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "acceleration-step",
-        says: "inertia × acceleration for `width` seconds from `start` on, as of a wheel whose speed changes linearly (thesis 2.7.1)",
+        description: "inertia × acceleration for `width` seconds from `start` on, as of a wheel whose speed changes linearly (thesis 2.7.1)",
         parameters: &[
             parameter("acceleration", 0.1, "rad/s²", "acceleration", Allowed::Any),
             // hub.I + tank.m_liq tank.r² at the FMU's start values.
@@ -237,7 +237,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "noise",
-        says: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
+        description: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
         parameters: &[
             parameter("rms", 0.05, "N·m", "torque, rms", Allowed::Positive),
             parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::NotNegative),
@@ -259,7 +259,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "sine-noise",
-        says: "A sin 2πft plus noise as of the profile `noise`, the sum clipped at ±limit: a steady wave, and noise that excites the other modes (thesis 8.6.1)",
+        description: "A sin 2πft plus noise as of the profile `noise`, the sum clipped at ±limit: a steady wave, and noise that excites the other modes (thesis 8.6.1)",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude of the sine", Allowed::Any),
             parameter("frequency", 2.4, "Hz", "frequency of the sine", Allowed::Within(FREQUENCY)),
@@ -283,7 +283,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "zero",
-        says: "no torque",
+        description: "no torque",
         parameters: &[duration(20.0)],
         demands: &[],
         shape: |_| pieces([]),
@@ -292,5 +292,5 @@ pub const KINDS: &[Kind] = &[
 
 pub const FILE: (&str, &str) = (
     "file:path=FILE,hold=false",
-    "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, joined by lines, or held with hold=true; a relative path starts where the command is started",
+    "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, interpolated linearly, or held with hold=true; a relative path starts where the command is started",
 );

@@ -24,7 +24,7 @@ pub use self::shape::Shape;
 use analysis::sweep::Sweep;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
-/// A torque history with a formula: an entry of [`KINDS`] with values for its parameters.
+/// A torque history that is given by a formula: an entry of [`KINDS`] with values of its parameters.
 #[derive(Clone, Debug)]
 pub struct Profile {
     kind: &'static Kind,
@@ -61,9 +61,11 @@ impl Kind {
 }
 
 pub fn help() -> String {
-    let all = KINDS.iter().map(|kind| (kind.written(&kind.defaults()), kind.says));
+    let all = KINDS.iter().map(|kind| (kind.written(&kind.defaults()), kind.description));
     all.chain([(FILE.0.into(), FILE.1)])
-        .map(|(written, says)| format!("  {written}\n      {}\n", says.replace('`', "")))
+        .map(|(written, description)| {
+            format!("  {written}\n      {}\n", description.replace('`', ""))
+        })
         .collect()
 }
 
@@ -74,7 +76,7 @@ pub fn table() -> String {
         let units = kind.parameters.iter().filter(|p| !p.unit.is_empty());
         let units: Vec<_> = units.map(|p| format!("{} {}", p.name, p.unit)).collect();
         let written = kind.written(&kind.defaults());
-        text.push_str(&format!("| `{written}` | {} | {} |\n", kind.says, units.join(", ")));
+        text.push_str(&format!("| `{written}` | {} | {} |\n", kind.description, units.join(", ")));
     }
     text.push_str(&format!("| `{}` | {} | s, N·m |\n", FILE.0, FILE.1));
     text
@@ -86,14 +88,14 @@ pub fn list() -> Vec<serde_json::Value> {
     let profile = |kind: &kinds::Kind| {
         json!({
             "profile": kind.name,
-            "torque": kind.says,
+            "torque": kind.description,
             "parameters": kind.parameters.iter().map(parameter).collect::<Vec<_>>(),
         })
     };
     KINDS.iter().map(profile).collect()
 }
 
-/// The text of a profile, `name` or `name:key=value,key=value`, split but not yet checked.
+/// The text of a profile, `name` or `name:key=value,key=value`, split into its parts but not yet checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
     name: String,
@@ -113,7 +115,7 @@ impl Written {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let name = name.trim();
         let mut written = Written { name: name.into(), pairs: Vec::new() };
-        // A comma within the name of an array's element, p[1,2], does not separate pairs.
+        // A comma within brackets belongs to a name, such as p[1,2], and does not separate pairs.
         let mut depth = 0i32;
         let pairs = rest.split(|c| {
             depth += i32::from(c == '[') - i32::from(c == ']');
@@ -148,11 +150,10 @@ impl Written {
         self.pairs.push((key.into(), value.into()));
     }
 
-    /// Makes the torque; a file is read.
+    /// Creates the torque. If the profile is `file`, reads the file.
     ///
     /// # Errors
-    /// If there is no such profile, a parameter is unknown or not allowed, or the file cannot be
-    /// read.
+    /// If there is no such profile, a parameter is unknown or not allowed, or the file cannot be read.
     pub fn torque(&self) -> Result<Torque> {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
     }
@@ -191,8 +192,8 @@ impl Written {
         Some(self.pairs.remove(place).1)
     }
 
-    /// Returns the values of `parameters` in their order, with defaults where the text gives none, and a list
-    /// of everything that is wrong with the text.
+    /// Returns the values of `parameters` in their order, with defaults for those that the text does not give, and a
+    /// list of everything that is wrong with the text.
     pub(crate) fn values(&self, parameters: &[Parameter]) -> (Vec<f64>, Vec<String>) {
         let mut values: Vec<f64> = parameters.iter().map(|p| p.default).collect();
         let mut problems = Vec::new();
@@ -238,7 +239,7 @@ impl Written {
 impl FromStr for Profile {
     type Err = anyhow::Error;
 
-    /// Parses `name` or `name:key=value,key=value`; parameters that are not given have their defaults.
+    /// Parses `name` or `name:key=value,key=value`; other parameters have their defaults.
     fn from_str(text: &str) -> Result<Self> {
         text.parse::<Written>()?.profile()
     }
@@ -281,27 +282,25 @@ impl Profile {
         self.shape.sweep()
     }
 
-    /// Returns the lowest and highest frequency (Hz) that the torque excites uniformly enough for a frequency
-    /// response; `None` if there are none.
+    /// Returns the lowest and highest frequency (Hz) of the band that the torque excites uniformly enough for a
+    /// frequency response; `None` for torques without such a band.
     pub fn band(&self) -> Option<(f64, f64)> {
         self.shape.band()
     }
 }
 
-/// Time between two torque commands of a profile if the user states none, s: 50 Hz, as on the
-/// thesis's bench.
+/// Time between two torque commands of a profile unless the user states one, s: 50 Hz, as on the thesis's bench.
 pub const SAMPLE: f64 = 0.02;
-/// Largest error of straight lines between the commands of a profile, as a fraction of its
-/// amplitude, with which the given interval between commands is kept. For a sine of frequency f the
-/// error is (2π f · interval)²/8. The value allows the thesis's sweeps up to 3.5 Hz to be commanded
-/// at 50 Hz.
+/// Largest error of linear interpolation between the commands of a profile, relative to its amplitude, at which the
+/// user's interval between commands is kept. For a sine of frequency f the error is (2π f · interval)²/8. The value
+/// allows the thesis's sweeps up to 3.5 Hz to be commanded at 50 Hz.
 pub const COARSEST: f64 = 0.025;
-/// Largest error of straight lines between the commands of a profile, as a fraction of its
-/// amplitude, if the given interval is divided because it exceeds [`COARSEST`].
+/// Largest error of linear interpolation between the commands of a profile, relative to its amplitude, after the
+/// user's interval was divided because its error exceeds [`COARSEST`].
 const FINEST: f64 = 0.001;
 
-/// Returns the largest product of frequency and interval (cycles) at which lines differ from a sine by at
-/// most the fraction `error` of its amplitude.
+/// Returns the largest product of frequency and interval (cycles) at which linear interpolation of a sine has at most
+/// the error `error`, relative to its amplitude.
 pub fn cycles(error: f64) -> f64 {
     (8.0 * error).sqrt() / std::f64::consts::TAU
 }
@@ -309,7 +308,7 @@ pub fn cycles(error: f64) -> f64 {
 #[derive(Clone, Debug)]
 pub enum Torque {
     Profile(Profile),
-    /// Rows of time (s) and torque (N·m), each held until the next row, or joined by straight lines.
+    /// Rows of time (s) and torque (N·m), each held until the next row, or interpolated linearly.
     Rows {
         history: History,
         held: bool,
@@ -317,7 +316,8 @@ pub enum Torque {
 }
 
 impl Torque {
-    /// Reads the columns `time` (s) and `tau_cmd` (N·m) of a file; the rows are `held` or joined by lines.
+    /// Reads the columns `time` (s) and `tau_cmd` (N·m) of a file. Between rows the torque is
+    /// `held` or interpolated linearly.
     ///
     /// # Errors
     /// If the file cannot be read as a history of inputs.
@@ -331,11 +331,11 @@ impl Torque {
             .with_context(|| format!("the file {} cannot be used", path.display()))
     }
 
-    /// Makes a torque from rows of time (s) and torque (N·m). With `slopes` (N·m/s) the torque follows each
-    /// row's slope until the next row, and may jump there.
+    /// Creates a torque from rows of time (s) and torque (N·m). With `slopes` (N·m/s) the torque follows the slope of
+    /// each row until the next row, and may jump there.
     ///
     /// # Errors
-    /// If there are no rows, or the times do not ascend.
+    /// If there are no rows, or the times do not increase.
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
         let slopes = slopes.map(<[f64]>::to_vec);
         Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
@@ -358,23 +358,23 @@ impl Torque {
         }
     }
 
-    /// Returns the torque at `t` (s), N·m; at a jump the value after it.
+    /// Returns the torque at `t` (s), N·m. At a jump it is the value after the jump.
     pub fn torque_at(&self, t: f64) -> f64 {
         match self {
             Torque::Profile(profile) => profile.shape.torque_after(t),
-            // Communication points k·H may lie one ulp before the row that they coincide with.
+            // Communication points k·H may be one rounding error before the row with the same time.
             Torque::Rows { history, .. } => history.near(t),
         }
     }
 
-    /// Returns the torque until `stop` (s) as rows that are joined by lines or held. The rows of a file are
-    /// unchanged. Edges of a profile are rows. A profile that oscillates has a row every `sample` seconds. If
-    /// lines between those would differ from it by more than 2.5 % of the amplitude, `sample` is divided so
-    /// that they differ by at most 0.1 %. Held rows are never divided.
+    /// Returns the torque until `stop` (s) as rows, between which it is interpolated linearly or held. The rows of a
+    /// file are unchanged. A profile has rows at its edges; a profile that oscillates also has a row every `sample`
+    /// seconds. If the error of linear interpolation would exceed 2.5 % of the amplitude, `sample` is divided so that
+    /// the error is at most 0.1 %. Held rows are never divided.
     ///
     /// # Errors
-    /// If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half
-    /// of the rate of held rows.
+    /// If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half of the
+    /// rate of held rows.
     pub fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<Cow<'_, History>> {
         match self {
             Torque::Rows { history, .. } if hold => Ok(Cow::Owned(history.held())),
@@ -383,11 +383,11 @@ impl Torque {
         }
     }
 
-    /// Returns the number of rows of [`Torque::history`] without making them.
+    /// Returns the number of rows of [`Torque::history`] without creating them.
     ///
     /// # Errors
-    /// If the profile has more commands than allowed, or frequencies that the commands do not
-    /// follow, as for [`Torque::history`].
+    /// If the profile has more commands than allowed, or frequencies that are too high for the
+    /// commands, as for [`Torque::history`].
     pub fn row_count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
         Ok(match self {
             Torque::Rows { history, .. } => history.time().len(),
@@ -415,9 +415,9 @@ impl Torque {
 }
 
 impl Profile {
-    /// Returns the number of intervals between torque commands until `stop`, s, which may have a
-    /// fraction, and the number of them in `sample`, s. `None` if the torque is constant between
-    /// its edges and needs no commands.
+    /// Returns the number of intervals between torque commands until `stop`, s, which need not be whole, and
+    /// the number of intervals in `sample`, s. Returns `None` if the torque is constant between its edges
+    /// and needs no commands.
     fn commands(&self, sample: f64, stop: f64, hold: bool) -> Result<Option<(f64, usize)>> {
         let highest = self.shape.highest(stop);
         if highest == 0.0 {
@@ -463,7 +463,7 @@ impl Profile {
             edges.sort_by(f64::total_cmp);
             let mut last = 0.0;
             for edge in edges {
-                // Two edges one ulp apart are the same.
+                // Two edges that differ only by rounding are the same edge.
                 let apart = 1e-9 * (1.0 + edge.abs());
                 if edge > last + apart && edge < stop - apart {
                     row(edge);
@@ -478,8 +478,8 @@ impl Profile {
         let whole = (intervals - intervals.round()).abs() < 1e-6;
         let last = if whole { intervals.round() } else { intervals.ceil() }.max(1.0) as usize;
         (1..last).for_each(|k| row(command(k)));
-        // The last row is the first command after the stop time, so that the torque does not depend on when
-        // the run ends.
+        // The last row is the first command after the stop time, so that the torque does not depend on the
+        // end of the run.
         row(if whole { stop } else { command(last) });
         History::new(time, values, None, hold)
     }
@@ -509,8 +509,8 @@ mod tests {
         }
     }
 
-    /// A linear sweep from 0 Hz has the phase φ = π f1 t²/T. With f1 = 4 Hz and T = 8 s, a quarter
-    /// cycle ends at t = 1 s and the first whole one at 2 s, when the frequency is 1 Hz.
+    /// A linear sweep from 0 Hz has the phase φ = π f1 t²/T. With f1 = 4 Hz and T = 8 s, the first quarter of a cycle
+    /// ends at t = 1 s, and the first whole cycle at 2 s, when the frequency is 1 Hz.
     #[test]
     fn a_linear_sweep_begins_at_zero_hertz() {
         let profile: Profile = "lin-sweep:amplitude=2,f0=0,f1=4,duration=8".parse().unwrap();
@@ -559,8 +559,8 @@ mod tests {
         history.time().iter().map(|t| (*t, history.after(*t).0)).collect()
     }
 
-    /// A profile of two pulses, sampled every 20 ms: the torque history has rows at the edges, so that its impulse is
-    /// exact.
+    /// A profile of two pulses is sampled every 20 ms. The torque history has rows at the edges, so that
+    /// its impulse is exact.
     #[test]
     fn edges_of_a_profile_are_rows_at_their_exact_times() {
         let text = "bang-stop-bang:amplitude=0.1,start=0.1,bang=0.3,stop=0.5,duration=2";
@@ -580,15 +580,15 @@ mod tests {
         let expected = [(0.0, 0.0), (0.005, 2.0), (0.015, 0.0), (1.0, 0.0)];
         assert_eq!(rows(pulse, 0.02, 1.0, false), expected);
         assert_eq!(rows(pulse, 0.02, 1.0, true), expected);
-        // an edge at the start, and one at the end
+        // a pulse with one edge at the start and the other at the end of the history
         let pulse = "pulse:amplitude=2,start=0,width=1";
         assert_eq!(rows(pulse, 0.02, 1.0, false), [(0.0, 2.0), (1.0, 0.0)]);
     }
 
-    /// The thesis's sweeps are commanded at 50 Hz; a line of 0.02 s differs from 3.5 Hz by (0.44)²/8 = 2.4 %
-    /// of the amplitude.
+    /// The thesis's sweeps are commanded at 50 Hz: linear interpolation over 0.02 s has an error of (0.44)²/8 = 2.4 %
+    /// of the amplitude at 3.5 Hz.
     #[test]
-    fn lines_between_commands_follow_a_profile_of_any_frequency() {
+    fn the_error_of_linear_interpolation_between_commands_is_limited_at_any_frequency() {
         for (text, count, error) in [
             ("exp-sweep:amplitude=1,duration=20", 1000, 0.025),
             ("sine:amplitude=1,frequency=3.5", 1000, 0.025),
@@ -605,7 +605,7 @@ mod tests {
                 largest = largest.max((history.after(t).0 - torque.torque_at(t)).abs());
             }
             assert!(largest <= error, "{text}: {largest}");
-            // every command of 50 Hz is one of them, to the last bit, and none depends on when the run ends
+            // every command at 50 Hz is exactly one of the rows, and no row depends on the end of the run
             let early = torque.history(0.02, 7.333, false).unwrap();
             for k in 0..366 {
                 let t = f64::from(k) * 0.02;
@@ -616,7 +616,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_that_takes_too_many_commands_is_refused_with_what_is_possible() {
+    fn a_profile_with_too_many_commands_is_refused_and_the_error_states_what_is_possible() {
         let refused = |text: &str, sample: f64, hold: bool| {
             let torque = Torque::Profile(text.parse().unwrap());
             torque.history(sample, 60.0, hold).unwrap_err().to_string()
@@ -625,7 +625,7 @@ mod tests {
         for word in ["4.215e12 commands", "allowed: at most 20000000", "up to 2.847e-4 s"] {
             assert!(error.contains(word), "{word}: {error}");
         }
-        // 20 million rows in 60 s, 70.25 for a cycle
+        // 20 million rows in 60 s with 70.25 rows per cycle
         assert!(error.contains("up to 4.7451e3 Hz"), "{error}");
         assert!(refused("sine", 1e-9, false).contains("6.000e10 commands"));
         let error = refused("sine:frequency=25", 0.02, true);

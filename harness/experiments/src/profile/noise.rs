@@ -1,23 +1,23 @@
-//! Band-limited coloured noise with a formula: a sum of sines,
+//! Band-limited coloured noise that is given by a formula, a sum of sines:
 //!
 //! ```text
 //! τ(t) = Σ a_k sin(2π f_k t + φ_k),   a_k² ∝ f_k^exponent,   Σ a_k²/2 = rms²
 //! ```
 //!
-//! The band is divided into [`TONES`] equal cells. The seed determines f_k within the k-th cell and the phase
-//! φ_k. So the noise has a value at any time, has no period, and is the same on every machine.
+//! The band is divided into [`TONES`] equal cells. The seed determines the frequency f_k within the k-th cell and the
+//! phase φ_k. Therefore the noise has a value at any time, is not periodic, and is equal on every machine.
 
 use std::f64::consts::TAU;
 
 use super::shape::{Dwell, Shape};
 use analysis::random::Random;
 
-/// Number of sines of which the noise consists. Over the thesis's band they are 4.4 mHz apart,
-/// closer than the 5 mHz that `spa` resolves, so that the estimate has no gaps.
+/// Number of sines of the noise. Over the thesis's band they are 4.4 mHz apart, closer than the 5 mHz that `spa`
+/// resolves, so that the estimate has no gaps.
 pub const TONES: usize = 512;
 
-/// A noise torque in a band, which may begin at 0, Hz, if wanted with a sine added. The torque is clipped at
-/// ±`limit`, N·m.
+/// A noise torque in a band, Hz, which may begin at 0, optionally with a sine added. The torque is
+/// clipped at ±`limit`, N·m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
     pub(super) sine: Option<Dwell>,
@@ -34,8 +34,8 @@ pub(super) struct Tone {
 }
 
 impl Noise {
-    /// Makes the noise: `rms` is the root mean square before the limit, N·m, and the power density is
-    /// ∝ f^exponent: 0 is white, −1 pink, −2 brown.
+    /// Creates the noise. `rms` is the root mean square before clipping, N·m, and the power density is proportional to
+    /// f^exponent: 0 is white, −1 pink, −2 brown.
     pub fn new(rms: f64, (f0, f1): (f64, f64), exponent: f64, seed: u64, limit: f64) -> Self {
         let mut random = Random::new(seed, 0);
         let cell = (f1 - f0) / TONES as f64;
@@ -69,8 +69,8 @@ impl Shape for Noise {
         self.sine.as_ref().map_or(0.0, |sine| sine.highest(stop)).max(self.band.1)
     }
 
-    /// Returns the excited band, Hz. If the band of the noise begins at 0, the excited band begins at the second tone,
-    /// because the first tone may be at any frequency near 0.
+    /// Returns the excited band, Hz. If the band of the noise begins at 0, the excited band begins with the second
+    /// sine, because the frequency of the first one may be close to 0.
     fn band(&self) -> Option<(f64, f64)> {
         let (f0, f1) = self.band;
         Some((if f0 > 0.0 { f0 } else { f1 / TONES as f64 }, f1))
@@ -102,7 +102,7 @@ mod tests {
             power += noise.torque_after(t).powi(2);
         }
         assert!(clipped > 0);
-        // 600 s resolve 1.7 mHz, tones are 39 mHz apart: a fraction of a per cent
+        // 600 s resolve 1.7 mHz, and the sines are 39 mHz apart: the error is a fraction of a per cent
         assert!(((power / 60_000.0).sqrt() / 0.05 - 1.0).abs() < 0.01);
         let brown = Noise::new(0.05, (0.0, 20.0), -2.0, 1, 1.0);
         assert!((0..100).all(|k| brown.torque_after(k as f64).is_finite()));
@@ -113,7 +113,8 @@ mod tests {
         let noise = Noise::new(0.05, (1.25, 3.5), -1.0, 3, 0.26);
         let tau = samples(&noise, 600.0, 0.05);
         let rms = (tau.iter().map(|v| v * v).sum::<f64>() / tau.len() as f64).sqrt();
-        // 600 s resolve 1.7 mHz, so that tones 4.4 mHz apart on average mix little: a few per cent
+        // 600 s resolve 1.7 mHz, and the sines are 4.4 mHz apart on average, so that they overlap little: the error is
+        // a few per cent
         assert!((rms / 0.05 - 1.0).abs() < 0.05, "{rms}");
         let loud = Noise::new(0.13, (1.25, 3.5), 0.0, 3, 0.26);
         let tau = samples(&loud, 100.0, 0.05);
@@ -126,7 +127,7 @@ mod tests {
             let noise = Noise::new(0.05, (1.0, 4.0), exponent, 5, 1.0);
             let step = 0.1;
             let tau = samples(&noise, 400.0, step);
-            // under a Hann window of the record, at every multiple of 1/duration in the range
+            // spectrum of the record with a Hann window, at every multiple of 1/duration in the range
             let (first, last) = ((from * 400.0) as usize, (to * 400.0) as usize);
             (first..last)
                 .map(|bin| {
@@ -142,13 +143,13 @@ mod tests {
                 })
                 .sum::<f64>()
         };
-        // from 1 to 2 and from 2 to 4 Hz: white noise has twice, pink the same, brown half the
-        // power in the higher octave; single tones scatter by their places in their cells
+        // from the octave 1 to 2 Hz to the octave 2 to 4 Hz the power of white noise doubles, of pink noise stays the
+        // same, of brown noise halves; the random frequencies within the cells cause an error
         for (exponent, ratio) in [(0.0, 2.0), (-1.0, 1.0), (-2.0, 0.5)] {
             let found = power(exponent, (2.0, 3.99)) / power(exponent, (1.01, 2.0));
             assert!((found / ratio - 1.0).abs() < 0.1, "exponent {exponent}: {found}");
         }
-        // a Hann window's skirts beyond a tenth of a hertz from the band: 1e-6 and less
+        // at a distance of a tenth of a hertz from the band a Hann window leaks 1e-6 or less
         assert!(power(0.0, (0.3, 0.9)) < 1e-6 * power(0.0, (1.0, 2.0)));
     }
 

@@ -1,24 +1,25 @@
-//! Formulas for torque as a function of time, of which the profiles consist.
+//! Torques as functions of time, of which the profiles consist.
 
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
 use analysis::sweep::Sweep;
 
-/// A torque as a function of time; t in s, torque in N·m.
+/// A torque, N·m, as a function of time t, s.
 pub trait Shape: Debug + Send + Sync {
-    /// Returns the torque just after `t`; at a jump this is the new value.
+    /// Returns the torque at `t`; at a jump this is the value after the jump.
     fn torque_after(&self, t: f64) -> f64;
 
-    /// Returns the highest frequency from 0 to `stop` (s), Hz; 0 if the torque is constant between its edges.
+    /// Returns the highest frequency of the torque from 0 to `stop` (s), Hz; 0 for a torque that is
+    /// constant between its edges.
     fn highest(&self, stop: f64) -> f64;
 
     fn edges(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Returns the lowest and highest frequency (Hz) that the torque excites uniformly enough for a frequency
-    /// response; `None` if there are none.
+    /// Returns the lowest and highest frequency (Hz) of the band that the torque excites uniformly enough for
+    /// a frequency response; `None` for torques without such a band.
     fn band(&self) -> Option<(f64, f64)> {
         None
     }
@@ -64,7 +65,7 @@ impl Shape for Dwell {
     }
 }
 
-/// Constant torques one after the other, zero between them.
+/// A sequence of constant torques, with zero torque between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pieces(pub Vec<Piece>);
 
@@ -87,7 +88,7 @@ impl Piece {
 
 impl Shape for Pieces {
     fn torque_after(&self, t: f64) -> f64 {
-        // A communication point k·H may differ from the edge by one ulp.
+        // a communication point k·H may differ from the time of an edge by a rounding error
         let slack = 1e-9 * (1.0 + t.abs());
         let now = self.0.iter().find(|piece| t >= piece.from - slack && t < piece.to - slack);
         now.map_or(0.0, |piece| piece.torque)

@@ -1,11 +1,10 @@
-//! Sensors in the record of a run: what they measure ([`quantity`]), and their errors. A reading is
+//! Sensors that are recorded in a run: the quantities that they measure ([`quantity`]), and their errors. A reading is
 //!
 //! ```text
 //! y = quantum · round((scale · x(t − delay) + bias + noise · n)/quantum),   n ~ N(0, 1) in every sample
 //! ```
 //!
-//! x is sampled every 1/rate seconds. A row at which a sample arrives has a reading; other rows have no
-//! value.
+//! x is sampled every 1/rate seconds. A row has a reading if a sample arrives in it; other rows have no value.
 
 pub mod quantity;
 
@@ -22,13 +21,13 @@ use crate::profile::{Allowed, Parameter, Written, parameter};
 use crate::run;
 use signals::table::Table;
 
-/// A kind of sensor. `says` describes the measured quantity for readers; `parameters` come in addition to
-/// [`ERRORS`]; `unit` is the unit of the readings, or empty if the readings have the variable's unit; `of` is the variable
-/// that the sensor reads unless `of=NAME` names another, where the outer `None` is for kinds that do not read a variable.
+/// A kind of sensor. `description` describes the measured quantity for readers of the help; `parameters` are in addition
+/// to [`ERRORS`]; `unit` is the unit of the readings, empty if they have the unit of the variable. `of` is the variable
+/// that the sensor reads unless `of=NAME` names another one; the outer `None` is for kinds that do not read a variable.
 #[derive(Debug)]
 pub struct Kind {
     pub name: &'static str,
-    pub says: &'static str,
+    pub description: &'static str,
     pub parameters: &'static [Parameter],
     pub unit: &'static str,
     of: Option<Option<&'static str>>,
@@ -45,14 +44,14 @@ const ANGLE: Parameter = parameter(
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "gauge",
-        says: "wave height at the wall of HubSlosh's tank, m, at an angle from radially outwards towards tangential",
+        description: "wave height at the wall of HubSlosh's tank, m, at an angle from radially outwards towards tangential",
         parameters: &[ANGLE],
         unit: "m",
         of: None,
     },
     Kind {
         name: "pressure",
-        says: "pressure at the wall of HubSlosh's tank relative to the gas, Pa, at an angle and a height above the bottom",
+        description: "pressure at the wall of HubSlosh's tank relative to the gas, Pa, at an angle and a height above the bottom",
         parameters: &[
             ANGLE,
             parameter("height", 0.0, "m", "height over the bottom", Allowed::NotNegative),
@@ -62,21 +61,21 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "camera",
-        says: "surface in HubSlosh's tank: best-fitting plane and amplitude of every mode, as heights at the wall, m",
+        description: "surface in HubSlosh's tank: best-fitting plane and amplitude of every mode, as heights at the wall, m",
         parameters: &[],
         unit: "m",
         of: None,
     },
     Kind {
         name: "force",
-        says: "force output of the FMU, named by of=NAME, N",
+        description: "force output of the FMU, named by of=NAME, N",
         parameters: &[],
         unit: "N",
         of: Some(Some(F_TANGENTIAL)),
     },
     Kind {
         name: "accelerometer",
-        says: "specific force at a radius of HubSlosh's hub, on the tank's side, along an angle, m/s²",
+        description: "specific force at a radius of HubSlosh's hub, on the tank's side, along an angle, m/s²",
         parameters: &[
             parameter("radius", 0.225, "m", "distance from the bearing axis", Allowed::Any),
             ANGLE,
@@ -86,14 +85,14 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "encoder",
-        says: "angle output of the FMU, named by of=NAME, rad",
+        description: "angle output of the FMU, named by of=NAME, rad",
         parameters: &[],
         unit: "rad",
         of: Some(Some(THETA)),
     },
     Kind {
         name: "variable",
-        says: "Real variable of any FMU, named by of=NAME",
+        description: "Real variable of any FMU, named by of=NAME",
         parameters: &[],
         unit: "",
         of: Some(None),
@@ -123,9 +122,8 @@ pub struct Sensor {
     errors: Errors,
 }
 
-/// Values of [`ERRORS`]; the unit of noise, bias and quantum is the sensor's. `noise` is the standard
-/// deviation of a sample, `scale` the reading divided by the quantity, and `delay` the time between sampling
-/// and reading, s.
+/// Values of [`ERRORS`]. Noise, bias and quantum are in the sensor's unit. `noise` is the standard deviation of a sample,
+/// `scale` the reading divided by the quantity, and `delay` the time from sampling to reading, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     pub rate: f64,
@@ -149,7 +147,7 @@ impl FromStr for Sensor {
 }
 
 impl Sensor {
-    /// Makes a sensor with the name of its column from `KIND:key=value,…`.
+    /// Creates a sensor with the name of its column from `KIND:key=value,…`.
     ///
     /// # Errors
     /// Lists everything that is wrong with it.
@@ -179,7 +177,10 @@ impl Sensor {
         let parameters: Vec<Parameter> = parameters.collect();
         let (mut values, mut problems) = written.values(&parameters);
         match (kind.of, &of) {
-            (None, Some(_)) => problems.push(format!("{} reads no variable by of=", kind.name)),
+            (None, Some(_)) => problems.push(format!(
+                "{} does not read a variable, so that of= is not allowed",
+                kind.name
+            )),
             (Some(None), None) => problems.push("of=NAME is required".into()),
             _ => {}
         }
@@ -239,9 +240,9 @@ impl Sensor {
         self.errors.scale * value + self.errors.bias
     }
 
-    /// Returns the readings of one channel in the rows of a run; NaN in rows without a reading. A sample is taken in every
-    /// `every`-th row, and its reading arrives `late` rows later. `stream` seeds the noise, so that channels and runs have
-    /// different noise.
+    /// Returns the readings of one channel in the rows of a run, NaN in rows without a reading. A sample is taken in every
+    /// `every`-th row, and its reading arrives `late` rows later. The noise is seeded with `stream`, so that channels and
+    /// runs have different noise.
     fn readings(&self, truth: &[f64], every: usize, late: usize, stream: &str) -> Vec<f64> {
         let Errors { noise, quantum, seed, .. } = self.errors;
         let mut random = Random::new(seed, fnv(stream));
@@ -249,7 +250,7 @@ impl Sensor {
         for (k, value) in truth.iter().enumerate().step_by(every) {
             let y = self.expected(*value) + noise * random.normal();
             if let Some(reading) = readings.get_mut(k + late) {
-                // + 0.0 prevents −0 in a file.
+                // + 0.0 avoids −0 in a file
                 *reading = if quantum > 0.0 { quantum * (y / quantum).round() + 0.0 } else { y };
             }
         }
@@ -261,7 +262,7 @@ impl Sensor {
 pub struct Sensors(Vec<(Sensor, Quantity)>);
 
 impl Sensors {
-    /// Makes the sensors of a run with these settings, whose rows are `step` seconds apart.
+    /// Creates the sensors of a run with these settings, whose rows are `step` seconds apart.
     ///
     /// # Errors
     /// Lists everything that is wrong with them.
@@ -315,11 +316,11 @@ impl Sensors {
         self.0.iter().flat_map(one).collect()
     }
 
-    /// Returns the first `kept` columns of a run's table and the readings of [`Sensors::read`], without the
-    /// columns that were recorded only for the sensors.
+    /// Returns the first `kept` columns of a run's table and the readings of [`Sensors::read`]. The columns that were
+    /// recorded only for the sensors are left out.
     ///
     /// # Errors
-    /// If the table lacks a variable that they need.
+    /// If the table lacks a variable that the sensors need.
     pub fn recorded(&self, table: Table, kept: usize, run: &str, step: f64) -> Result<Table> {
         let names: Vec<String> =
             table.names()[..kept].iter().cloned().chain(self.columns()).collect();
@@ -327,11 +328,11 @@ impl Sensors {
         Ok(self.read(table, run, step)?.select(&names))
     }
 
-    /// Adds the readings of all sensors to a run's table. `run` is the name of the run; runs with the same
-    /// seed but different names have different noise.
+    /// Adds the readings of all sensors to the table of a run. `run` is the name of the run; runs with the same seed but
+    /// different names have different noise.
     ///
     /// # Errors
-    /// If the table lacks a variable that they need.
+    /// If the table lacks a variable that the sensors need.
     pub fn read(&self, table: Table, run: &str, step: f64) -> Result<Table> {
         let mut columns = Vec::new();
         for (sensor, quantity) in &self.0 {
@@ -366,10 +367,10 @@ impl Sensors {
 }
 
 impl Sensor {
-    /// Converts period and delay to numbers of rows: from sample to sample, and from a sample to its reading.
+    /// Converts times to numbers of rows: from a sample to the next, and from a sample to its reading.
     ///
     /// # Errors
-    /// If one is not a multiple of the step.
+    /// If a time is not a multiple of the step.
     fn rows(&self, step: f64) -> Result<[usize; 2]> {
         let whole = |what: &str, seconds: f64| {
             let rows = seconds / step;
@@ -402,13 +403,13 @@ pub fn help() -> String {
         let of = kind.of.map(|default| format!("of={}", default.unwrap_or("NAME")));
         let all: Vec<String> = of.into_iter().chain([own]).filter(|t| !t.is_empty()).collect();
         let colon = if all.is_empty() { "" } else { ":" };
-        format!("  {}{colon}{}\n      {}\n", kind.name, all.join(","), kind.says)
+        format!("  {}{colon}{}\n      {}\n", kind.name, all.join(","), kind.description)
     });
     let errors = format!("  every sensor also has: {}\n", written(&ERRORS));
     kinds.chain([errors]).collect()
 }
 
-/// Hashes a text to a number that is the same on every machine (FNV-1a).
+/// Returns a hash of a text that is the same on every machine (FNV-1a).
 fn fnv(text: &str) -> u64 {
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     text.bytes().fold(0xcbf2_9ce4_8422_2325, step)

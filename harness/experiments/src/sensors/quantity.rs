@@ -1,22 +1,22 @@
 //! Measured quantities, computed from variables of the FMU.
 //!
-//! The surface in an upright cylinder of radius R = d/2, filled to h, is a sum of modes (NASA SP-106, chapter
-//! 2; Dodge 2000). At the angle φ on the wall, from radial outwards towards tangential, with α_n the slosh
-//! angle of mode n in that direction:
+//! The surface in an upright cylinder of radius R = d/2, filled to the height h, is a sum of modes (NASA SP-106, chapter
+//! 2; Dodge 2000). At the wall and at the angle φ, from radial outwards towards tangential, with the slosh angle α_n of
+//! mode n in that direction:
 //!
 //! ```text
 //! wave       η(φ) = Σ b_n α_n                        b_n = 2 R/(ξ_n² − 1)
-//! plane that fits the surface best, at the wall:     Σ 4 b_n α_n/ξ_n²
+//! height of the best-fitting plane at the wall:      Σ 4 b_n α_n/ξ_n²
 //! pressure   p(φ, z) = ρ g (h − z) + ρ Σ b_n (g α_n + a) cosh(ξ_n z/R)/cosh(ξ_n h/R) − ρ a R
 //! ```
 //!
-//! p is the pressure above that of the gas at the height z over the bottom, a the acceleration of the tank in
-//! the direction φ, less that of gravity. The formula for p follows in the frame of the tank from Φ_t + g η +
-//! a r cos φ = 0 at the surface, and p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ decreases
-//! with depth as its cosh. A mode that the model does not include follows the acceleration at once, g α_n + a
-//! = 0, and contributes nothing. Integrated over the wall, p gives the force of the pendulums and of the
-//! liquid that moves with the tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the
-//! least-squares fit over the disc: ∫ J_1(ξ r/R) r² dr = R³ J_1(ξ)/ξ².
+//! p is the pressure relative to the gas, at the height z above the bottom, and a is the acceleration of the tank minus
+//! that of gravity in the direction φ. The formula for p follows in the frame of the tank from Φ_t + g η + a r cos φ = 0
+//! at the surface, and p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ decreases with depth as its cosh. A
+//! mode that the model does not include is assumed to follow the acceleration immediately, g α_n + a = 0, and
+//! contributes nothing. The integral of p over the wall is the force of the pendulums and of the liquid that moves with
+//! the tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the least-squares fit over the disc: ∫ J_1(ξ
+//! r/R) r² dr = R³ J_1(ξ)/ξ².
 
 use std::collections::BTreeMap;
 
@@ -27,8 +27,8 @@ use names::hubslosh::{
     self, G_AXIAL, OMEGA, OMEGA_DOT, SloshModel, SloshSource, THETA, bench, fluid, tank,
 };
 
-/// Measured quantity of one sensor, computed from the Real variables `needs` of the FMU. Each channel has the
-/// ending of the column's name, and the unit.
+/// Measured quantity of one sensor, computed from the Real variables `needs` of the FMU. Each channel has the ending of
+/// its column's name, and its unit.
 #[derive(Clone, Debug)]
 pub struct Quantity {
     pub needs: Vec<String>,
@@ -80,9 +80,8 @@ impl Coordinate {
     }
 }
 
-/// Slosh modes of the FMU as a sensor reads them. Their coordinates are the first of the needed
-/// variables: for each mode the radial and the tangential coordinate and the pendulum length, and
-/// finally the tank's diameter.
+/// Slosh modes of the FMU, as a sensor reads them from its needed variables. The first of these are, for each mode, the
+/// radial coordinate, the tangential coordinate and the pendulum length, followed by the tank's diameter.
 #[derive(Clone, Debug)]
 struct Modes {
     count: usize,
@@ -93,7 +92,7 @@ const MOTION: [&str; 7] =
     [THETA, OMEGA, OMEGA_DOT, tank::R, G_AXIAL, bench::TILT, bench::TILT_AZIMUTH];
 
 impl Quantity {
-    /// Makes the quantity that a Real variable of the FMU is. `unit` is the unit that the variable must have.
+    /// Creates the quantity that is equal to a Real variable of the FMU. `unit` is the unit that the variable must have.
     ///
     /// # Errors
     /// If there is no such variable, or it has another unit.
@@ -114,7 +113,7 @@ impl Quantity {
         Ok(Quantity { needs: vec![name.into()], channels, rule: Rule::Itself })
     }
 
-    /// Makes the wave at an angle on the wall (rad), m.
+    /// Creates the wave height at an angle on the wall (rad), m.
     ///
     /// # Errors
     /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
@@ -123,11 +122,10 @@ impl Quantity {
         Ok(Quantity { needs, channels: single_value("m"), rule: Rule::Wave { modes, angle } })
     }
 
-    /// Makes the pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
+    /// Creates the pressure, Pa, at an angle on the wall (rad) and a height above the bottom (m).
     ///
     /// # Errors
-    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is
-    /// above the liquid at rest.
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is above the liquid at rest.
     pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
         let (mut needs, modes) = surface.modes()?;
         let h = surface.number(tank::H)?;
@@ -140,8 +138,8 @@ impl Quantity {
         })
     }
 
-    /// Makes the surface as a camera sees it: the plane that fits best, and every mode, each as a height at
-    /// the wall, m.
+    /// Creates the quantities of the surface that a camera measures: the best-fitting plane and every mode, each as a
+    /// height at the wall, m.
     ///
     /// # Errors
     /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
@@ -154,8 +152,8 @@ impl Quantity {
         Ok(Quantity { needs, channels, rule: Rule::Camera { modes } })
     }
 
-    /// Makes the specific force of a point of the hub in the direction of an angle (rad), from radial
-    /// outwards towards tangential, m/s².
+    /// Creates the specific force at a point of the hub, m/s², in the direction of an angle (rad) from
+    /// radial outwards towards tangential.
     ///
     /// # Errors
     /// If the FMU is not HubSlosh.
@@ -187,7 +185,7 @@ impl Quantity {
                 let (g, a) = (motion[4], component_along(acceleration(motion, motion[3]), *angle));
                 let modal = |(n, angles): (usize, &[f64; 2])| {
                     let k = XI[n] / radius;
-                    // cosh kz / cosh kh without overflow.
+                    // cosh kz / cosh kh without overflow
                     let falls = (k * (height - h)).exp() * (1.0 + (-2.0 * k * height).exp())
                         / (1.0 + (-2.0 * k * h).exp());
                     wall(n, radius) * (g * component_along(*angles, *angle) + a) * falls
@@ -212,8 +210,7 @@ impl Quantity {
     }
 }
 
-/// Returns the elevation of the wave at the wall over the slosh angle of mode `n`, which counts
-/// from 0, m/rad.
+/// Returns the elevation of the wave at the wall divided by the slosh angle of mode `n`, which counts from 0, m/rad.
 fn wall(n: usize, radius: f64) -> f64 {
     2.0 * radius / (XI[n] * XI[n] - 1.0)
 }
@@ -222,8 +219,8 @@ fn component_along([radial, tangential]: [f64; 2], angle: f64) -> f64 {
     radial * angle.cos() + tangential * angle.sin()
 }
 
-/// Returns radial and tangential acceleration of a point of the hub on the tank's side, less the acceleration of gravity,
-/// m/s². `motion` has the values of [`MOTION`].
+/// Returns the radial and tangential acceleration of a point of the hub on the tank's side, minus the acceleration of
+/// gravity, m/s². `motion` contains the values of [`MOTION`].
 fn acceleration(motion: &[f64], radius: f64) -> [f64; 2] {
     let [theta, omega, omega_dot, _, g, tilt, azimuth] = std::array::from_fn(|k| motion[k]);
     let (across, from_low) = (g * f64::tan(tilt), theta - azimuth);
@@ -267,8 +264,8 @@ impl Surface<'_> {
         Ok(self.text(name)?.parse()?)
     }
 
-    /// Returns the selected item of the enumeration `name`. If the integer parameter `kind` is not 0, it selects the item
-    /// instead; it exists for hosts that cannot set enumerations.
+    /// Returns the selected item of the enumeration `name`. For hosts that cannot set enumerations, the integer parameter
+    /// `kind` selects the item instead, unless it is 0.
     fn choice(&self, name: &str, kind: &str) -> Result<String> {
         let number: i64 = self.text(kind)?.parse()?;
         let items = self.description.items(self.description.variable(name)?);

@@ -1,4 +1,4 @@
-//! Tests that the example in each FMU's folder `extra` belongs to the FMU.
+//! Tests that the example in the folder `extra` of each FMU agrees with the FMU.
 
 use std::path::PathBuf;
 
@@ -46,9 +46,9 @@ fn replayed_input_gives_the_reference_result() {
         let reference = reference(example);
         assert_eq!(reference.rows(), 201);
         for (name, difference) in differences(&answer, &reference) {
-            // the figures in the README.md of the example; the default tolerance is 1e-8
+            // the README.md of each example states this figure; the default tolerance is 1e-8
             assert!(difference < 1e-6, "{}, {name}: {difference:e}", example.model);
-            // nothing is divided by a value that is rounding alone
+            // no difference is divided by a value that consists of rounding errors
             let largest =
                 reference.column(&name).unwrap().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             assert!(largest == 0.0 || largest > 1e-6, "{}, {name}: {largest:e}", example.model);
@@ -65,7 +65,7 @@ fn the_example_of_the_bench_slips_and_comes_to_rest() {
 
 #[test]
 fn in_the_six_axis_examples_the_slosh_angle_reaches_some_degrees() {
-    // the wave's force across the thrust: 128 kg at 1.5 m/s2 and 2 degrees are 6.7 N
+    // the lateral force of the wave: 128 kg at 1.5 m/s2 and 2 degrees are 6.7 N
     for (example, name) in [(&EXAMPLES[1], "slosh_force[1]"), (&EXAMPLES[2], "force[1]")] {
         let answer = reference(example);
         let force = answer.column(name).unwrap();
@@ -81,7 +81,8 @@ fn the_example_replayed_with_held_torque_is_as_close_to_the_reference_as_its_rea
     let input = folder(example).join(example.input());
     let answer = example::replay(&fmu, &input, None, true).unwrap();
     let all = differences(&answer, &reference(example));
-    // those that do not jump when the hub stops; late by 10 ms at 2 Hz: 2 pi 2 0.01 = 0.13
+    // outputs that do not jump when the hub stops; a delay of 10 ms at 2 Hz changes them by 2 pi
+    // 2 0.01 = 0.13
     let smooth = ["theta", "omega", "slosh_angle", "slosh_rate"];
     let smooth = all.iter().filter(|(name, _)| smooth.contains(&name.as_str()));
     let worst = smooth.map(|(_, difference)| *difference).fold(0.0, f64::max);
@@ -93,7 +94,7 @@ fn committed_files_of_the_examples_equal_the_files_that_hubslosh_example_writes(
     for example in &EXAMPLES {
         let made = tempfile::tempdir().unwrap();
         example.write(&packed(example), made.path()).unwrap();
-        // the reference's last digits may turn; its values are compared above
+        // the last digits of the reference may change; its values are compared above
         for name in [example.input(), example.options()] {
             let made = std::fs::read_to_string(made.path().join(&name)).unwrap();
             let committed = std::fs::read_to_string(folder(example).join(&name)).unwrap();

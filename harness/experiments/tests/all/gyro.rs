@@ -20,8 +20,8 @@ fn simulated_random_walk_and_bias_instability_are_estimated() {
     for (specified, settings, hours) in [(bench, &[][..], 2.0), (other, &set[..], 1.0)] {
         let found = recording(hours, 4, settings).characterise(&fmu, &|_| {}).unwrap();
         assert_eq!(found.specified, specified);
-        // Standard errors: N 0.1 %; B sqrt(bias_time/(2 x 4 records x hours)) = 4 and 3 %.
-        // The gyro's specification allows 5 and 20 %; the seeds are fixed.
+        // Standard errors: N 0.1 %; B sqrt(bias_time/(2 x 4 records x hours)) = 4 and 3 %. The limits for the
+        // gyro are 5 and 20 %.
         let deviation = |found: f64, specified: f64| (found / specified - 1.0).abs();
         assert!(deviation(found.fit.noise.arw, specified.arw) < 0.05, "{}", found.text());
         let bias = deviation(found.fit.noise.bias_instability, specified.bias_instability);
@@ -36,7 +36,7 @@ fn white_noise_has_no_bias_instability_and_rounding_adds_noise() {
     let found = recording(0.5, 2, &[quiet]).characterise(&fmu, &|_| {}).unwrap();
     assert!((found.fit.noise.arw / 5.75e-5 - 1.0).abs() < 0.05, "{}", found.text());
     assert_eq!(found.fit.terms.len(), 1, "{}", found.text());
-    // rounding to a step of about the noise is as if white noise of step/sqrt(12) were added
+    // rounding to a step of about the noise adds white noise of step/sqrt(12)
     let found =
         recording(0.5, 2, &[quiet, ("imu.lsb", "5e-4")]).characterise(&fmu, &|_| {}).unwrap();
     let rounding = 5e-4 / (12.0f64 * 50.0).sqrt();
@@ -70,7 +70,7 @@ fn a_gyro_record_that_cannot_be_analysed_is_refused_with_a_reason() {
         (-1.0, &[], "positive number of hours"),
         (1e6, &[], "samples"),
         (1.0, &[("imu.seed", "7")], "imu.seed"),
-        (1.0, &[("init.omega", "0.1")], "does not rest"),
+        (1.0, &[("init.omega", "0.1")], "not at rest"),
         (1.0, &[("imu.lsb", "1")], "imu.lsb"),
         (1.0, &[("imu.arw", "0"), ("imu.bias_instability", "0")], "no noise"),
         (1.0, &[("imu.noise", "1")], "imu.noise"),

@@ -1,4 +1,4 @@
-//! Tests of the bench on the packed FMU.
+//! Tests of the crate `experiments` on packed FMUs.
 
 mod example;
 mod gyro;

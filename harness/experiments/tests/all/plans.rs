@@ -1,4 +1,4 @@
-//! The built-in plans stay within the range of validity of their models, unless their texts say otherwise.
+//! The built-in plans stay within the range of validity of their models, unless their texts say that they leave it.
 
 use experiments::campaign::{Range, WAVE, seek_onset};
 use experiments::plan::{BUILT_IN, Case, Plan};
@@ -17,8 +17,8 @@ const BEYOND: [&str; 7] = [
     "bench_damping",
 ];
 
-/// Selects the runs of a plan that the test simulates: those with the largest torque if there are
-/// many, and every twentieth of random draws.
+/// Selects the runs of a plan that the test simulates: those with the largest torque if there are many runs, and
+/// every twentieth random draw.
 fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
     let largest = cases.iter().filter_map(|case| case.amplitude).fold(0.0, f64::max);
     match cases.len() {
@@ -32,7 +32,7 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     let run = case.run();
     let mut instance = run.initialise(fmu).unwrap();
     let mut said = instance.take_warnings();
-    // A plan can compare models of which one does not use a parameter.
+    // A plan may compare models, one of which does not use a parameter.
     said.retain(|warning| !warning.contains(" no effect: "));
     let range = Range::read(fmu.description(), &mut instance).unwrap().unwrap();
     let table = run.drive(&mut instance, &[WAVE], |_| {}).unwrap();
@@ -40,13 +40,11 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()
 }
 
-/// Slosh models in the plan that seeks the onset of rotary slosh. The search takes seconds, so that this test
-/// replaces them.
+/// Slosh models in the test of the plan that seeks the onset of rotary slosh. They replace the plan's
+/// search, which takes seconds.
 const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 
-/// If a built-in plan says that it leaves the range of its model, at least one of its runs leaves the range; no run of
-/// the other plans does. The search for the onset of rotary slosh is made with the linear liquid only, which leaves the
-/// range.
+/// The search for the onset of rotary slosh is tested only with the linear model, which leaves its range.
 #[test]
 #[ignore = "six seconds: .ci/long-tests"]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {

@@ -1,4 +1,4 @@
-//! Sensors in the record of a run.
+//! Sensors that are recorded in a run.
 
 use experiments::plan::Plan;
 use experiments::profile::Torque;
@@ -41,7 +41,7 @@ fn column<'t>(table: &'t Table, name: &str) -> &'t [f64] {
     table.column(name).unwrap()
 }
 
-/// The root of the sum of squares of both gauges equals the FMU's output `wave_height`.
+/// The two gauges are the components of the wave: the root of the sum of their squares equals the FMU's output `wave_height`.
 #[test]
 fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     for model in ["linear", "planar", "spherical", "liquid"] {
@@ -52,7 +52,7 @@ fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
         let [out, along, wave] = ["out", "along", "wave_height"].map(|name| column(&table, name));
         let mut largest = 0.0f64;
         for ((out, along), wave) in out.iter().zip(along).zip(wave) {
-            // rounding of the host's arcsines against the FMU's
+            // rounding errors of the arcsines of host and FMU
             assert!((out.hypot(*along) - wave).abs() < 1e-14, "{model}: {out}, {along}, {wave}");
             largest = largest.max(*wave);
         }
@@ -60,11 +60,12 @@ fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     }
 }
 
-/// Compares the integral of the wall's pressure over the angle, times the angle's cosine, with `F_tangential`, the force of
-/// the pendulums without damping and of the rigid liquid. With ten modes or one, the other modes move with the tank in both.
+/// The pressure on the wall, integrated over the surface with the cosine of the angle as weight, equals `F_tangential`, the
+/// force of the undamped pendulums and of the rigid liquid. With ten modes and with one mode, all other modes move with the
+/// tank in both results.
 #[test]
 fn pressures_on_the_wall_add_up_to_the_force_on_the_tank() {
-    // Gauss and Legendre's five points on each of 8 parts of the height
+    // Gauss–Legendre quadrature with five points in each of 8 parts of the height
     let x = [0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
     let w = [0.568_888_888_888_888_9, 0.478_628_670_499_366_5, 0.236_926_885_056_189_1];
     let points: Vec<(f64, f64)> =
@@ -96,7 +97,7 @@ fn pressures_on_the_wall_add_up_to_the_force_on_the_tank() {
             };
             let sum: f64 = heights.iter().enumerate().map(one).sum();
             let sum = std::f64::consts::PI * radius * sum;
-            // rounding of ρ g h, 1e3 Pa, over the wall; the quadrature's error is below 1e-12
+            // rounding of ρ g h = 1e3 Pa over the wall; the error of the quadrature is below 1e-12
             assert!((sum - force[row]).abs() < 1e-10, "{modes}, row {row}: {sum}, {}", force[row]);
         }
         assert!(force.iter().any(|f| f.abs() > 0.5), "there is a force");
@@ -104,8 +105,8 @@ fn pressures_on_the_wall_add_up_to_the_force_on_the_tank() {
 }
 
 #[test]
-fn a_camera_sees_a_tilted_plane_where_liquid_stands_still_under_a_constant_pull() {
-    // a leaning bench: in rest all modes have the angle of the pull, and the surface is a plane across it
+fn a_camera_measures_a_tilted_plane_if_the_liquid_is_at_rest_on_a_tilted_bench() {
+    // a tilted bench: at rest all modes have the angle of the specific force, and the surface is the plane perpendicular to it
     let tilt = 0.02_f64;
     let set = [
         ("slosh.modes", "10"),
@@ -123,17 +124,20 @@ fn a_camera_sees_a_tilted_plane_where_liquid_stands_still_under_a_constant_pull(
     let table = record(&set, &sensors, &["g_axial"], 20.0);
     let last = |name: &str| *column(&table, name).last().unwrap();
     let rise = 0.0815 * tilt.tan();
-    // planar models move along the tangent alone: the radial pull is seen by the accelerometer and by the pressure of what moves with the tank
+    // planar models move only tangentially: a radial specific force changes only the accelerometer and the pressure
+    // of the rigid liquid
     assert!(last("view.plane_radial").abs() < 1e-15 && last("low").abs() < 1e-15);
     assert!((last("a") + 9.81 * tilt.tan()).abs() < 1e-9, "{}", last("a"));
     let set: Vec<_> = set.into_iter().chain([("slosh.model", "spherical")]).collect();
     let table = record(&set, &sensors, &["g_axial"], 20.0);
     let last = |name: &str| *column(&table, name).last().unwrap();
-    // ten modes of Σ 8/(ξ²(ξ²−1)) = 1 leave 2e-6 of the plane; angles are to third order in the tilt beyond their sines
+    // ten modes leave 2e-6 of the plane, because Σ 8/(ξ²(ξ²−1)) = 1 is truncated; the angles differ from their sines by the third
+    // power of the tilt
     assert!((last("view.plane_radial") / rise - 1.0).abs() < 3e-4, "{}", last("view.plane_radial"));
-    // and of Σ 2/(ξ²−1) = 1 at the wall 2 %
+    // at the wall the truncated sum Σ 2/(ξ²−1) = 1 leaves 2 %
     assert!((last("low") / rise - 1.0).abs() < 0.025, "{}", last("low"));
-    // hydrostatics about the lateral pull: ρ (g (h − z) + g tan(tilt) R), and what the modes that are not kept lack at the wall is nothing
+    // hydrostatic pressure with the lateral specific force: ρ (g (h − z) + g tan(tilt) R); the modes that are left out contribute
+    // nothing at the wall
     let hydrostatic = 1000.0 * 9.81 * (0.06 + rise);
     assert!((last("p") - hydrostatic).abs() < 1e-3 * 1000.0 * 9.81 * rise, "{}", last("p"));
 }
@@ -159,7 +163,7 @@ fn sensors_have_the_requested_noise_bias_scale_quantisation_rate_and_delay() {
         let [read, truth] = ["s", "t"].map(|name| column(&table, &format!("{name}{channel}")));
         let mut errors = Vec::new();
         for row in 0..table.rows() {
-            // three rows late, every second row
+            // every second row, three rows late
             let arrives = row >= 3 && (row - 3) % 2 == 0;
             assert_eq!(!read[row].is_nan(), arrives, "{kind}: row {row}");
             if arrives {
@@ -170,7 +174,8 @@ fn sensors_have_the_requested_noise_bias_scale_quantisation_rate_and_delay() {
         assert!(n > 4990.0);
         let mean = errors.iter().sum::<f64>() / n;
         let std = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-        // four standard errors: noise/√n of the mean, 1/√(2 n) of the deviation; and of the correlation from one to the next
+        // four standard errors: noise/√n of the mean, 1/√(2 n) of the standard deviation, 1/√n of the
+        // correlation between successive readings
         assert!(mean.abs() < 4.0 * noise / n.sqrt(), "{kind}: mean {mean}");
         assert!((std / noise - 1.0).abs() < 4.0 / (2.0 * n).sqrt(), "{kind}: deviation {std}");
         let next: f64 = errors.windows(2).map(|e| (e[0] - mean) * (e[1] - mean)).sum();
@@ -197,7 +202,7 @@ fn noise_does_not_depend_on_other_sensors_and_differs_between_sensors_seeds_and_
     assert_ne!(column(&two, "c"), column(&two, "b"));
 }
 
-/// A sensor at 10 Hz in rows at 50 Hz: rows without a reading are empty in CSV and null in Parquet.
+/// The sensor has 10 Hz in rows at 50 Hz. Rows without a reading are empty in CSV and null in Parquet.
 #[test]
 fn missing_readings_are_missing_in_files() {
     let table = record(&[], &["s=encoder:rate=10,noise=1e-3"], &["omega"], 1.0);
@@ -234,7 +239,7 @@ fn errors_of_sensors_say_what_is_allowed() {
             "a=gauge:angle=x,noise=-1",
             "angle expects a number, not \"x\"; noise must not be negative",
         ),
-        ("a=gauge:of=theta", "gauge reads no variable by of="),
+        ("a=gauge:of=theta", "gauge does not read a variable"),
         ("a=variable", "of=NAME is required"),
         ("a=encoder:hight=1", "there is no parameter \"hight\""),
     ];
@@ -258,7 +263,7 @@ fn errors_of_sensors_say_what_is_allowed() {
     ] {
         assert!(refused(text, &[set]).contains(words), "{text}: {}", refused(text, &[set]));
     }
-    // elements of two-dimensional arrays have commas in their names
+    // names of elements of two-dimensional arrays contain commas
     assert!(refused("a=variable:of=p[1,2],noise=1", &[]).contains("no variable \"p[1,2]\""));
     let plan = "profile = \"sine\"\n[sensor]\nwave = \"gage\"\nload = 3\n";
     let error = format!("{:#}", Plan::parse(plan).unwrap_err());

@@ -1,4 +1,4 @@
-//! FMUs 3.0 with array variables. The parameter that determines the length of the arrays is set
+//! FMUs 3.0 with array variables, whose length a structural parameter determines. It is set
 //! like any other parameter.
 
 use experiments::profile::Torque;
@@ -57,14 +57,14 @@ fn spacecraft(fmi: Fmi, settings: &[(String, String)]) -> anyhow::Result<Fmu> {
     Fmu::open_with(packed_version_for_tests(model, fmi), settings)
 }
 
-/// The harness sets `tanks` and array elements of Spacecraft with arrays, and the same parameters of Spacecraft with
-/// scalars.
+/// The same parameters are set as array elements of a Spacecraft with arrays, and as scalars of a Spacecraft with
+/// scalars. `tanks` sets the size.
 #[test]
 fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last_bit() {
     let set = settings(&SCALARS);
     let scalars = spacecraft(Fmi::V3, &set).unwrap();
     let expected = record(&scalars, &run(set), &COLUMNS);
-    // Elements that only the larger size has come before it.
+    // elements that exist only with the larger size are set before the size
     let set: Vec<_> =
         SCALARS.iter().map(|(name, value)| (in_arrays(name), value.to_string())).collect();
     assert_eq!((&*set[1].0, &*set[2].0), ("tank.position[2,3]", "tank.diameter[2]"));
@@ -77,7 +77,7 @@ fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last
         let moves = found.column(name).unwrap().iter().any(|x| x.abs() > 1e-6);
         assert!(moves, "{scalar}");
     }
-    // What a run's table says of itself: the size, what was set, and starts of what was not.
+    // the table of a run describes itself: the size, the settings, and the start values of everything else
     let all = parameters(arrays.description(), &set, &[]);
     let of = |name: &str| all.get(name).map(String::as_str);
     assert_eq!((of("tanks"), of("tank.modes[2]")), (Some("2"), Some("2")));
@@ -91,7 +91,7 @@ fn arrays_have_the_declared_size_unless_a_setting_changes_it() {
     let fmu = spacecraft(Fmi::V3Arrays, &settings(&[("tank.position[1,3]", "-0.5")])).unwrap();
     assert!(fmu.description().variable("tank.position[1,3]").is_ok());
     assert!(fmu.description().variable("tank.position[2,3]").is_err());
-    // and of none there are none
+    // with a size of 0 the arrays are empty
     let fmu = spacecraft(Fmi::V3Arrays, &settings(&[("tanks", "0")])).unwrap();
     assert!(fmu.description().variable("tank.position[1,3]").is_err());
     let table = record(&fmu, &run(settings(&[("tanks", "0")])), &["omega[1]"]);
@@ -112,7 +112,7 @@ fn array_sizes_that_are_refused_are_reported_with_allowed_values() {
     let late = run(settings(&[("tanks", "2")])).initialise(&fmu);
     let late = format!("{:#}", late.err().expect("it is refused"));
     assert!(late.contains("tanks cannot be set to 2: it is a structural parameter"), "{late}");
-    // of scalars it is a parameter like any other
+    // in the FMU with scalars `tanks` is an ordinary parameter
     let fmu = spacecraft(Fmi::V3, &[]).unwrap();
     run(settings(&[("tanks", "2")])).initialise(&fmu).unwrap();
 }

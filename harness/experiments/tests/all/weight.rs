@@ -1,4 +1,4 @@
-//! Warnings of runs of the packed FMUs in six axes in which weight does not rule the liquid.
+//! Warnings about runs of the packed six-axis FMUs in which weight does not dominate the liquid.
 
 use experiments::profile::Torque;
 use experiments::run::Run;
@@ -34,9 +34,9 @@ fn said(
     tanks.without_weight(&run.drive(&mut instance, &columns, |_| {}).unwrap())
 }
 
-/// The default craft at rest has 1180 kg, of which 381.704 kg are water in a tank of R = 0.376618 (1.841184²
-/// − 1)/2 = 0.45005 m. At 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A cut-off to 6 N
-/// gives a tenth of that, no thrust gives 0.
+/// The default craft at rest has 1180 kg, of which 381.704 kg are water in a tank of R = 0.376618 (1.841184² − 1)/2 =
+/// 0.45005 m. At 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A thrust of 6 N gives a tenth of this,
+/// no thrust gives 0.
 #[test]
 fn a_thrust_cut_off_is_reported_with_the_numbers_of_a_hand_calculation() {
     let rest = [("init.omega[1]", "0"), ("init.omega[3]", "0")];
@@ -49,16 +49,16 @@ fn a_thrust_cut_off_is_reported_with_the_numbers_of_a_hand_calculation() {
     for words in ["Bond number 0.000", "Froude number infinite", "surface tension"] {
         assert!(cut.contains(words), "{words}: {cut}");
     }
-    // The same after the same fall of a liquid with a fifth of the tension: Bo = 53.9 at 6 N.
+    // A liquid with a fifth of the surface tension: Bo = 53.9 at 6 N.
     let thin = said("Spacecraft", &rest, ("force[3]", &times, &[60.0, 6.0, 6.0]), water / 5.0);
     assert_eq!(thin, [""; 0]);
-    // A diaphragm holds it.
+    // A diaphragm holds the liquid, so that there is no warning.
     let held: Vec<_> = rest.into_iter().chain([("tank[1].k[1]", "20")]).collect();
     assert_eq!(said("Spacecraft", &held, ("force[3]", &times, &[60.0, 0.0, 0.0]), water), [""; 0]);
 }
 
-/// A tank of 0.9 m by its diameter at 0.1 m/s² along its axis, Bo = 280.7, then 0.002: Bo = 5.61. Its slosh mass starts
-/// with 0.2 1/s: V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
+/// The tank has a diameter of 0.9 m. At 0.1 m/s² along its axis Bo = 280.7, then at 0.002 m/s² Bo = 5.61. Its slosh
+/// mass starts with 0.2 1/s: V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
 #[test]
 fn a_thrust_cut_off_of_slosh_tank_is_recognised_from_its_acceleration_input() {
     let settings = [("tank.diameter", "0.9"), ("a[1]", "0"), ("tank.p_dot_0[1,1]", "0.2")];
