@@ -19,8 +19,8 @@ pub fn allan_deviations(gyro: &Characteristics) -> String {
     .file()
 }
 
-/// Draws the Allan deviations of a gyro and, if `noise` is given, the deviation of this noise and
-/// of its white part. `names` label the white part, the deviations and the noise.
+/// Draws the Allan deviations of a gyro and, if `noise` is given, the Allan deviation of this noise and of
+/// its white part. `names` label the white part, the measured deviations and the noise.
 fn allan(title: &str, points: &[Point], noise: Option<&Noise>, names: [&str; 3]) -> Chart {
     let curve = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
         points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
@@ -50,13 +50,13 @@ pub fn page(rows: &[(String, String)], found: &Rest) -> String {
 }
 
 pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
-    // The frame around the range that noise allows.
+    // frame around the range that noise stays in
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
     let allan = allan(
         "Allan deviation of the recorded gyro at rest",
         &rest.allan,
         rest.noise.as_ref().map(|fit| &fit.noise),
-        ["its white noise, slope −1/2", "recorded", "fitted noise"],
+        ["fitted white noise, slope −1/2", "recorded", "fitted noise"],
     );
     let end = rest.quantiles.last().map_or(3.0, |(x, _)| *x);
     let mut quantiles = Chart::new(

@@ -1,5 +1,4 @@
-//! HTML pages and charts: about a campaign ([`campaign::page`]) or one run ([`view::page`]), and charts in
-//! SVG.
+//! HTML pages about a campaign ([`campaign::page`]) or one run ([`view::page`]), and charts in SVG.
 
 pub mod campaign;
 pub mod gyro;

@@ -21,8 +21,8 @@ pub fn document(title: &str, body: &Markup) -> String {
     page.into_string()
 }
 
-/// Embeds a chart that scrolls on a narrow screen, because its labels could not be read if it were made
-/// smaller.
+/// Embeds a chart that scrolls on a narrow screen, because its labels would be too small to read if
+/// it were scaled down.
 pub fn render_chart(chart: &Chart) -> Markup {
     html! { div class="scroll" { (PreEscaped(chart.svg())) } }
 }

@@ -1,5 +1,5 @@
-//! Charts as inline SVG. Colours are CSS values, so that a page can change them with the reader's light or
-//! dark scheme.
+//! Charts as inline SVG. Colours are CSS values, so that a page can change them with the light or dark
+//! scheme of the reader.
 
 use std::fmt::Write as _;
 
@@ -15,8 +15,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis with about `count` round ticks that covers all `values`, and a range of at least
-    /// `span`.
+    /// Creates an axis that covers all `values` and at least a range of `span`, with about `count`
+    /// ticks at round numbers.
     pub fn linear(
         label: &str,
         values: impl IntoIterator<Item = f64>,
@@ -80,8 +80,8 @@ pub enum Style {
     Cloud,
 }
 
-/// A curve of a chart. Points that are NaN or infinite are left out. The title is shown when the pointer rests on the
-/// curve.
+/// A curve of a chart. Points that are NaN or infinite are left out. The title is shown while the pointer
+/// is on the curve.
 #[derive(Clone, Debug)]
 pub struct Series {
     pub points: Vec<(f64, f64)>,
@@ -124,7 +124,7 @@ impl Chart {
         let (left, right, top, bottom) = (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
         let x = |value: f64| left + (right - left) * self.x.place(value);
         let y = |value: f64| bottom - (bottom - top) * self.y.place(value);
-        // A number at the right end would extend beyond the drawing.
+        // a number that would extend beyond the right end is shifted to the left
         let place = |at: f64| if at > right - 6.0 { (width, "end") } else { (at, "middle") };
         let drawing = html! {
             svg xmlns=[style.map(|_| "http://www.w3.org/2000/svg")]
@@ -149,7 +149,7 @@ impl Chart {
                     text-anchor="middle" { (self.x.label) }
                 text .label transform={ "translate(13 " (tenth((top + bottom) / 2.0)) ") rotate(-90)" }
                     text-anchor="middle" { (self.y.label) }
-                // A nested svg clips curves to the plot.
+                // a nested svg clips curves to the plot
                 @let (w, h) = (right - left, bottom - top);
                 svg x=(left) y=(top) width=(w) height=(h)
                     viewBox={ (left) " " (top) " " (w) " " (h) } {
@@ -204,7 +204,8 @@ fn curve(points: impl IntoIterator<Item = (f64, f64)>, series: &Series) -> Marku
     }
 }
 
-/// Leaves out points within `tolerance` of the line through the remaining points (Ramer, Douglas and Peucker).
+/// Leaves out points that are within `tolerance` of the line through the remaining points
+/// (Ramer, Douglas and Peucker).
 pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     if points.len() < 3 {
         return points.to_vec();

@@ -151,7 +151,7 @@ fn the_page_is_well_formed_and_has_every_figure() {
         "Comparison with the thesis",
         "Sweeps &amp; &lt;models&gt;",
         "Models overlaid",
-        "Antiresonance and resonance against torque amplitude",
+        "Antiresonance and resonance over torque amplitude",
         "Frequency response, spherical, 10 cm fill",
         "Time histories, linear, 10 cm fill",
         "Validity of a linear fit",
@@ -398,7 +398,7 @@ fn two_campaigns_are_compared_run_by_run() {
         .unwrap();
     assert!(done.status.success());
     let page = page(directory);
-    assert!(page.contains("This campaign less the other") && page.contains("<code>heavier</code>"));
+    assert!(page.contains("This campaign minus the other") && page.contains("<code>heavier</code>"));
     // less inertia: a higher resonance
     let largest = page.split("resonance / mHz: +").count();
     assert!(largest > 1, "the resonance rises");

@@ -44,7 +44,7 @@ fn a_run_with_default_columns_becomes_a_page_with_the_run_s_parameters() {
     // data that a CSV file cannot hold is given on the command line, or the command asks for it
     assert!(hubslosh(directory, &[&RUN[..], &["--out", "run.csv"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "run.csv", "--out", "csv.html"]);
-    assert!(said(&done).contains("does not say which parameters"), "{}", said(&done));
+    assert!(said(&done).contains("does not contain the parameters"), "{}", said(&done));
     assert_eq!(
         drawn(directory, "csv.html")["scene"]["geometry"]["tanks"][0]["shape"]["contour"][1][0],
         0.0815

@@ -2,8 +2,8 @@
 const CATEGORIES: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8c6bb1", "#7f7f7f"];
 
-/// Colour map "viridis", which increases in lightness and is safe for colour-blind readers. Its ends are left
-/// out, because they cannot be seen on black and on white.
+/// Colour map "viridis", whose lightness increases steadily and which is safe for colour-blind readers. Its
+/// ends are left out, because they are invisible on black and on white.
 const VIRIDIS: [[f64; 3]; 8] = [
     [72.0, 40.0, 120.0],
     [62.0, 73.0, 137.0],
@@ -45,6 +45,6 @@ pub(super) fn ordered(i: usize, count: usize) -> String {
     format!("rgb({r:.0},{g:.0},{b:.0})")
 }
 
-/// Name that stands for the colour of reference curves: dark in the light scheme of the page and
-/// light in the dark scheme.
+/// Placeholder for the colour of reference curves: dark in the light scheme of the page, and light
+/// in the dark scheme.
 pub(super) const INK: &str = "@ink";

@@ -64,7 +64,7 @@ pub(super) fn compare(
         largest.extend(most.map(|(miss, run)| format!("{label}: {miss:+.3} ({run})")));
     }
     let figure = add(vec![Figure {
-        title: "This campaign less the other".into(),
+        title: "This campaign minus the other".into(),
         caption: html! {
             (sentence_with_names("Largest differences", &largest)) (sentence_with_names("Only in this campaign", &alone))
         },

@@ -1,5 +1,5 @@
-//! Figures of Monte Carlo campaigns: the most influential of the drawn parameters, and the distribution of
-//! the results.
+//! Figures of Monte Carlo campaigns: the drawn parameters with the largest influence, and the
+//! distribution of the results.
 
 use analysis::statistics;
 use experiments::campaign::Outcome;
@@ -25,8 +25,8 @@ fn random_parameters<'a>(page: &Page<'a>) -> Vec<(usize, &'a str)> {
     drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect()
 }
 
-/// Ranks the drawn parameters by their influence, largest last: name, change of antiresonance and resonance
-/// (mHz) for one standard deviation of the parameter, and the two correlation coefficients.
+/// Ranks the drawn parameters by their influence, the largest last. For each: name, change of antiresonance
+/// and resonance (mHz) for one standard deviation of the parameter, and the two correlation coefficients.
 pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 2], [f64; 2])> {
     let effect = |place: usize, of: fn(&Outcome) -> Option<f64>| {
         let point = |run: &&Outcome| Some((run.case.varied[place].parse().ok()?, of(run)?));
@@ -34,8 +34,7 @@ pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 
         let (_, deviation) = moments(&points.iter().map(|p| p.1).collect::<Vec<_>>());
         (correlation(&points), deviation)
     };
-    // One standard deviation of the parameter changes the quantity by ρ times the quantity's own standard
-    // deviation.
+    // One standard deviation of the parameter changes the quantity by ρ standard deviations of the quantity.
     let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = random_parameters(page)
         .into_iter()
         .map(|(place, name)| {

@@ -6,11 +6,11 @@ use serde_json::{Value, json};
 use crate::svg::{range, simplified};
 use experiments::rounding::significant;
 
-/// A figure of one or more panels with a common legend, `columns` of them in a row on a wide screen. The
-/// caption states what the figure shows; `thesis` holds the numbers of the figures in Rubaga's thesis that
-/// show the same for its bench, for example `7.1 and 7.2`. `half` figures take half of the page's width on a
-/// wide screen; the panels of `shared` figures zoom together along x. `labels` at the right ends of the lines
-/// in the first panel replace a legend.
+/// A figure of one or more panels with a common legend, with `columns` panels in a row on a wide screen. The
+/// caption states what the figure shows. `thesis` contains the numbers of the corresponding figures about the
+/// bench in Rubaga's thesis, for example `7.1 and 7.2`. `half` figures take half of the page's width on a wide
+/// screen; the panels of `shared` figures zoom together along x. `labels` at the right ends of the lines in the
+/// first panel replace a legend.
 pub(super) struct Figure {
     pub title: String,
     pub caption: Markup,
@@ -30,8 +30,8 @@ pub(super) struct Label {
     pub color: String,
 }
 
-/// One pair of axes of a figure. With `equal` both axes have the same scale; `range` is the initial range of x (`None`
-/// shows all data).
+/// One pair of axes of a figure. If `equal` is true, both axes have the same scale. `range` is the range of x that is
+/// shown at first (`None` shows all data).
 #[derive(Clone, Default)]
 pub(super) struct Panel {
     pub x: String,
@@ -77,7 +77,7 @@ impl Figures {
         Figures { of_the_thesis, ..Figures::default() }
     }
 
-    /// Adds a figure and returns the HTML of its place, or nothing if the figure has no data.
+    /// Adds a figure and returns the HTML element into which the page draws it, or nothing if the figure has no data.
     pub fn add(&mut self, figure: Figure) -> Markup {
         let none = |axis: &Value| axis.as_array().is_some_and(Vec::is_empty);
         let empty = |trace: &Value| none(&trace["x"]) || none(&trace["y"]);
@@ -118,7 +118,7 @@ impl Figures {
                     }
                 }
             }
-            "\n" // the space between two halves
+            "\n" // the space between two half figures
         }
     }
 
@@ -139,7 +139,7 @@ impl Figures {
 pub(super) fn number(value: f64) -> Value {
     let rounded = significant(value, 5);
     if rounded.is_finite() && rounded == rounded.trunc() && rounded.abs() < 1e15 {
-        return json!(rounded as i64); // shorter
+        return json!(rounded as i64); // an integer is shorter in JSON
     }
     json!(rounded.is_finite().then_some(rounded))
 }
@@ -167,8 +167,8 @@ pub(super) fn line(
     trace
 }
 
-/// Returns the first x and the distance between neighbouring points along x if all these distances
-/// are equal, so that a page need not store every x.
+/// Returns the first x and the distance between neighbouring points if all points are equally spaced along x, so that
+/// a page need not store every x. Otherwise returns `None`.
 fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let [first, .., last] = points else { return None };
     let step = (last.0 - first.0) / (points.len() - 1) as f64;
@@ -198,8 +198,8 @@ pub(super) fn dots(
     trace
 }
 
-/// Selects the points of a curve that are needed to draw it at the usual size. `log` is true if the x axis is
-/// logarithmic.
+/// Returns the points of a curve that are needed to draw it at the usual size. `log` is true if the
+/// x axis is logarithmic.
 pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
     let finite = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite();
     let points: Vec<(f64, f64)> = points.iter().filter(finite).copied().collect();
@@ -209,7 +209,7 @@ pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
         (low, (high - low).max(1e-300))
     };
     let ((x0, w), (y0, h)) = (span(&|p| place(p.0)), span(&|p| p.1));
-    // Sized for 2000 by 400 px, because readers may zoom into a narrow resonance.
+    // Sized for 2000 by 400 px instead of the usual size, because readers may zoom into a narrow resonance.
     let scaled: Vec<(f64, f64)> =
         points.iter().map(|p| (2000.0 * (place(p.0) - x0) / w, 400.0 * (p.1 - y0) / h)).collect();
     let mut kept = simplified(&scaled, 0.4).into_iter().peekable();

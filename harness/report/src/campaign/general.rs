@@ -10,11 +10,11 @@ use super::colors;
 use super::figure::{Figure, Panel, line};
 use super::page::unit;
 
-/// Plots one run: attitude and rates, the path of each slosh mass, and all other signals. `tail` is the end of the run with
-/// more detail.
+/// Plots one run: attitude and rates, the path of each slosh mass, and all other signals. `tail` contains the last part of
+/// the run in more detail.
 pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> Vec<Figure> {
     let unit = |signal: &str| unit(fmu, signal).map_or(String::new(), |unit| format!(" / {unit}"));
-    // Elements such as omega[1], omega[2], omega[3] share a panel.
+    // elements of one vector, such as omega[1], omega[2], omega[3], share a panel
     let mut vectors: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for (signal, values) in &history.signals {
         let moves = values.iter().any(|v| *v != values[0]);
@@ -36,7 +36,7 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
             let signals = &vectors[*stem];
             panels.push(Panel::new("time / s", &format!("{stem}{}", unit(signals[0]))));
             for signal in signals.iter().take(8) {
-                // All panels share one legend.
+                // all panels share one legend
                 let i = traces.len();
                 let curve = history.curve(signal);
                 traces.push(line(p, signal, colors::category(i), colors::dash(i), &curve));
@@ -47,7 +47,7 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
                 "Time histories{}, {name}",
                 if part > 0 { format!(" ({})", part + 1) } else { String::new() }
             ),
-            caption: html! { "Signals that change; a long run by its envelope." },
+            caption: html! { "Signals that change; of a long run the envelope." },
             columns: 2,
             height: 230,
             panels,
@@ -75,9 +75,9 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
         }
     }
     out.push(Figure {
-        title: format!("Path of the bobs, {name}"),
+        title: format!("Path of the slosh masses, {name}"),
         caption: html! {
-            "Slosh angles along the tank's axes, the same scale both ways, in the last "
+            "Slosh angles along the tank's axes, with the same scale on both axes, in the last "
             (tail.time.len()) " rows."
         },
         height: 470,

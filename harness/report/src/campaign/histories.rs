@@ -1,4 +1,4 @@
-//! Plots over time, and the path of the wave's crest.
+//! Plots over time, and of the path of the wave crest.
 
 use analysis::rotary;
 use experiments::campaign::{History, Outcome, SloshPath};
@@ -29,9 +29,9 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
         "residual / (rad/s)",
     ];
     let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "residual"];
-    // If the liquid stays in its plane, the radial angle is not plotted.
+    // the radial angle is not plotted if the liquid stays in its plane
     let planar = runs.iter().all(|run| run.totals.peak_radial_angle == 0.0);
-    // The largest curve is drawn first, because it would hide the others.
+    // The largest curve is drawn first, so that it does not cover the others.
     for (i, run) in runs.iter().enumerate().rev() {
         let color = colors::ordered(i, runs.len());
         for (p, signal) in signals.iter().enumerate() {
@@ -48,7 +48,7 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     Figure {
         title: format!("Time histories, {}", group.title()),
         caption: html! {
-            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual. The residual is the rate minus that of the exact linear plant, with viscous friction at most, under the same torque. It shows dry friction and nonlinear slosh."
+            "Torque, measured rate, tangential and radial slosh angle, and the residual. The residual is the rate minus the rate of the exact linear plant without dry friction under the same torque. It shows dry friction and nonlinear slosh."
             @if runs.len() < group.runs.len() {
                 " " (runs.len()) " of " (super::page::runs(group.runs.len())) "."
             }
@@ -65,8 +65,8 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// Plots rate and slosh angle after a manoeuvre. Each group has one colour and is represented by its middle
-/// run along the axis.
+/// Plots rate and slosh angle after a manoeuvre. Each group has a colour, and its run in the middle of
+/// the axis is plotted.
 pub(super) fn motion_after_manoeuvre(page: &Page) -> Figure {
     let mut traces = Vec::new();
     let mut from = f64::INFINITY;
@@ -84,7 +84,7 @@ pub(super) fn motion_after_manoeuvre(page: &Page) -> Figure {
     }
     Figure {
         title: "Rate and slosh angle after the manoeuvre".into(),
-        caption: html! { "From the end of the torque on. With a rigid liquid the hub is at rest then; a sloshing liquid goes on pushing it at the slosh frequency." },
+        caption: html! { "From the end of the torque on. With a rigid liquid the hub is then at rest; a sloshing liquid continues to drive it at the slosh frequency." },
         columns: 2,
         height: 300,
         panels: vec![
@@ -117,7 +117,7 @@ pub(super) fn compared(page: &Page) -> Figure {
             traces.push(line(p, &name, color, dash, &curve));
         }
     }
-    // Smallest and largest rate in each interval of a run.
+    // smallest and largest rate in each time interval of a run
     let envelope = |run: &Outcome| -> Vec<[f64; 2]> {
         let rate = run.history.curve(OMEGA_IMU);
         rate.chunks_exact(2).map(|p| [p[0].1.min(p[1].1), p[0].1.max(p[1].1)]).collect()
@@ -134,7 +134,7 @@ pub(super) fn compared(page: &Page) -> Figure {
     };
     Figure {
         title: "The runs compared".into(),
-        caption: html! { "Measured rate, slosh angles along and across the hub's turn." (apart) },
+        caption: html! { "Measured rate, tangential and radial slosh angle." (apart) },
         height: 190,
         shared: true,
         panels: signals.iter().map(|(_, label, _)| Panel::new("time / s", label)).collect(),
@@ -149,7 +149,7 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     else {
         return Vec::new();
     };
-    // A wave that stays in its plane has no path to show, and a recording does not contain it.
+    // a wave that stays in its plane has no path to show, and a recording does not contain the wave
     if radial(last).is_nan() || radial(last) < rotary::LEAST {
         return Vec::new();
     }
@@ -172,10 +172,10 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let seen = Figure {
         title: format!("The wave seen from above, {}", group.title()),
         caption: html! {
-            "Slosh angle outwards against slosh angle along the hub's turn, the same scale both ways; a line is planar slosh, a circle rotary slosh. "
+            "Radial against tangential slosh angle, with the same scale on both axes; a line is planar slosh, a circle rotary slosh. "
             (SloshPath::LARGEST) " periods around the largest wave, " (SloshPath::ONSET)
-            " around the moment at which the swirl passes " (rotary::ROTARY)
-            ". An entry of the legend switches its path."
+            " around the moment at which the swirl number passes " (rotary::ROTARY)
+            ". A click on an entry of the legend hides or shows its path."
         },
         height: 470,
         half: true,
@@ -191,7 +191,7 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let time = Figure {
         title: format!("The same over time, {}", group.title()),
         caption: html! {
-            "Run: " (name) ". The radial motion grows out of the plane of the tangential one; in rotary slosh the two are a quarter of a period apart."
+            "Run: " (name) ". The radial motion grows from the planar tangential motion; in rotary slosh the two are a quarter of a period apart."
         },
         height: 470,
         half: true,

@@ -31,15 +31,15 @@ pub(crate) static PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 
 pub(crate) static PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
-/// Largest number of groups of runs that get figures of their own; the page names the groups whose
+/// Largest number of groups of runs with figures of their own. The page names the groups whose
 /// figures are left out.
 const MOST_GROUPS: usize = 24;
 
 const MOST_RUNS: usize = 6;
 
-/// Returns the run that the report shows in 3-D: the run with the largest radial slosh angle,
-/// because it has rotary slosh. If the slosh of every run stays in its plane, it is the run with
-/// the largest slosh angle. Recordings are not considered, because their liquid was not measured.
+/// Returns the run that the report shows in 3-D: the run with the largest radial slosh angle, because its
+/// slosh is rotary. If the slosh of every run stays in its plane, it is the run with the largest slosh angle.
+/// Recordings are not considered, because their liquid was not measured.
 pub fn most_swirling_run(results: &Results) -> Option<&Outcome> {
     let simulated = results.outcomes.iter().filter(|run| !run.is_recording());
     let (radial, tangential) =
@@ -154,7 +154,7 @@ fn bench_sections<'a>(
     let mut sections: Vec<(&str, Markup)> = Vec::new();
     let mut add = |all: Vec<Figure>| html! { @for figure in all { (figures.add(figure)) } };
 
-    // The answer to the plan's question comes first.
+    // The answer to the question of the plan comes first.
     let mut first = Vec::new();
     if random && has_response {
         first.extend(groups.iter().flat_map(|group| draws::draws(page, group)));
@@ -378,7 +378,7 @@ fn torques(results: &Results) -> String {
     match profiles[..] {
         [] => "none".into(),
         [one] => one.into(),
-        // The part that the profiles have in common, key by key.
+        // The parameters that all profiles have in common.
         [first, ..] => {
             let (name, rest) = first.split_once(':').unwrap_or((first, ""));
             let same = |part: &&str| {

@@ -35,8 +35,8 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     }
 }
 
-/// Describes, for the last run of a group (which has the largest torque, if torques differ), how far the
-/// sweep shifts its resonance. Returns `None` without a resonance.
+/// Describes how far the sweep shifts the resonance in the last run of a group, which has the largest torque
+/// if torques differ. Returns `None` without a resonance.
 fn swept_row(group: &Group) -> Option<Markup> {
     let run = group.runs.last()?;
     let (mode, exact) = (run.linear.modes.first()?, group.exact.last()?.f_res?);
@@ -64,8 +64,7 @@ fn swept_row(group: &Group) -> Option<Markup> {
     })
 }
 
-/// Largest number of rows in the table of results, because a browser would need seconds to lay out a longer
-/// table.
+/// Largest number of rows in the table of results. A browser would need seconds to lay out a longer table.
 const MOST_ROWS: usize = 2000;
 
 pub(super) fn table(page: &Page, results: &Results) -> Markup {
@@ -126,7 +125,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                             }
                             @if swept { (cells(run.passing.as_ref().map(|passing| &passing.rate))) }
                             @if recorded { (cells(run.record.as_ref().map(|record| &record.spa))) }
-                            // For recordings most parameters are unknown.
+                            // most parameters of recordings are unknown
                             @let known = |text: String| if text == "NaN" { String::new() } else { text };
                             td { (known(format!("{:.1}", run.totals.peak_slosh_angle.to_degrees()))) }
                             td { (known(format!("{:.1}", run.totals.peak_wave_height * 1e3))) }
@@ -169,8 +168,8 @@ fn cells(estimate: Option<&Estimate>) -> Markup {
     }
 }
 
-/// Formats a number times `scale`. A number with more than six digits, such as a value drawn at
-/// random, is rounded to six. A text that is not a number is returned unchanged.
+/// Formats a number multiplied by `scale`. A number with more than six digits, such as a random value, is
+/// rounded to six digits. A text that is not a number is returned unchanged.
 fn shortened(text: &str, scale: f64) -> String {
     match text.parse::<f64>() {
         Ok(value) if text.len() > 8 => format!("{:.5e}", value * scale),

@@ -23,9 +23,8 @@ fn quantity<'a>(label: &'a str, value: &'a dyn Fn(&Outcome) -> Option<f64>) -> Q
     Quantity { label, value, decades: false, level: None }
 }
 
-/// Plots antiresonance and resonance of every group over the axis, and for comparison antiresonance and resonance of the
-/// exact linear plant. The colour shows the group, the line style its model, and the marker which of the two features it
-/// is.
+/// Plots antiresonance and resonance of every group over the axis, and for comparison those of the exact linear model.
+/// The colour shows the group, the line style the slosh model, and the marker the feature (antiresonance or resonance).
 pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let models = distinct(page.groups.iter().map(|group| group.model));
@@ -36,7 +35,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     };
     let mut traces = Vec::new();
     let mut untrusted = Vec::new();
-    // Ends of the lines: (frequency, antiresonance or resonance and plant, model, colour).
+    // Ends of the lines: (frequency, feature and plant, model, colour).
     let mut ends: Vec<(f64, String, &str, &str)> = Vec::new();
     for group in &page.groups {
         type Side = (
@@ -78,7 +77,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             untrusted.extend(doubt.map(|doubt| format!("{} ({doubt})", run.case.name)));
         }
     }
-    // Groups with equal plants have the same exact response.
+    // Groups with equal parameters have the same exact response.
     let mut drawn: Vec<Vec<(f64, f64)>> = Vec::new();
     for group in &page.groups {
         for get in [|f: &Features| f.f_dip, |f: &Features| f.f_res] {
@@ -96,11 +95,11 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let lines: Vec<String> =
         models.iter().map(|model| format!("{} {model}", dash(model).1)).collect();
     Figure {
-        title: format!("Antiresonance and resonance against {}", axis.name),
+        title: format!("Antiresonance and resonance over {}", axis.name),
         caption: html! {
             "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other. "
             @if models.len() > 1 { "Lines: " (lines.join(", ")) ". " }
-            "Thin and dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from the part of the rate that no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
+            "Thin and dotted: antiresonance and resonance of the exact linear plant with viscous friction. Bars: 95 % intervals, from the part of the rate that no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
             (sentence_with_names("Invalid, and not drawn", &untrusted))
         },
         thesis: "7.1 and 7.2",
@@ -112,8 +111,8 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     }
 }
 
-/// Returns labels for the ends of a figure's lines. Lines that end close together share a label. If
-/// there would be too many labels to be read, none is drawn.
+/// Returns labels for the ends of a figure's lines. Lines whose ends are close together share a label. If so many labels
+/// are left that they could not be read, none is drawn.
 fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
     const TOGETHER: f64 = 0.03;
@@ -141,12 +140,12 @@ fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
 pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     let rate = |run: &Outcome| Some(1e3 * run.ending.rate?);
     let angle = |run: &Outcome| Some(run.ending.slosh_angle?.to_degrees());
-    let title = format!("Residual motion after the manoeuvre, against {}", axis.name);
+    let title = format!("Residual motion after the manoeuvre, over {}", axis.name);
     let figure = small(
         page,
         axis,
         &title,
-        html! { "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models. In a slew by more than some tens of degrees linear and planar models turn the plane of the swing with the hub; spherical pendulums keep it in space." },
+        html! { "The largest rate of the hub and the largest slosh angle after the torque has ended. After a torque that brings a rigid craft to rest, all residual motion comes from the liquid; an effect of bearing friction is the same for all models. In a slew by more than some tens of degrees linear and planar models turn the plane of the swing with the hub; spherical pendulums keep it in space." },
         [quantity("largest rate / (mrad/s)", &rate), quantity("largest slosh angle / deg", &angle)],
     );
     Figure { columns: 2, height: 340, ..figure }
@@ -157,12 +156,12 @@ pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
     let tangential = |run: &Outcome| Some(run.totals.peak_slosh_angle.to_degrees());
     let angle = |run: &Outcome| Some(run.ending.slosh_angle?.to_degrees());
     let rate = |run: &Outcome| run.ending.rate;
-    let title = format!("Slosh angles against {}", axis.name);
+    let title = format!("Slosh angles over {}", axis.name);
     let figure = small(
         page,
         axis,
         &title,
-        html! { "The largest slosh angle along the hub's turn and across it, which only rotary slosh makes; and in the last fifth of the run, a dwell's steady state." },
+        html! { "The largest tangential slosh angle (along the hub's rotation) and the largest radial one, which only rotary slosh causes. The values at the end are from the last fifth of the run, which in a dwell is the steady state." },
         [
             quantity("largest tangential / deg", &tangential),
             quantity("largest radial / deg", &radial),
@@ -178,7 +177,7 @@ pub(super) fn features(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Separation and notch depth",
-        html! { "While the sweep passes, and over the whole record (" code { "spa" } "). For a linear plant with linear friction the torque's amplitude would not matter; dry friction counts most when the torque is small, a nonlinear liquid when it is large." },
+        html! { "While the sweep passes, and over the whole record (" code { "spa" } "). For a linear plant with linear friction these values would not depend on the amplitude of the torque. Dry friction matters most at small torques, a nonlinear liquid at large ones." },
         [
             quantity("Δf, swept / mHz", &|run| {
                 Some(1e3 * run.passing.as_ref()?.rate.features.delta_f()?)
@@ -243,7 +242,7 @@ pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Cross-axis energy fraction and leakage of the recordings",
-        html! { "Share of the squared rates that is not about the hub's axis, each rate without its mean: the median over the samples and the fraction of the whole record. Near 2/3 the three rates are noise of one size. Leakage: root mean square over the frequencies of √(|H_x|²+|H_y|²)/|H|." },
+        html! { "Fraction of the squared rates that is about other axes than the hub's, each rate without its mean: the median over the samples and the fraction of the whole record. A value near 2/3 means that all three rates are noise of equal size. Leakage: root mean square over the frequencies of √(|H_x|²+|H_y|²)/|H|." },
         [
             quantity("CEF, median", &|run| Some(share(run)?.median)),
             quantity("CEF, whole record", &|run| Some(share(run)?.energy)),
@@ -260,7 +259,7 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Out of the plane",
-        html! { "Swirl: 0 for motion in a plane, 1 for a circle; beyond the dashed line the slosh is rotary. Off-axis energy and leakage: the liquid's radial force, which only loads the bearing, relative to the tangential one and to the torque." },
+        html! { "Swirl number: 0 for motion in a plane, 1 for a circle; above the dashed line the slosh is rotary. Off-axis energy and leakage: the liquid's radial force, which only loads the bearing, relative to the tangential one and to the torque." },
         [
             Quantity {
                 level: Some((rotary::ROTARY, "counts as rotary")),

@@ -7,8 +7,8 @@ use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
 
 /// Runs that differ only in the parameter along the axis, and in parameters drawn at random. `fill` is in m,
-/// `None` if it is drawn at random or is the axis; `others` are further differences from the other groups,
-/// for example `tank.d 111 mm`. `drawn` are the runs whose time histories are stored, and `exact` are the
+/// `None` if it is drawn at random or is the axis. `others` are further differences from other groups, for
+/// example `tank.d 111 mm`. `drawn` are the runs whose time histories are plotted, and `exact` are the
 /// features of each run's exact linear response, evaluated on a grid over its band.
 pub(super) struct Group<'a> {
     pub model: &'a str,
@@ -81,8 +81,8 @@ impl Page<'_> {
 
 pub(super) const MOST_CURVES: usize = 24;
 
-/// Returns the estimate from which the run's headline values are taken, and its name: for a sweep the one in
-/// `features.csv`, otherwise `spa`.
+/// Returns the estimate that gives the main results of a run, and its name: for a sweep the estimate
+/// in `features.csv`, otherwise `spa`.
 pub(super) fn best(run: &Outcome) -> Option<(&Estimate, &'static str)> {
     run.estimate().or_else(|| Some((&run.record.as_ref()?.spa, "spa")))
 }
@@ -119,8 +119,8 @@ pub(crate) fn printed(unit: &str) -> String {
     unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
 }
 
-/// A varied quantity as readers see it: a parameter of the torque profile has a label, a variable its name.
-/// `scale` is the factor from SI to the displayed unit.
+/// A varied quantity with the name that readers see: the label of a parameter of the torque profile, or the
+/// name of a variable. `scale` is the factor from SI to the displayed unit.
 pub(super) struct Varied {
     pub name: String,
     pub unit: String,
@@ -150,7 +150,7 @@ impl Varied {
     /// or `slosh.model planar`.
     pub fn value(&self, text: &str) -> String {
         let number = text.parse::<f64>().ok().map(|value| {
-            // Rounded, to remove the errors of binary fractions.
+            // rounded to remove the errors of binary fractions
             let value = (value * self.scale * 1e9).round() / 1e9;
             format!("{value} {}", self.unit).trim_end().to_string()
         });
@@ -174,7 +174,7 @@ pub(super) fn axis(plan: &Plan, fmu: &Fmu, runs: &[Outcome]) -> Option<Axis> {
 
 pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
     let axis = plan.axis().unwrap_or("");
-    // Indices of the varied parameters that separate groups, apart from model and fill.
+    // indices of the varied parameters that separate groups, except model and fill
     let grouping = plan.grouping();
     let recorded = results.recordings() > 0;
     let differs = |place: usize| {
@@ -196,7 +196,7 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
     for run in &results.outcomes {
         let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());
         let key: Vec<String> = match &run.case.listed {
-            // The plan's own name for the group says more than the values.
+            // the name that the plan gives the group is clearer than the values
             Some(name) => vec![name.replace('_', " ")],
             None => values.map(|(i, varied)| varied.value(&run.case.varied[*i])).collect(),
         };

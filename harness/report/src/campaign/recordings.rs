@@ -6,8 +6,8 @@ use experiments::rounding::thousandths;
 
 type Value = (f64, Option<f64>);
 
-/// A feature that is compared: heading, the function that reads it from a run with its standard deviation,
-/// its number of digits, and factor, digits and unit of a difference.
+/// A feature to compare: its heading, the function that reads it from a run with its standard deviation, its
+/// number of digits, and for a difference the factor, the digits and the unit.
 struct Feature {
     heading: [&'static str; 2],
     value: fn(&Outcome) -> Option<Value>,
@@ -94,7 +94,7 @@ pub(super) fn comparison_table(results: &Results) -> Markup {
     }
     html! {
         p {
-            "For each recording the results of the same estimators, and below them the deviations of the models' runs with the same torque and fill. ✓: within the joint 95 % interval of both estimates. This interval leaves out the uncertainty of the models' parameters, which matters most for the resonance in rotary slosh. CEF and leakage come from the recording's rates about the other axes (thesis 6.3.6). A hub that cannot tilt has no such rates."
+            "For each recording the table contains the results of the estimators, and below them the differences of the models' runs with the same torque and fill. ✓: within the joint 95 % interval of both estimates. This interval leaves out the uncertainty of the models' parameters, which matters most for the resonance in rotary slosh. CEF and leakage are computed from the recording's rates about the other axes (thesis 6.3.6), which a hub that cannot tilt does not have."
         }
         div .wide {
             table {
@@ -135,15 +135,15 @@ fn value(feature: &Feature, run: &Outcome) -> String {
     }
 }
 
-/// Formats the difference of a model's value from the recording's; a ✓ marks a difference within the joint 95
-/// % interval.
+/// Formats the difference between the values of a model and of the recording. A ✓ marks a difference within
+/// the joint 95 % interval.
 fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
     let Some(((model, a), (there, b))) = (feature.value)(run).zip((feature.value)(recording))
     else {
         return String::new();
     };
     let (factor, places, unit) = feature.difference;
-    // Adding 0 avoids −0.0.
+    // adding 0 avoids −0.0
     let unit_of_last = 10f64.powi(places as i32);
     let rounded = ((model - there) * factor * unit_of_last).round() / unit_of_last + 0.0;
     let text = format!("{rounded:+.places$} {unit}").replace('-', "\u{2212}");

@@ -21,7 +21,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             None => (page.name(run), "solid"),
         };
         traces.extend(bode(&name, &color, dash, &estimate.response));
-        // Intervals of all curves would hide each other.
+        // The intervals of all curves would cover each other.
         if i == 0 || i + 1 == runs.len() {
             traces.extend(intervals(&name, &color, estimate));
         }
@@ -37,7 +37,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     Figure {
         title: format!("Frequency response, {}", group.title()),
         caption: html! {
-            "Hub rate over torque (" (names.join(", ")) "). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals of the first and the last run, where they are wider than a line. At first around the two: a double click shows the whole band."
+            "Hub rate over torque (" (names.join(", ")) "). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals of the first and the last run, where they are wider than a line. At first the range around antiresonance and resonance is shown; a double click shows the whole band."
         },
         thesis: "6.6",
         height: 235,
@@ -49,8 +49,8 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// Returns the band (Hz) around the antiresonance and the resonance of both linear theory and every plotted
-/// run, because a nonlinear liquid or a bench has its resonance elsewhere than linear theory.
+/// Returns the band (Hz) around the antiresonance and the resonance of linear theory and of every plotted run, because
+/// the resonance of a nonlinear liquid or a bench differs from linear theory.
 fn band_around_resonance(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
     let of_runs = group.drawn.iter().filter_map(|run| Some(best(run)?.0.features));
@@ -80,10 +80,11 @@ fn bode(
     ]
 }
 
-/// Draws the band of two standard deviations around a response, or nothing if the band would be as narrow as the line.
+/// Draws the band of two standard deviations around a response. Draws nothing where the band would be as
+/// narrow as the line.
 fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
-    /// Smallest half-width of a band that is visible, dB, and the largest half-width that is drawn,
-    /// as the standard deviation of ln |H|.
+    /// Smallest half-width of a band that is visible, dB, and the largest half-width that is drawn, as the standard
+    /// deviation of ln |H|.
     const SEEN: f64 = 0.2;
     const WIDEST: f64 = 0.5;
     let decibel = 20.0 / std::f64::consts::LN_10;
@@ -113,7 +114,7 @@ fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Va
     sides.into_iter().enumerate().map(area).collect()
 }
 
-/// Plots the linear models fitted to the first and the last run of a group, and the coherence of the
+/// Plots the linear models that were fitted to the first and the last run of a group, and the coherence of the
 /// residuals with the torque.
 pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
     let ends = [group.drawn.first(), group.drawn.last()];
@@ -134,7 +135,7 @@ pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
     }
     Figure {
         title: format!("Fitted transfer function and residual coherence, {}", group.title()),
-        caption: html! { "A transfer function with three poles and two zeros (dashed) over the measured response of the smallest and the largest torque, and the coherence of what it leaves with the torque: 1 where the rest still follows the torque." },
+        caption: html! { "A transfer function with three poles and two zeros (dashed) over the measured response of the smallest and the largest torque, and the coherence of the residual with the torque, which is 1 where the residual follows the torque linearly." },
         thesis: "6.4, 6.5 and 6.7",
         height: 235,
         half: true,
@@ -155,7 +156,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
         .into_iter()
         .map(|fill| {
             let mut groups: Vec<&&Group> = comparable.iter().filter(|g| g.fill == fill).collect();
-            // Recordings are drawn on top of the models.
+            // recordings are drawn on top of the models
             groups.sort_by_key(|group| group.runs[0].is_recording());
             let mut traces = Vec::new();
             for (i, group) in groups.iter().enumerate() {
@@ -175,7 +176,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
             let what = fill.map_or("any fill".into(), |fill| format!("{} cm fill", cm(fill)));
             Figure {
                 title: format!("Models overlaid, {what}"),
-                caption: html! { "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike. At first around the two: a double click shows the whole band." },
+                caption: html! { "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike. At first the range around antiresonance and resonance is shown; a double click shows the whole band." },
                 thesis: "7.5 and 7.6",
                 height: 340,
                 half: true,
@@ -187,8 +188,8 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
         .collect()
 }
 
-/// A quantity of a run that a heat map shows: its name, the function that reads it from the run,
-/// and the ends of the colour scale if they are fixed.
+/// A quantity of a run that a heat map shows: its name, the function that reads it from the run, and the ends of the
+/// colour scale if they are fixed.
 struct Quantity {
     label: &'static str,
     of: fn(&Outcome) -> Curve,
@@ -254,9 +255,9 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     }
     Figure {
         title: format!("Over frequency and {}, {}", axis.name, group.title()),
-        caption: html! { "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: "
-        @if group.runs[0].is_recording() { "the rates about the other axes over that about the hub's (thesis 6.3.6)." }
-        @else { "the radial force times the tank's arm over the torque; bright in rotary slosh." } },
+        caption: html! { "One row of cells for each run. Residual coherence: bright where the residual of the linear fit follows the torque linearly. Leakage: "
+        @if group.runs[0].is_recording() { "the rates about the other axes divided by the rate about the hub's axis (thesis 6.3.6)." }
+        @else { "the radial force times the tank's arm, divided by the torque; bright in rotary slosh." } },
         thesis: "7.11 to 7.14 and 7.16",
         columns: 4,
         height: 250,
@@ -266,8 +267,8 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     }
 }
 
-/// Averages a curve over frequency in cells of equal width in log frequency. An empty cell between
-/// others takes the value of its left neighbour.
+/// Averages a curve over frequency in cells of equal width in log frequency. An empty cell between other cells takes
+/// the value of its left neighbour.
 fn cells(curve: &Curve, (from, to): (f64, f64)) -> Vec<serde_json::Value> {
     let mut sums = vec![(0.0, 0usize); CELLS];
     for (f, value) in curve.iter().filter(|(_, v)| v.is_finite()) {

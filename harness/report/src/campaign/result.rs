@@ -8,9 +8,9 @@ use super::draws::moments;
 use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, torque_amplitude};
 use super::recordings;
 
-/// Features of one run's frequency response: the position of the run on the axis, in the unit of the axis,
-/// and antiresonance and resonance, estimated and of the exact linear plant, Hz. `swirls` is true if the slosh
-/// was rotary for some time.
+/// Features of one run's frequency response: the position of the run on the axis, in the unit of the axis, and
+/// antiresonance and resonance, estimated and of the exact linear plant, Hz. `swirls` is true if the slosh was
+/// rotary for some time.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     x: f64,
@@ -26,8 +26,8 @@ impl Point {
     }
 }
 
-/// The runs of one group in the order of the axis. `plant` describes differences from other groups apart from
-/// the model, for example `10 cm fill`.
+/// The runs of one group in the order of the axis. `plant` describes how the group differs from other groups,
+/// apart from the model, for example `10 cm fill`.
 #[derive(Clone, Debug)]
 struct Series {
     model: String,
@@ -57,8 +57,8 @@ impl Series {
         [SloshModel::Linear.name(), SloshModel::Frozen.name()].contains(&&*self.model)
     }
 
-    /// Returns the first and the last position on the axis with rotary slosh, and true if every
-    /// position from the first to the end of the axis has it. `None` without rotary slosh.
+    /// Returns the first and the last position on the axis with rotary slosh, and true if every position from
+    /// the first to the end of the axis has rotary slosh. Returns `None` without rotary slosh.
     fn swirl(&self) -> Option<(f64, f64, bool)> {
         let first = self.points.iter().position(|p| p.swirls)?;
         let last = self.points.iter().rposition(|p| p.swirls)?;
@@ -67,8 +67,8 @@ impl Series {
     }
 }
 
-/// Returns the result in one to three sentences, or an empty text if the runs show nothing that a sentence
-/// could say.
+/// Returns the result in one to three sentences, or an empty text if the runs have no result that
+/// a sentence could state.
 pub(super) fn sentence(page: &Page, results: &Results) -> String {
     if results.recordings() > 0 {
         return recordings::result(results);
@@ -104,7 +104,7 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
         plants.dedup();
         plants.len() > 1
     };
-    // The linear runs of the same plant, or else the exact linear plant.
+    // the reference: the linear runs of the same plant, otherwise the exact linear plant
     let measured = |own: &Series| {
         series.iter().find(|s| s.model == SloshModel::Linear.name() && s.plant == own.plant)
     };
@@ -121,7 +121,7 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
     }
     let swirling: Vec<&&Series> = nonlinear.iter().filter(|s| s.swirl().is_some()).collect();
     let ends = |s: &Series| s.points.first().map(|p| p.x).zip(s.points.last().map(|p| p.x));
-    // The range before the first rotary slosh, or the whole axis.
+    // the range of torques before the first rotary slosh, or the whole axis
     let below = |s: &&Series| -> Vec<Point> {
         s.points.iter().copied().take_while(|p| !p.swirls).collect()
     };
@@ -179,7 +179,7 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
             format!("in {many} of {} series, from {first}{unit} at the earliest,", series.len())
         }
     };
-    // The largest deviation of a resonance in rotary slosh, with its sign.
+    // the largest shift of a resonance in rotary slosh, with its sign
     let shifts = swirling.iter().flat_map(|s| {
         let turning = s.points.iter().filter(|p| p.swirls);
         turning.filter_map(move |p| {
@@ -221,13 +221,13 @@ fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> 
                 let low = values.iter().copied().fold(f64::MAX, f64::min);
                 let high = values.iter().copied().fold(f64::MIN, f64::max);
                 Some(match high - low < 5e-3 * high {
-                    // Values that do not change.
+                    // values that hardly change
                     true => format!(
                         "stays within {} mHz of {:.3} Hz",
                         format_two_digits(500.0 * (high - low)),
                         (low + high) / 2.0
                     ),
-                    // Monotonic from one end to the other.
+                    // values that increase or decrease from one end to the other
                     false if (last - first).abs() > 0.9 * (high - low) => {
                         format!("moves from {first:.3} to {last:.3} Hz")
                     }
@@ -352,7 +352,7 @@ fn left_behind(page: &Page) -> String {
 }
 
 /// Describes for each model in how many runs the slosh was rotary, and which of these runs has the smallest
-/// torque. Empty if no model can leave its plane.
+/// torque. Returns an empty text if no model can leave its plane.
 fn rotation(page: &Page) -> String {
     let count = |model: &str| {
         let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
@@ -430,8 +430,8 @@ fn largest_angle_of_other_fmus(results: &Results) -> String {
     }
 }
 
-/// Returns the first `most` parts of a list in words, followed by the number of the further parts
-/// ("and 3 more").
+/// Returns the first `most` parts of a list, and instead of the others their number ("3 more
+/// in the results table").
 fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
     let further = parts.len().saturating_sub(most);
     if further > 0 {
@@ -465,8 +465,8 @@ mod tests {
         swirling,
     };
 
-    /// Returns a series whose exact responses are at 2 and 3 Hz. Each point is given as its
-    /// position on the axis, antiresonance, resonance, and true for rotary slosh.
+    /// Returns a series whose exact antiresonances and resonances are at 2 and 3 Hz. Each point is given as
+    /// its position on the axis, antiresonance, resonance, and true for rotary slosh.
     fn series(model: &str, plant: &str, points: &[(f64, f64, f64, bool)]) -> Series {
         let known = |f: f64| (f > 0.0).then_some(f);
         let point = |&(x, a, r, swirls): &(f64, f64, f64, bool)| Point {
@@ -509,9 +509,8 @@ mod tests {
         );
     }
 
-    /// Of a series with growing torque only runs in the middle have rotary slosh.
     #[test]
-    fn rotary_slosh_that_ends_again_is_stated_between_two_torques() {
+    fn the_report_states_both_torques_between_which_slosh_is_rotary() {
         let points = [
             (1.0, 2.0, 3.0, false),
             (2.0, 2.0, 3.0, true),

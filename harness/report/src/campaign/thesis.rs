@@ -1,8 +1,9 @@
 //! Compares the numbers that Rubaga's thesis states about its bench and its synthetic data with the
-//! campaign's runs.
+//! runs of the campaign.
 //!
-//! Numbers that need no run (Bond numbers, flight tanks) are rows of `hubslosh scale thesis`, and wrong ones
-//! are in the errata. Statements without a number are not compared; the figures of the report show the runs.
+//! Numbers that need no run (Bond numbers, flight tanks) are compared by `hubslosh scale thesis`, and the
+//! wrong ones are listed in the errata. Statements without a number are not compared; the figures of the
+//! report show the runs.
 
 use analysis::statistics::mean;
 use experiments::campaign::Outcome;
@@ -17,13 +18,13 @@ const LARGEST: f64 = 0.25;
 /// A number stated in the thesis.
 ///
 /// - `quantity` is the quantity with its unit, `printed` the number as the thesis prints it.
-/// - `synthetic`: true if the number is about the synthetic data, whose liquid is linear, so that it is
-///   compared only with the linear model.
+/// - `synthetic`: true if the number is about the synthetic data, whose liquid is linear. It is then compared
+///   only with runs of the linear model.
 /// - `agreeing`: range of values that agree with the thesis. It is the thesis's own range if it states one;
 ///   otherwise ±15 % for an acceleration (because the thesis states neither the fill nor the filter of its
-///   gyro) and half a step between torques.
-/// - `ours` computes the quantity for a group of runs that differ only in torque; `None` if runs or estimates
-///   are missing.
+///   gyro), and half a step between torques for a torque.
+/// - `ours` computes the quantity for a group of runs that differ only in torque; `None` if runs
+///   or estimates are missing.
 struct Number {
     section: &'static str,
     quantity: &'static str,
@@ -117,8 +118,8 @@ fn run_at<'a>(group: &'a Group, torque: f64) -> Option<&'a Outcome> {
     group.runs.iter().copied().find(|run| (torque_amplitude(run) - torque).abs() < 1e-9)
 }
 
-/// Evaluates `figure` for each run with at least this torque (N·m). Returns `None` if fewer than two runs
-/// have a value.
+/// Evaluates `figure` for each run with at least the torque `from` (N·m). Returns `None` if fewer than two
+/// runs have a value.
 fn values_from(
     group: &Group,
     torque: f64,
@@ -129,8 +130,8 @@ fn values_from(
     (values.len() > 1).then_some(values)
 }
 
-/// Returns the table of the thesis's numbers with a column for each model and a value for each fill; empty
-/// without values.
+/// Returns the table of the thesis's numbers, with a column for each model and a value for each fill; empty
+/// if no run gives a value.
 pub(super) fn numbers(groups: &[Group]) -> Markup {
     let groups: Vec<&Group> = groups.iter().filter(|group| group.others.is_empty()).collect();
     let models = distinct(groups.iter().map(|group| group.model));
@@ -155,7 +156,7 @@ pub(super) fn numbers(groups: &[Group]) -> Markup {
     html! {
         p {
             "The numbers that Rubaga's thesis prints about its bench and its synthetic data, and the same quantities of these runs. "
-            "✓: within the tolerance, ✗: outside; –: the runs do not give the quantity, for example because no slosh was rotary. "
+            "✓: within the tolerance, ✗: outside; –: no run gives the quantity, for example because no slosh was rotary. "
             "The synthetic data have a linear liquid, so their rows are compared with the model linear only."
         }
         div .wide {

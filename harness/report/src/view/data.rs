@@ -1,4 +1,4 @@
-//! Columns of a run for the page: every k-th row of the columns that move something, and envelopes of those
+//! Columns of a run for the page: every k-th row of the columns that move an object, and envelopes of columns
 //! that are only plotted.
 
 use base64ct::{Base64, Encoding};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::svg::range;
 
-/// Largest number of values for the moving objects of one page. With 32 bits each this is 6.4 MB of text.
+/// Largest number of values for the moving objects of one page. With 32 bits each they are 6.4 MB of text.
 const MOST_VALUES: usize = 1_200_000;
 
 const INTERVALS: usize = 4_000;
@@ -32,12 +32,12 @@ impl Thinning {
         kept
     }
 
-    /// Returns the number of kept rows per oscillation of the column that oscillates fastest, if it
-    /// is too small to show the oscillation; otherwise `None`.
+    /// Returns the number of kept rows per oscillation of the column that oscillates fastest, if there are
+    /// too few rows to show the oscillation; otherwise `None`.
     pub fn too_few(&self, columns: &[&[f64]]) -> Option<f64> {
         let frames = |column: &&[f64]| {
             let (low, high) = range(column.iter().copied());
-            // With hysteresis, so that noise does not count as oscillation.
+            // with hysteresis, so that noise does not count as oscillation
             let (mut above, mut crossings) = (column[0] > 0.5 * (low + high), 0usize);
             for value in column.iter() {
                 let middle = 0.5 * (low + high) + if above { -0.1 } else { 0.1 } * (high - low);
@@ -62,8 +62,8 @@ pub(super) fn thinned(values: &[f64], rows: &[usize]) -> String {
     text(rows.iter().map(|row| values[*row]))
 }
 
-/// Encodes the times of the kept rows: by start and step if they are equidistant, otherwise each with 64
-/// bits.
+/// Encodes the times of the kept rows: as start and step if they are equally spaced, otherwise
+/// each with 64 bits.
 pub(super) fn times(time: &[f64], rows: &[usize]) -> Value {
     let (first, count) = (time[rows[0]], rows.len());
     let step = (time[rows[count - 1]] - first) / (count - 1).max(1) as f64;

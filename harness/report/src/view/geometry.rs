@@ -1,16 +1,16 @@
 //! Geometry of a run's bench or craft, computed from its parameters.
 //!
-//! The contour of a tank is not a parameter of an FMU. Without a contour from the user, an upright cylinder
-//! represents the tank:
+//! The contour of a tank is not a parameter of an FMU. If the user gives no contour, the tank is drawn
+//! as an upright cylinder:
 //!
 //! ```text
 //! radius R        from the wave at the wall, w_1 = 2 R/(xi^2 - 1)
-//! depth h         from m_1/m_liq = 2 tanh(xi h/R)/(xi (xi^2 - 1) h/R), which falls with h/R
+//! depth h         from m_1/m_liq = 2 tanh(xi h/R)/(xi (xi^2 - 1) h/R), which decreases with h/R
 //! height          its middle at z_liq = [m_0 H_0 + sum m_n (h_n - l_n)]/m_liq
 //! ```
 //!
-//! The result is exact for an upright cylinder. In a draining tank the surface is at z_s = d(m z_liq)/dm for
-//! any shape, because added liquid lies on top.
+//! The result is exact for an upright cylinder. In a draining tank of any shape the surface is at z_s = d(m z_liq)/dm,
+//! because added liquid is on top.
 
 use std::collections::BTreeMap;
 
@@ -46,8 +46,8 @@ impl Parameters<'_> {
         items.iter().find(|item| item.value == n).map_or(text, |item| item.name.clone())
     }
 
-    /// Returns the item of the enumeration `name`, or the item whose number the parameter `kind` has, which
-    /// serves hosts that cannot set enumerations.
+    /// Returns the item of the enumeration `name`. For hosts that cannot set enumerations, the number in the parameter
+    /// `kind` selects the item instead.
     pub fn choice(&self, name: &str, kind: &str) -> String {
         let number = self.number(kind) as i64;
         let items = self.description.variable(name).map(|v| self.description.items(v));
@@ -60,8 +60,8 @@ impl Parameters<'_> {
     }
 }
 
-/// Outline of a tank, m, in the axes of the tank: a contour, or the side lengths of a box along x and y with
-/// the heights of bottom and top.
+/// Outline of a tank, m, in the axes of the tank: a contour, or the side lengths of a box along x and y with the heights
+/// of bottom and top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outline {
     Revolved(Vec<[f64; 2]>),
@@ -69,12 +69,12 @@ pub enum Outline {
 }
 
 /// Function that returns the surface shapes of the first modes for a mass of liquid, kg. A shape is the
-/// elevation at equal steps of the radius, from the axis or the inner wall to the outer wall, relative to
-/// that at the outer wall.
+/// elevation at equal steps of the radius, from the axis or the inner wall to the outer wall, divided by the
+/// elevation at the outer wall.
 pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
 
-/// Drawing of a tank that the user has given. `levels` are masses of liquid, kg, ascending, each with the
-/// height of the surface at rest, m; a box has no `surfaces`, because its modes are sines.
+/// Drawing of a tank that the user has given. `levels` are masses of liquid, kg, in ascending order, each with the height
+/// of the surface at rest, m. A box has no `surfaces`, because its modes are sines.
 pub struct Drawing {
     pub name: String,
     pub outline: Outline,
@@ -88,7 +88,7 @@ impl Drawing {
     }
 }
 
-/// Interpolates linearly between points with ascending x; outside, the value of the nearest end is used.
+/// Interpolates linearly between points with ascending x. Outside of the points the value of the nearest end is returned.
 fn line(points: &[[f64; 2]], x: f64) -> f64 {
     let after = points.partition_point(|p| p[0] < x);
     match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {
@@ -139,8 +139,8 @@ impl Tank {
         self.extent_from(0.0)
     }
 
-    /// Returns the height of the tank's middle above its origin, and the radius of the sphere about this
-    /// middle that contains the tank, m.
+    /// Returns the height of the tank's middle above its origin, and the radius of the sphere about this middle that
+    /// contains the tank, both in m.
     pub fn middle_and_extent(&self) -> [f64; 2] {
         let middle = match &self.outline {
             Outline::Revolved(points) => {
@@ -167,9 +167,9 @@ impl Tank {
     }
 }
 
-/// Interpolation of a draining tank's modes and surface height over the mass of its liquid, as in
-/// the FMU: 1/l_n and h_n − l_n at the points of the fill table, with slope and second derivative,
-/// and the height of the surface, m, by mass, kg.
+/// Interpolation of a draining tank's modes and surface height over the mass of its liquid, as in the FMU: 1/l_n and
+/// h_n − l_n at the points of the fill table, with first and second derivatives, and the height of the surface, m,
+/// over the mass, kg.
 pub(super) struct Fill {
     masses: Vec<f64>,
     modes: Vec<[Vec<[f64; 3]>; 2]>,
@@ -204,8 +204,8 @@ fn cylinder(radius: f64, bottom: f64, level: f64) -> Outline {
     Outline::Revolved(vec![[0.0, bottom], [radius, bottom], [radius, level + FREEBOARD * radius]])
 }
 
-/// Returns the ratio of depth to radius, h/R, of the upright cylinder whose first mode has this
-/// share of the liquid's mass. It is found by bisection.
+/// Returns the ratio of depth to radius, h/R, of the upright cylinder whose first mode has this fraction of the
+/// liquid's mass, by bisection.
 fn depth_over_radius(share: f64) -> f64 {
     let xi = XI[0];
     let share_at = |x: f64| 2.0 * (xi * x).tanh() / (xi * (xi * xi - 1.0) * x);
@@ -217,8 +217,8 @@ fn depth_over_radius(share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Returns the pendulum length of a mode, m, that is given by its natural frequency (Hz) at the acceleration
-/// `g`.
+/// Returns the pendulum length of a mode, m: `given`, or the length that follows from its natural frequency (Hz)
+/// at the acceleration `g`.
 fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
     let omega = std::f64::consts::TAU * frequency;
     let stiffness = (omega * omega - k_over_m) / g;
@@ -243,7 +243,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             let m_liq = number(fluid::RHO) * std::f64::consts::PI * radius * radius * h;
             let modes: Vec<_> = (0..count).map(|n| pendulum(n, 2.0 * radius, h, m_liq)).collect();
             let note =
-                "The tank is drawn by tank.d and tank.h; how high its wall is, is not a parameter."
+                "The tank is drawn with tank.d and tank.h; the height of its wall is not a parameter and is assumed."
                     .into();
             (modes, h, 0.0, m_liq, note)
         }
@@ -264,7 +264,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
                     length(element(LENGTH, n), element(FREQUENCY, n), g, element(K, n) / mass(n));
                 let like = pendulum(n, 2.0 * radius, depth, m_liq);
                 let wave = if element(WAVE, n) > 0.0 { element(WAVE, n) } else { like.wave };
-                // If the table has no heights, those of the cylinder are used.
+                // hinge heights of a cylinder, if the table contains none
                 let hinge =
                     if element(HINGE, n) == 0.0 { bottom + like.hinge } else { element(HINGE, n) };
                 if n == 0 {
@@ -274,7 +274,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             }
             modes.truncate(count);
             let note = format!(
-                "Of the tank only modes are known (slosh.source = table): it is drawn as {DRAWN}."
+                "Only the modes of the tank are known (slosh.source = table): it is drawn as {DRAWN}."
             );
             (modes, bottom + depth, bottom, m_liq, note)
         }
@@ -286,7 +286,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             level = drawing.level(m_liq);
             bottom = lowest(&drawing.outline);
             match drawing.outline {
-                // The first side, for which `hubslosh tank` computes the modes, is tangential.
+                // the first side, for which `hubslosh tank` computes the modes, is the tangential one
                 Outline::Box([a, b, low, high]) => Outline::Box([b, a, low, high]),
                 Outline::Revolved(_) => drawing.outline.clone(),
             }
@@ -295,7 +295,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
     };
     Tank {
         prefix: String::new(),
-        // The tank stands on the platform.
+        // the tank stands on the platform
         position: [number(tank::R), 0.0, -bottom],
         q: [1.0, 0.0, 0.0, 0.0],
         outline,
@@ -358,7 +358,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         }
         radius = mode_radius(&modes[0]);
         level = fill.level(m_liq);
-        // The first point as a cylinder: the liquid's centre is the mean of bottom and surface.
+        // the lowest fill is that of a cylinder: the liquid's centre is half-way between bottom and surface
         let first = fill.levels[0];
         let part = fill.levels[1];
         bottom = first[1] - (part[1] - first[1]) * first[0] / (part[0] - first[0]);
@@ -375,7 +375,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
             .collect();
         (level, bottom) = (depth, 0.0);
         note = format!(
-            "{prefix} is drawn by its diameter and depth; how high its wall is, is not a parameter."
+            "{prefix} is drawn with its diameter and depth; the height of its wall is not a parameter and is assumed."
         );
     } else {
         m_liq = number("m_0") + modes.iter().map(|m| m.mass).sum::<f64>();
@@ -384,7 +384,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         radius = mode_radius(&modes[0]);
         let depth = radius * depth_over_radius(modes[0].mass / m_liq);
         (level, bottom) = (moment / m_liq + 0.5 * depth, moment / m_liq - 0.5 * depth);
-        note = format!("Of {prefix} only modes are known: it is drawn as {DRAWN}.");
+        note = format!("Only the modes of {prefix} are known: it is drawn as {DRAWN}.");
     }
     let mut level = level;
     let outline = match drawing {
@@ -441,8 +441,8 @@ fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
             [curve(stiffness), curve(bob)]
         })
         .collect();
-    // m z_liq at the points, and its derivative by the parabola through three neighbours, which is exact for
-    // a cylinder.
+    // m z_liq at the points, and its derivative from the parabola through three neighbouring points, which is
+    // exact for a cylinder
     let moment: Vec<f64> = (0..points)
         .map(|k| {
             let bobs: f64 = (0..count).map(|n| element("mass", n, k)).sum();
@@ -467,8 +467,8 @@ fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
     Fill { masses, modes, levels }
 }
 
-/// Returns the sides of the homogeneous box with the dry craft's mass and moments of inertia, m: `a_x^2 = 6
-/// (Jyy + Jzz - Jxx)/m`. `None` if there is no such box.
+/// Returns the side lengths of the homogeneous box with the dry craft's mass and moments of inertia, m: `a_x^2 = 6 (Jyy +
+/// Jzz - Jxx)/m`. Returns `None` if no box has these moments of inertia.
 pub(super) fn craft_box(parameters: &Parameters) -> Option<[f64; 3]> {
     let [m, x, y, z] =
         ["mass", "Jxx", "Jyy", "Jzz"].map(|k| parameters.number(&format!("craft.{k}")));
@@ -493,8 +493,8 @@ mod tests {
         points[1]
     }
 
-    /// The default tank's modes are those of a cylinder of 0.9 m diameter, 0.6 m deep, to six
-    /// digits; the origin is at mid-depth.
+    /// The modes of the default tank are those of a cylinder of 0.9 m diameter with a depth of 0.6 m, to six digits; the
+    /// origin is at mid-depth.
     #[test]
     fn modes_of_a_cylinder_are_drawn_as_that_cylinder() {
         let drawn = tank_with(&[]);
@@ -504,15 +504,15 @@ mod tests {
         }
     }
 
-    /// The default fill table has the depths 0.1 to 1.2 m of one cylinder; between its points the
-    /// surface rises with the mass.
+    /// The default fill table contains the depths 0.1 to 1.2 m of one cylinder. Between its points the surface
+    /// rises with the mass.
     #[test]
     fn the_surface_of_a_draining_cylinder_is_where_its_liquid_ends() {
         let drawn = tank_with(&[("tank.fill.points", "12"), ("tank.liquid_0", "381.704")]);
         let fill = drawn.fill.as_ref().unwrap();
         let area = 1000.0 * std::f64::consts::PI * 0.45 * 0.45;
         for depth in [0.1, 0.17, 0.33, 0.6, 0.95, 1.2] {
-            // six digits of heights times masses, divided by the mass of a tenth of the tank
+            // heights and masses have six digits; the error is divided by the mass of a tenth of the tank
             assert!((fill.level(area * depth) + 0.3 - depth).abs() < 1e-3, "{depth}");
             let exact = pendulum(0, 0.9, depth, area * depth);
             let [length, hinge] = fill.mode(0, area * depth);

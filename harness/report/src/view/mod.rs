@@ -1,8 +1,7 @@
-//! A self-contained page that shows one run: the bench or craft in 3-D with its liquid, and plots that follow
-//! the time.
+//! A self-contained page that shows one run: the bench or craft in 3-D with its liquid, and plots that follow the time.
 //!
-//! Nothing is simulated: every moving object follows a column of the run's table, or a formula of columns
-//! that the page states.
+//! Nothing is simulated: every moving object shows a column of the run's table, or a formula of columns,
+//! which the page states.
 
 mod data;
 mod geometry;
@@ -34,10 +33,10 @@ pub struct Run<'a> {
     pub title: String,
     pub source: String,
     pub description: &'a ModelDescription,
-    /// Values of parameters by name, as text: all of them, or those that differ from the FMU's start values.
+    /// Values of parameters by name, as text: all parameters, or those that differ from the FMU's start values.
     pub parameters: &'a BTreeMap<String, String>,
-    /// True if the parameters come from the run's file. Otherwise they are the FMU's start values and the
-    /// user's settings.
+    /// True if the parameters come from the file of the run. Otherwise they are the FMU's start values
+    /// and the user's settings.
     pub parameters_known: bool,
     pub drawings: &'a BTreeMap<usize, Drawing>,
     pub table: &'a Table,
@@ -67,8 +66,8 @@ fn kind(description: &ModelDescription) -> Option<Kind> {
     .find_map(|(name, kind)| has(name).then_some(kind))
 }
 
-/// Panels of the bench's plots, each with its title and its columns in the order of interest. A
-/// name with `*` stands for all names that begin with it.
+/// Panels of the bench's plots, each with its title and its columns in the order of importance. A name with `*` means all
+/// names that begin with the part before it.
 const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Torque on the hub", &[TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FRICTION, TAU_FLUID]),
     ("Rate of the hub", &[OMEGA, OMEGA_IMU]),
@@ -81,7 +80,7 @@ const BENCH_PANELS: [(&str, &[&str]); 7] = [
 
 const MOST_PANELS: usize = 8;
 
-/// Lists all columns that the page can use, in the order of a table, so that the user sees which columns to record.
+/// Lists all columns that the page can use, in the order of a table, so that the user knows which columns to record.
 pub fn columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -126,8 +125,7 @@ pub fn columns(
     all
 }
 
-/// Lists the tanks of the FMU, each with the prefix of its variables and its number of modes; empty
-/// for the bench.
+/// Lists the tanks of the FMU, each with the prefix of its variables and its number of modes; empty for the bench.
 fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
     let all: Vec<String> = match kind(parameters.description) {
         Some(Kind::Craft) => (1..=(parameters.number("tanks") as usize).max(1))
@@ -152,8 +150,7 @@ impl Columns<'_> {
         self.table.is_some_and(|table| table.column(name).is_some())
     }
 
-    /// Marks all columns `names` as used and returns true if the run has all of them. Otherwise
-    /// marks none.
+    /// Returns true if the run has all columns `names`, and marks them as used. Otherwise marks none.
     fn take(&mut self, names: &[String]) -> bool {
         let there = names.iter().all(|name| self.has(name));
         if there {
@@ -162,8 +159,8 @@ impl Columns<'_> {
         there
     }
 
-    /// Marks the columns of the first list that the run has completely as used, and returns the
-    /// index of the list. If there is no such list, records the missing columns.
+    /// Finds the first list of which the run has all columns, marks these columns as used, and returns the index of the
+    /// list. If there is no such list, records which columns are missing.
     fn require(&mut self, lists: &[Vec<String>]) -> Option<usize> {
         let found = (0..lists.len()).find(|i| self.take(&lists[*i]));
         if found.is_none() {
@@ -178,9 +175,9 @@ fn coordinates(n: usize) -> [String; 2] {
     [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.element([n]))
 }
 
-/// Returns the radial and tangential slosh angles of HubSlosh's second and further modes, if the states of these modes were
-/// recorded. The FMU has outputs only for the angles of the first mode, so the angles of higher modes are computed from the
-/// states.
+/// Returns the radial and tangential slosh angles of HubSlosh's second and further modes, if the states of these
+/// modes were recorded. HubSlosh has outputs only for the angles of the first mode, so that the other angles are
+/// computed from the states.
 fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>; 2]> {
     let Some(coordinate) = Coordinate::from_model(model) else { return Vec::new() };
     let recorded = (2..).zip(&modes[1..]).map_while(|(n, mode)| {
@@ -188,7 +185,7 @@ fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>
         let y = table.column(&tangential)?;
         let x = match (coordinate, table.column(&radial)) {
             (_, Some(x)) => x.to_vec(),
-            // In motion in a plane the radial coordinate is not used.
+            // the radial coordinate is not used if the motion is planar
             (Coordinate::Angle, None) => vec![0.0; y.len()],
             _ => return None,
         };
@@ -219,8 +216,8 @@ fn vector(name: &str) -> Vec<String> {
 /// Returns the page that shows a run.
 ///
 /// # Errors
-/// If the FMU is not one of this project's, columns are missing, or the table has fewer than two
-/// rows. The message says how to record the columns.
+/// If the FMU is not one of this project's, columns are missing, or the table has fewer than two rows. The message says how
+/// to record the columns.
 pub fn page(run: &Run) -> Result<Page> {
     let Some(kind) = kind(run.description) else {
         anyhow::bail!(
@@ -266,8 +263,8 @@ pub fn page(run: &Run) -> Result<Page> {
     Ok(Page { html, warnings: draft.warnings })
 }
 
-/// A page that is being assembled, with columns that are computed from others, and remarks about the drawing
-/// for the page.
+/// A page that is being assembled, with columns that are computed from other columns, and with notes about the
+/// drawing for the reader.
 struct Draft<'a> {
     run: &'a Run<'a>,
     kind: Kind,
@@ -310,12 +307,12 @@ impl Draft<'_> {
                 self.columns.require(std::slice::from_ref(&q));
                 motion["q"] = json!(q);
                 self.notes.push(
-                    "The view follows O; the faint circles are directions that do not turn.".into(),
+                    "The view follows O; the faint circles are fixed in inertial space.".into(),
                 );
             }
             Kind::Tank => self
                 .notes
-                .push("The host's frame stands still here: a tank alone knows no attitude.".into()),
+                .push("The host's frame does not move in this view, because a tank without a craft has no attitude.".into()),
         }
         motion
     }
@@ -479,19 +476,19 @@ impl Draft<'_> {
     fn say_what_is_drawn(&mut self, tanks: &[Tank]) {
         self.notes.extend(tanks.iter().map(|tank| tank.note.clone()));
         self.notes.push(
-            "The surface is that of linear potential flow for the slosh angles, the sum of all modes with the FMU's wave per angle at \
+            "The surface is that of linear potential flow for the slosh angles, the sum of all modes with the FMU's wave height per slosh angle at \
              the wall. The shape is J₁(ξr/R) over the radius in an upright cylinder, sin (2n − 1)πx/a in a box, and the modes of \
-             `hubslosh tank` in another tank of --tank. A real high wave would break earlier. Only the surface is exaggerated, up to \
+             `hubslosh tank` in another tank of --tank. A real wave of this height would break. Only the surface is exaggerated, up to \
              bottom and rim; pendulums are drawn at their positions."
                 .into(),
         );
         if !self.run.parameters_known {
             self.warnings.push(format!(
-                "{} does not say which parameters it was run with: drawn with the FMU's start values and what --set and --parameters \
-                 say (a .parquet of `hubslosh run` has them in its metadata)",
+                "{} does not contain the parameters of the run: it is drawn with the FMU's start values and the values of --set and --parameters \
+                 (a .parquet of `hubslosh run` contains them in its metadata)",
                 self.run.source
             ));
-            self.notes.push("The file does not hold its parameters: those are the FMU's start values and what the command said.".into());
+            self.notes.push("The file does not contain the parameters of the run: the FMU's start values and the values of the command are used.".into());
         }
     }
 
@@ -501,7 +498,7 @@ impl Draft<'_> {
         let panels = panels(self.kind, table);
         let plotted: BTreeSet<&String> = panels.iter().flat_map(|(_, names)| names).collect();
         let mut moving = self.columns.moving.clone();
-        // If there is room for every row, columns that are only plotted keep all rows too.
+        // if every row is drawn, columns that are only plotted keep all rows, too
         let all: BTreeSet<String> =
             moving.iter().cloned().chain(plotted.iter().map(|n| n.to_string())).collect();
         if Thinning::new(time.len(), all.len() + self.derived.len()).every == 1 {
@@ -512,8 +509,8 @@ impl Draft<'_> {
         let column = |name: &str| table.column(name).unwrap_or_default();
         if thinning.every > 1 {
             self.notes.push(format!(
-                "Of {} rows every {} is drawn, {:.3} s apart, and motion between them along straight lines; --from and --to show a part \
-                 with more of them. Plots of what does not move have the extremes of all rows.",
+                "Of {} rows every {} is drawn, {:.3} s apart, with linear interpolation between them; --from and --to show a part \
+                 with more rows. Plots of quantities that move no object contain the extreme values of all rows.",
                 time.len(),
                 ordinal(thinning.every),
                 (time[time.len() - 1] - time[0]) / (rows.len() - 1) as f64,
@@ -526,7 +523,7 @@ impl Draft<'_> {
             .collect();
         if let Some(frames) = thinning.too_few(&angles) {
             let sentence = format!(
-                "the liquid's oscillations have {frames:.1} frames each: what is drawn between them is not the motion (--from and --to \
+                "the picture has {frames:.1} frames per oscillation of the liquid, so that it does not show the motion between them (--from and --to \
                  show a part; a smaller --step of `hubslosh run` records more)"
             );
             self.notes.push(format!("Note: {sentence}."));
@@ -535,7 +532,7 @@ impl Draft<'_> {
         let unplotted = table.names().len() - 1 - plotted.len();
         if unplotted > 0 {
             self.notes.push(format!(
-                "{unplotted} columns of the table are not plotted: what is 0 throughout, and what {MOST_PANELS} panels do not hold."
+                "{unplotted} columns of the table are not plotted, because they are always 0 or because the page has at most {MOST_PANELS} panels."
             ));
         }
         let unit = |name: &str| {
@@ -599,7 +596,7 @@ fn panels(kind: Kind, table: &Table) -> Vec<(String, Vec<String>)> {
             }
         }
     }
-    // Elements of one vector share a panel, and so do the slosh angles of one tank.
+    // the elements of one vector share a panel, and so do the slosh angles of one tank
     let family = |name: &str| {
         let bare =
             name.strip_suffix(']').and_then(|n| n.rsplit_once('[')).map_or(name, |(bare, _)| bare);

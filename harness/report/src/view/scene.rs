@@ -24,8 +24,8 @@ struct Arrows<'a, 'c, 't> {
 }
 
 impl Arrows<'_, '_, '_> {
-    /// Adds an arrow that follows the columns `names`, if the run has them and they are not always
-    /// 0. An input without a column keeps its start value.
+    /// Adds an arrow that shows the columns `names`, if the run contains them and they are not always 0. An
+    /// input without a column keeps its start value.
     fn add(&mut self, name: &str, label: &str, mut arrow: Value, names: &[String]) {
         let constant = |name: &String| {
             let variable = self.parameters.description.variable(name).ok()?;
@@ -52,7 +52,7 @@ impl Arrows<'_, '_, '_> {
         }
     }
 
-    /// Gives all arrows of one unit the same scale, so that their lengths can be compared.
+    /// Gives all arrows with the same unit the same scale, so that their lengths can be compared.
     fn share_scales(&mut self) {
         let mut most: BTreeMap<String, f64> = BTreeMap::new();
         for arrow in &self.drawn {
@@ -194,8 +194,8 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     (geometry, reach)
 }
 
-/// Returns the scene of a tank on a host's craft, whose middle is the scene's centre, with the
-/// point O and the arrows there, and the radius that contains the scene, m.
+/// Returns the scene of a tank on the host's craft, whose centre is the middle of the tank, with the point O
+/// and the arrows there, and the radius that contains the scene, m.
 fn host_tank_scene(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let [middle, half] = tank.middle_and_extent();
     let [x, y, z] = tank.position;
