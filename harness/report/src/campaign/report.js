@@ -1,5 +1,5 @@
-// Draws the page's figures with plotly: in the reader's light or dark colours, with as many panels
-// beside each other as there is room for, and for paper at its width.
+// Draws the figures of the page with plotly: in the light or dark scheme of the reader, with as many panels
+// next to each other as the window has room for, and for printing with the width of the paper.
 (() => {
   const figures = JSON.parse(document.getElementById("figures").textContent);
   const places = [...document.querySelectorAll(".plot")];
@@ -13,18 +13,18 @@
     toImageButtonOptions: { format: "svg" },
   };
 
-  // How many powers of ten the values of a panel span.
+  // Returns the number of powers of ten that the values of a panel span.
   function decades(spec, panel, axis = "y") {
     const logs = spec.traces.filter((t) => t.panel === panel).flatMap((t) => t[axis]).filter((v) => v > 0).map(Math.log10);
     return logs.reduce((a, b) => Math.max(a, b), -Infinity) - logs.reduce((a, b) => Math.min(a, b), Infinity);
   }
 
-  // Texts at the right ends of lines, each at its line or as near as the others let it.
+  // Returns labels for the right ends of lines, each as close to its line as the other labels allow.
   function labels(spec, size, night, inner, [low, high]) {
     const px = (y) => ((y - low) / (high - low)) * inner;
     const all = spec.labels.map((l) => ({ ...l, at: px(l.y) })).sort((a, b) => a.at - b.at);
     const apart = size * 1.25;
-    // from below upwards, then from above downwards, so that none leaves the panel
+    // first shifted upwards from the lowest, then downwards from the highest, so that no label leaves the panel
     all.forEach((l, i) => { if (i) l.at = Math.max(l.at, all[i - 1].at + apart); });
     for (let i = all.length - 1, most = inner - apart / 2; i >= 0; i--, most -= apart) all[i].at = Math.min(all[i].at, most);
     return all.map((l) => ({
@@ -33,7 +33,7 @@
     }));
   }
 
-  // Where the values of a panel end, error bars included, with some air.
+  // Returns the range of a panel's values, including error bars, with a margin.
   function span(spec, panel) {
     const ends = spec.traces.filter((t) => t.panel === panel).flatMap((t) =>
       t.y.flatMap((y, i) => { const e = t.error_y ? t.error_y.array[i] : 0; return y === null ? [] : [y - e, y + e]; }));
@@ -41,7 +41,7 @@
     return [low - air, high + air];
   }
 
-  // Height over width of what a figure shows.
+  // Returns the ratio of height to width of the data in a figure.
   function shape(spec) {
     const size = (axis) => {
       const all = spec.traces.flatMap((t) => t[axis] || []);
@@ -61,7 +61,7 @@
     const columns = Math.max(1, Math.min(spec.columns, Math.floor(width / (printing ? 170 : 290))));
     const rows = Math.ceil(panels / columns);
     let row = printing ? Math.min(spec.height * 0.55, 250) : spec.height;
-    const bars = spec.traces.some((trace) => trace.orientation === "h"); // whose names are long
+    const bars = spec.traces.some((trace) => trace.orientation === "h"); // horizontal bars, which have long names
     const [space, right, top, below, gutter] = printing ? [44, 6, 8, 32, 54] : [62, 12, 30, 44, 66];
     const between = bars ? 2 * gutter : gutter;
     const left = bars ? 2 * space + 20 : space;
@@ -71,12 +71,12 @@
     const longest = Math.max(0, ...spec.labels.map((l) => l.text.length));
     const aside = labelled ? 0.56 * small * longest + 10 : 0;
     const showlegend = named.size > 1 && !labelled;
-    // its height is known once it is drawn
+    // the height of the legend is known only after it is drawn
     const legend = showlegend ? (measured ?? 30) + 6 : 0;
     const shared = spec.shared && columns === 1;
     const gap = shared ? 16 : below + 10;
     const plotWidth = width - left - right - aside;
-    // what has the same scale both ways is no higher than its width needs
+    // a panel with the same scale on both axes is not higher than its width requires
     if (panels === 1 && spec.panels[0].equal) row = Math.min(row, below + plotWidth * shape(spec));
     const inner = rows * row - below;
     const height = top + rows * row + legend;
@@ -104,13 +104,13 @@
       layout["xaxis" + suffix] = { ...common, domain: domain.x, anchor: "y" + suffix, title: { text: last ? panel.x : "", standoff: printing ? 4 : 8, font: { size: small + (printing ? 0 : 1) } }, showticklabels: last,
         type: panel.logx ? "log" : "-", nticks: Math.max(3, Math.round(w / 70)) };
       if (panel.logx) Object.assign(layout["xaxis" + suffix], { exponentformat: "none", tickformat: "~g" });
-      // 1, 2 and 5 of every decade: the labels of all digits overlap
+      // ticks at 1, 2 and 5 of every decade, because labels of all digits would overlap
       if (panel.logx && !panel.range && decades(spec, i, "x") >= 1) layout["xaxis" + suffix].dtick = "D2";
       if (panel.range) layout["xaxis" + suffix].range = panel.logx ? panel.range.map(Math.log10) : panel.range;
       if (spec.shared && i) layout["xaxis" + suffix].matches = "x";
       layout["yaxis" + suffix] = { ...common, domain: domain.y, anchor: "x" + suffix, title: { text: panel.y, standoff: 2, font: { size: small } }, type: panel.logy ? "log" : "-", nticks: 6 };
       if (bars) Object.assign(layout["yaxis" + suffix], { type: "category", dtick: 1, tickfont: { size: printing ? 7 : 10 } });
-      // at powers of ten; where there are less than two of them, at 1, 2 and 5 of each; within one decade where plotly puts them
+      // ticks at powers of ten; with less than two decades at 1, 2 and 5 of each; within one decade plotly's choice
       if (panel.logy && decades(spec, i) >= 1) layout["yaxis" + suffix].dtick = decades(spec, i) >= 2 ? 1 : "D2";
       if (panel.equal) Object.assign(layout["yaxis" + suffix], { scaleanchor: "x" + suffix, constrain: "domain" });
     });
@@ -129,19 +129,19 @@
         const d = domains[i];
         trace.colorbar = { x: d.x[1], xpad: 2, y: (d.y[0] + d.y[1]) / 2, len: d.y[1] - d.y[0], thickness: 7, tickfont: { size: 9 }, outlinewidth: 0 };
       } else {
-        // one entry for a name, which switches it in all panels
+        // one legend entry for each name, which shows or hides it in all panels
         trace.showlegend = trace.showlegend !== false && !seen.has(trace.name);
         seen.add(trace.name);
       }
       return trace;
     });
     place.style.height = height + "px";
-    // what is measured while it is drawn must not be scaled
+    // plotly measures sizes while it draws, which a scaled drawing would falsify
     place.querySelectorAll(".main-svg").forEach((svg) => svg.removeAttribute("viewBox"));
     Plotly.react(place, traces, layout, config);
     const found = showlegend && measured === undefined && place._fullLayout.legend._height;
     if (found && Math.abs(found - 30) > 1) return draw(place, spec, found);
-    // what is printed wider or narrower than drawn keeps its shape
+    // a figure that is printed wider or narrower than it was drawn keeps its aspect ratio
     place.querySelectorAll(".main-svg").forEach((svg) => svg.setAttribute("viewBox", `0 0 ${width} ${height}`));
     place.style.setProperty("--shape", `${width} / ${height}`);
   }
@@ -157,7 +157,7 @@
     clearTimeout(waiting);
     waiting = setTimeout(all, 150);
   });
-  // one after the other, so that the page can be read meanwhile
+  // the figures are drawn one after the other, so that the page can be read meanwhile
   let next = 0;
   (function go() {
     const until = performance.now() + 40;

@@ -1,4 +1,4 @@
-// Plays a run: moves the scene along the table's rows, keeps the plots' cursor at the same time.
+// Plays a run: moves the objects of the scene by the rows of the table, and the cursor of the plots to the same time.
 (() => {
   "use strict";
   const run = JSON.parse(document.getElementById("run").textContent);
@@ -12,7 +12,7 @@
   const timeOf = (k) => (listed ? listed[k] : run.time.first + run.time.step * k);
   const first = timeOf(0), last = timeOf(count - 1);
 
-  // The last row at or before t, and how far t is from there to the next one.
+  // Returns the last row at or before t, and the fraction of the way from this row to the next at which t is.
   function place(t) {
     let k;
     if (listed) {
@@ -30,7 +30,7 @@
     return part === 0 ? column[k] : part === 1 ? column[k + 1] : column[k] + (column[k + 1] - column[k]) * part;
   };
 
-  // Directions from hinge to bob: recorded, or from slosh angles, whose sines are displacements over the length.
+  // Returns directions from hinges to pendulum masses: recorded, or from slosh angles, whose sines are displacements divided by the length.
   function direction(mode, where) {
     if (mode.p) {
       const p = mode.p.map((name) => value(name, where)), size = Math.hypot(...p);
@@ -41,7 +41,7 @@
     return [x, y, -Math.sign(Math.cos(a) * Math.cos(b)) * Math.sqrt(Math.max(0, 1 - x * x - y * y))];
   }
 
-  // A mode's surface, linear between the masses of liquid at which it is known.
+  // Returns the surface shape of a mode by linear interpolation over the mass of liquid.
   function surface({ liquid, masses, shapes }, n, where) {
     const last = masses.length - 1, found = masses.findIndex((m) => m >= value(liquid, where));
     if (last === 0) return shapes[0][n];
@@ -55,7 +55,7 @@
     if (run.motion.theta) {
       const theta = value(run.motion.theta, where);
       state.q = [Math.cos(theta / 2), 0, 0, Math.sin(theta / 2)];
-      // the rotor's speed is against the ground
+      // the speed of the rotor is relative to the ground
       if (run.motion.wheel) state.wheel = value(run.motion.wheel, where) - theta;
     } else if (run.motion.q) state.q = run.motion.q.map((name) => value(name, where));
     state.tanks = run.tanks.map((tank, i) => {
@@ -84,9 +84,9 @@
     at("scene").append(text);
   }
 
-  // Plots: light or dark colours as the reader has it, envelopes as fine as the width of the plot.
+  // Plots in the light or dark scheme of the reader, with envelopes as fine as the width of the plot allows.
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  // A quantity that is an arrow of the picture has the colour of its arrow; other curves take colours that are still free.
+  // A quantity with an arrow in the scene has the colour of its arrow; other curves take colours that are still free.
   const arrowOf = new Map(Object.entries(run.scene.arrows).filter(([, source]) => typeof source === "string").map(([arrow, column]) => [column, arrow]));
   function colorsOf(names) {
     const fixed = names.map((name) => scene && scene.colors[arrowOf.get(name)]);
@@ -117,7 +117,7 @@
     return { panel, place, cursor, shown, envelopes, last: i === run.panels.length - 1 };
   });
 
-  // Points of a line between two times: each, or least and largest in as many intervals as can be seen.
+  // Returns the points of a curve between two times: all points, or the smallest and the largest in each visible interval.
   const INTERVALS = 700;
   function line(plot, i, from, to) {
     const envelope = plot.envelopes[i], x = [], y = [];
@@ -148,7 +148,7 @@
         swatch.style.background = color;
         const [x, y] = line(plot, i, ...window_);
         return { type: "scatter", mode: "lines", x, y, name, line: { width: 1.2, color } };
-      }).reverse(); // the first on top
+      }).reverse(); // the first curve is drawn on top
       Plotly.react(plot.place, traces, {
         margin: { l: 58, r: 8, t: 4, b: plot.last ? 34 : 6 }, showlegend: false, dragmode: "zoom", hovermode: false,
         paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 11, color: ink },
@@ -171,7 +171,7 @@
     }
   }
 
-  // A click goes to that time; a drag is plotly's zoom.
+  // A click moves the cursor to its time; a drag is plotly's zoom.
   for (const { place } of plots) {
     let down = null;
     place.addEventListener("pointerdown", (event) => { down = [event.clientX, event.clientY]; }, true);
@@ -189,7 +189,7 @@
     drawPlots();
   };
   const all = () => { at("window").value = ""; window_ = [first, last]; drawPlots(); };
-  // Plots of a part turn the page when the time leaves it.
+  // Plots of a part of the run move on by a part when the time leaves it.
   function turnPage() {
     const width = Math.min(Number(at("window").value), last - first);
     if (!width || (now >= window_[0] && now <= window_[1] && Math.abs(window_[1] - window_[0] - width) < 1e-6 * width)) return;
@@ -212,9 +212,9 @@
     if (scene) scene.show(stateAt(now));
     for (const plot of plots) plot.shown.forEach(({ name, text }, i) => {
       const envelope = plot.envelopes[i];
-      // of what is kept as an envelope alone there is a value where it keeps every row
+      // a column that is kept only as an envelope has values only if it keeps every row
       const known = columns[name] ? value(name, where) : envelope.each === 1 ? envelope.low[Math.min(nearest(envelope.times), envelope.low.length - 1)] : null;
-      // what stands in the panel's title is not said again
+      // the name in the title of the panel is not repeated
       const title = plot.panel.title, tank = title.slice(0, title.lastIndexOf(".") + 1);
       const label = name.startsWith(title) ? name.slice(title.length) || "now" : name.slice(name.startsWith(tank) ? tank.length : 0);
       text.textContent = known === null ? label : `${label} = ${HubSloshScene.digits(known)}`;
@@ -297,7 +297,7 @@
 
   for (const option of [...at("window").options]) if (Number(option.value) > 0.6 * (last - first)) option.remove();
   show();
-  // the picture first
+  // the scene is drawn before the plots
   requestAnimationFrame(() => setTimeout(() => {
     drawPlots();
     plots.forEach(({ place }) => { place.on("plotly_relayout", relayout); place.addEventListener("dblclick", all); });
@@ -305,6 +305,6 @@
     new ResizeObserver(moveCursors).observe(at("plots"));
     document.documentElement.dataset.drawn = "yes";
   }));
-  // For checks and recordings: where time goes, what is drawn.
+  // For tests and screen recordings: sets the time, and returns the state of the page.
   globalThis.hubsloshView = { seek, first, last, timeOf, count, read: () => scene && scene.read(), scene, get now() { return now; }, get playing() { return playing; } };
 })();
