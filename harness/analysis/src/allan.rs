@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn the_allan_deviation_of_a_gauss_markov_bias_has_its_peak_where_the_book_says() {
+    fn the_allan_deviation_of_a_gauss_markov_bias_has_the_peak_that_the_book_states() {
         let noise = Noise { bias_instability: FLICKER, bias_time: 100.0, ..Noise::default() };
         let deviation = |tau: f64| noise.variance(tau).sqrt();
         let times = (0..10_000).map(|k| f64::from(k) * 0.1 + 1.0);

@@ -5,7 +5,7 @@
 //! and sums of squares are in units of its variance. Coefficients of formulas, orders of tables and names stay with their code.
 
 // Signals on clocks of their own: `input/clocks.rs`.
-// Tests: `readings_of_a_slow_gyro_are_interpolated_and_measured_rows_are_marked`, `a_band_limited_torque_of_10_hz_is_known_between_its_samples`.
+// Tests: `readings_of_a_slow_gyro_are_interpolated_and_measured_rows_are_marked`, `a_band_limited_torque_of_10_hz_is_interpolated_accurately_between_its_samples`.
 /// Spacing of the points of a band-limited torque, between which the torque is linear, s. A much larger spacing would add
 /// images of its spectrum.
 pub const FINE_TORQUE: f64 = 0.02;
@@ -111,7 +111,7 @@ pub const SPIKE_AROUND: usize = 50;
 // Tolerances: `input/tolerance.rs`.
 // Tests: `intervals_contain_the_true_values_if_the_torque_is_wrong_within_its_tolerance`.
 /// Share of a known value's tolerance in the variance of an estimate above which the verdict mentions the tolerance.
-pub const TOLD_SHARE: f64 = 0.2;
+pub const REPORTED_SHARE: f64 = 0.2;
 
 // Unknowns of any FMU: `model/unknown.rs`.
 // Tests: `tolerances_of_known_values_widen_the_intervals`.
@@ -157,7 +157,7 @@ pub const SAME_INSTANT: f64 = 1e-9;
 pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 
 // Starts from data: `bench/start.rs`.
-// Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
+// Tests: `the_bench_follows_from_poles_and_zeros_of_its_exact_response`.
 /// Damping ratios that are tried for the slosh mode when the start of a search is computed from the torque balance.
 pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
 /// Relative step between the slosh frequencies that are tried. The half-power width at the smallest damping of [`DAMPINGS`] is
@@ -177,7 +177,7 @@ pub const ANGLE_ROUNDS: usize = 12;
 // Verdict: `bench/verdict.rs`.
 // Tests: `a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result`.
 /// Newton decrement, in standard deviations, above which the verdict says that the search ended before the minimum.
-pub const TOLD_DECREMENT: f64 = 0.1;
+pub const REPORTED_DECREMENT: f64 = 0.1;
 
 // Page: `words/page.rs`.
 // Tests: `the_report_of_a_fit_is_a_complete_page`.

@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_line_keeps_its_ends_and_a_corner_stays() {
+    fn simplification_of_a_curve_keeps_its_ends_and_corners() {
         let line: Vec<_> = (0..100).map(|i| (i as f64, 2.0 * i as f64)).collect();
         assert_eq!(simplified(&line, 0.1), [line[0], line[99]]);
         let corner = [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0)];

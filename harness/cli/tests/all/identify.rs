@@ -45,7 +45,7 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
         ["identify", "data.csv", "--model", "frozen", "--also", "none", "--out", "result.json"];
     let said = hubslosh(folder, &asked).unwrap();
     // the liquid's part of the inertia is what the tank says
-    assert!(said.contains("the interval holds for this one"), "{said}");
+    assert!(said.contains("the interval is valid only for this liquid"), "{said}");
     let asked = ["run", "--parameters", "result.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--columns", "omega", "--out", "twin.csv"]].concat()).unwrap();
     let column = |name: &str| {

@@ -398,7 +398,9 @@ fn two_campaigns_are_compared_run_by_run() {
         .unwrap();
     assert!(done.status.success());
     let page = page(directory);
-    assert!(page.contains("This campaign minus the other") && page.contains("<code>heavier</code>"));
+    assert!(
+        page.contains("This campaign minus the other") && page.contains("<code>heavier</code>")
+    );
     // less inertia: a higher resonance
     let largest = page.split("resonance / mHz: +").count();
     assert!(largest > 1, "the resonance rises");

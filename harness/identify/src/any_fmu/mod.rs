@@ -385,7 +385,7 @@ fn conclude(
             pressed.join(", ")
         ),
         None => format!(
-            "{NOT_JUDGED}: the residual of every output is noise, but the errors of the solver decide estimates."
+            "{NOT_JUDGED}: the residual of every output is noise, but estimates depend on the errors of the solver."
         ),
         Some(_) => fit_in_words(&found.details.outputs),
     }];
@@ -393,7 +393,7 @@ fn conclude(
     if is_decided {
         let heeds = matches!(system.model, Model::Own(_)) && solver.differs.first() == Some(&true);
         words.push(format!(
-            "No interval is given for {}: the errors of the {} solver decide them ({}).",
+            "No interval is given for {}, because the errors of the {} solver are too large for these estimates ({}).",
             found.details.decided_by_solver.join(", "),
             if matches!(system.model, Model::Own(_)) { "FMU's own" } else { "host's" },
             remedy(system, heeds)
@@ -409,7 +409,7 @@ fn conclude(
     words.extend(sets.map(Inseparable::words));
     if !found.converged {
         words.push(format!(
-            "{NO_MINIMUM}: it ended {:.1} standard deviations from it",
+            "{NO_MINIMUM}: the minimum is {:.1} standard deviations away",
             minimum.decrement
         ));
     }

@@ -30,7 +30,7 @@ fn lagged(y: f64, (a, b): (f64, f64), h: f64, lag: f64) -> f64 {
 /// Returns times and values of the torque of an actuator with this lag (s). The times are the knots of the command and points
 /// between them, dense enough for linear interpolation. The command is held from knot to knot if `held` is true, and linear
 /// otherwise. At the first knot the actuator's torque equals the command.
-pub fn of_actuator(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<f64>, Vec<f64>) {
+pub fn lagged_torque(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<f64>, Vec<f64>) {
     let (mut time, mut values) = (vec![knots[0]], vec![torque[0]]);
     let mut y = torque[0];
     for k in 1..knots.len() {
@@ -78,7 +78,7 @@ mod tests {
         let gain = 1.0 / (1.0 + (w * lag).powi(2)).sqrt();
         let expected = |t: f64| gain * (w * t - (w * lag).atan()).sin();
         let read = of_gyro(lag, &time, &sine);
-        let (knots, torque) = of_actuator(lag, &time, &sine, false);
+        let (knots, torque) = lagged_torque(lag, &time, &sine, false);
         // after 15 lags the transient has decayed; the end is left out
         for k in 100..1900 {
             // the harmonics of the linear interpolation, 1/(2π/Ωh)² of the sine and more, pass the lag as well
@@ -86,7 +86,7 @@ mod tests {
             assert!((torque[3 * k] - expected(knots[3 * k])).abs() < 1e-3, "{k}");
         }
         // a held command is reached to 1 − 1/e after one lag
-        let held = of_actuator(1.0, &[0.0, 0.5, 1.5], &[0.0, 1.0, 1.0], true);
+        let held = lagged_torque(1.0, &[0.0, 0.5, 1.5], &[0.0, 1.0, 1.0], true);
         let last = held.1[held.1.len() - 1];
         assert!((last - (1.0 - (-1.0_f64).exp())).abs() < 1e-12, "{last}");
     }

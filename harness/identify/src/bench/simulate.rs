@@ -141,7 +141,7 @@ impl Setup {
         let (mut knots, mut torque) = course(recording, self.intersample);
         let mut held = self.intersample == Hold::ZeroOrderHold;
         if effects.actuator_lag > 0.0 {
-            (knots, torque) = effect::of_actuator(effects.actuator_lag, &knots, &torque, held);
+            (knots, torque) = effect::lagged_torque(effects.actuator_lag, &knots, &torque, held);
             held = false;
         }
         let at_knots = |signal: &[f64]| -> Vec<f64> {
@@ -149,7 +149,7 @@ impl Setup {
                 return signal.to_vec();
             }
             let mut row = 0;
-            let value = |t: &f64| clocks::on_line(&recording.time, signal, *t, &mut row);
+            let value = |t: &f64| clocks::interpolated_at(&recording.time, signal, *t, &mut row);
             knots.iter().map(value).collect()
         };
         let gravity = recording.gravity.as_deref().map(at_knots);

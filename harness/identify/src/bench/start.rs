@@ -338,7 +338,7 @@ mod tests {
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 
     #[test]
-    fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
+    fn the_bench_follows_from_poles_and_zeros_of_its_exact_response() {
         let measured =
             Linear::bench_10_cm(0.002_975_7).frequency_response(&logarithmic_grid(BAND, 1200));
         let found = translate(&measured, BENCH).unwrap();

@@ -6,7 +6,7 @@ use crate::bench::causes::{Cause, Missing};
 use crate::bench::identification::ModelFit;
 use crate::engine::DECIDES;
 use crate::estimate::{Estimated, prose};
-use crate::tuning::TOLD_DECREMENT;
+use crate::tuning::REPORTED_DECREMENT;
 use crate::words::combination::Combination;
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, failed};
 use analysis::innovations::Tests;
@@ -77,7 +77,7 @@ pub fn words(
             fit.newton_decrement
         ));
     }
-    if fit.converged && fit.newton_decrement > TOLD_DECREMENT {
+    if fit.converged && fit.newton_decrement > REPORTED_DECREMENT {
         lines.push(format!(
             "The search ended {:.2} standard deviations from the minimum; the stated standard deviations include this.",
             fit.newton_decrement
@@ -85,8 +85,8 @@ pub fn words(
     }
     if fit.model == SloshModel::Frozen.name() && parameters.contains_key(hub::I) {
         lines.push(
-            "hub.I is the total inertia minus that of the liquid in the tank as set (tank.d, tank.h, tank.r, fluid.rho). A \
-             recording without slosh does not show the liquid: the interval holds for this one."
+            "hub.I is the total inertia minus the inertia of the liquid in the settings (tank.d, tank.h, tank.r, fluid.rho). A \
+             recording without slosh does not show the liquid: the interval is valid only for this liquid."
                 .into(),
         );
     }

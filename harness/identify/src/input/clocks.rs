@@ -64,7 +64,7 @@ pub fn is_even(time: &[f64]) -> bool {
 
 /// Returns a signal at time `t` by linear interpolation. `row` is the row before `t`, which the function only increases, so that
 /// successive calls need increasing times.
-pub fn on_line(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
+pub fn interpolated_at(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
     while *row + 2 < time.len() && time[*row + 1] <= t {
         *row += 1;
     }
@@ -169,7 +169,7 @@ mod tests {
 
     /// A torque sampled at 10 Hz that contains 1.3 and 3.6 Hz is interpolated to 50 Hz with an error below 1e-3.
     #[test]
-    fn a_band_limited_torque_of_10_hz_is_known_between_its_samples() {
+    fn a_band_limited_torque_of_10_hz_is_interpolated_accurately_between_its_samples() {
         let sine = |t: f64| (2.0 * PI * 3.6 * t + 0.4).sin() + 0.5 * (2.0 * PI * 1.3 * t).cos();
         let time: Vec<f64> = (0..600).map(|k| 0.1 * f64::from(k)).collect();
         let (fine, found) = refined(&time, &time.iter().map(|t| sine(*t)).collect::<Vec<_>>());

@@ -49,7 +49,7 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
             left.push(n);
             continue;
         }
-        let error = *tried.entry(lost).or_insert_with(|| tried_out(&values, &gaps, lost) * step);
+        let error = *tried.entry(lost).or_insert_with(|| trial_error(&values, &gaps, lost) * step);
         match fill(before(&values, &gaps, n), after(&values, &gaps, n), lost) {
             Some(values) if error < kick => filled.push((n, values)),
             _ => left.push(n),
@@ -105,7 +105,7 @@ fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
 
 /// Estimates the error of filling a gap of `lost` samples by trials: known samples in other places are removed and predicted.
 /// Returns the root mean square of the summed errors, infinite if no trial is possible.
-fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
+fn trial_error(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     let side = 4 * GAP_ORDER;
     let room = values.len().saturating_sub(2 * side + lost);
     let mut squares = Vec::new();
@@ -234,10 +234,10 @@ mod tests {
             let worst = off.fold(0.0, f64::max);
             assert!(worst < 1e-3 * 0.1, "{lost}: {worst:e}");
         }
-        assert!(tried_out(&values, &[], 10) < 1e-4);
+        assert!(trial_error(&values, &[], 10) < 1e-4);
         // a torque that jumps from row to row is not predictable
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..4000).map(|_| 0.1 * random.normal()).collect();
-        assert!(tried_out(&noise, &[], 10) > 0.1);
+        assert!(trial_error(&noise, &[], 10) > 0.1);
     }
 }

@@ -237,7 +237,10 @@ pub fn prepare(
         check_signals(&part)?;
         parts.push(part);
     }
-    ensure!(!parts.is_empty(), "{name}: no part between gaps is as long as {SHORTEST_RECORDING} s");
+    ensure!(
+        !parts.is_empty(),
+        "{name}: every part between gaps is shorter than {SHORTEST_RECORDING} s"
+    );
     let torque = parts.iter().map(|part| peak(&part.torque)).fold(0.0, f64::max);
     ensure!(
         !parts.iter().all(is_stuck),
@@ -481,7 +484,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_recording_passes() {
+    fn a_recording_without_faults_is_accepted() {
         assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);
     }
 

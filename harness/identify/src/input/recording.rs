@@ -10,7 +10,7 @@ use analysis::statistics::{mean, noise_level};
 use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 
-use crate::input::clocks::{completed, on_line, usual};
+use crate::input::clocks::{completed, interpolated_at, usual};
 use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 
 #[derive(Clone, Debug)]
@@ -251,7 +251,7 @@ impl Recording {
         let at = |signal: &[f64]| -> Vec<f64> {
             let (mut row, times) =
                 (0, (0..self.time.len()).map(|k| self.time[0] + k as f64 * step));
-            times.map(|t| on_line(&self.time, signal, t, &mut row)).collect()
+            times.map(|t| interpolated_at(&self.time, signal, t, &mut row)).collect()
         };
         Ok((step, at(&self.torque), at(&self.rate)))
     }

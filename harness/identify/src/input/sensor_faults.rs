@@ -205,7 +205,7 @@ fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) 
     if repeats.len() < REPEATS.0 {
         return Vec::new();
     }
-    let off = spikes::off_neighbours(time, values);
+    let off = spikes::differences_from_neighbours(time, values);
     let squares: Vec<f64> = off.iter().map(|e| e * e).collect();
     // 0.4549 is the median of χ² with one degree of freedom
     let usual = median(&squares).unwrap_or(0.0) / 0.4549;

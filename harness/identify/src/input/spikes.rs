@@ -28,7 +28,7 @@ fn gain() -> f64 {
 
 /// Returns the difference of each value from the cubic through its neighbours, scaled to the noise of evenly spaced rows, and 0
 /// at the ends. `time` must increase.
-pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
+pub fn differences_from_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
     let inner = 2..y.len().saturating_sub(2);
     let one = |k: usize| match inner.contains(&k) {
         true => off((time, y), &[k - 1, k - 2, k + 1, k + 2], k).0,
@@ -51,7 +51,7 @@ pub fn find(
         return Vec::new();
     }
     let residuals: Vec<f64> =
-        off_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
+        differences_from_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
     // the median of |r| is 0.6745 σ for noise, and larger if friction causes kinks in many rows
     let typical = |residuals: &[f64]| median(residuals).map_or(0.0, |m| m / 0.6745);
     let around: Vec<f64> = residuals.chunks(SPIKE_AROUND).map(typical).collect();

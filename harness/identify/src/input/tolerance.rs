@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, ensure};
 use names::hubslosh::{G_AXIAL, fluid, tank};
 
-use crate::tuning::TOLD_SHARE;
+use crate::tuning::REPORTED_SHARE;
 
 /// Relative standard deviations of values that the recording does not determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub struct Share {
 /// Returns a sentence that names the estimates whose uncertainty comes mostly from tolerances. `known`
 /// describes the tolerances in words. Returns `None` if there is no such estimate.
 pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
-    let large = shares.iter().filter(|share| share.share > TOLD_SHARE);
+    let large = shares.iter().filter(|share| share.share > REPORTED_SHARE);
     let large: Vec<String> = large
         .map(|s| format!("{} {:.0} % (most by {})", s.name, 100.0 * s.share, s.most))
         .collect();

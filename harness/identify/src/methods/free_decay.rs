@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn damping_that_grows_with_the_amplitude_is_found_as_averaging_predicts_it() {
+    fn damping_that_grows_with_the_amplitude_is_estimated_as_averaging_theory_predicts() {
         // x'' + ... + q x'|x'|: averaging gives ζ_A = 4 q/(3π) (Nayfeh and Mook 1979, 3.3.3), and a cubic spring gives κ = 3
         // α/8. Both are of first order in the squared amplitude; the error, 0.2² α q, is below 1 %.
         let (q, alpha) = (0.02, -0.05);

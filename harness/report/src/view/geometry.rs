@@ -507,7 +507,7 @@ mod tests {
     /// The default fill table contains the depths 0.1 to 1.2 m of one cylinder. Between its points the surface
     /// rises with the mass.
     #[test]
-    fn the_surface_of_a_draining_cylinder_is_where_its_liquid_ends() {
+    fn the_surface_of_a_draining_cylinder_is_at_the_depth_of_its_liquid() {
         let drawn = tank_with(&[("tank.fill.points", "12"), ("tank.liquid_0", "381.704")]);
         let fill = drawn.fill.as_ref().unwrap();
         let area = 1000.0 * std::f64::consts::PI * 0.45 * 0.45;

@@ -150,7 +150,9 @@ fn a_slow_torque_is_held_and_lost_rows_are_left_out() {
     }
     assert!(said.contains("22 of 122 rows have no omega and are left out"), "{said}");
     assert!(
-        said.contains("tau_cmd has a value in 21 of 122 rows, 0.1000 s apart; between these rows it is held"),
+        said.contains(
+            "tau_cmd has a value in 21 of 122 rows, 0.1000 s apart; between these rows it is held"
+        ),
         "{said}"
     );
     // on an even grid the missing rate is interpolated linearly
