@@ -1,6 +1,6 @@
 //! Reads units of measurement, and converts their values to SI.
 //!
-//! One grammar reads units in brackets, in a row of units, and within the name of a column ([`find_unit`]). A
+//! One grammar reads units in brackets, in a row of units, and within the name of a column (`find_unit`). A
 //! unit is a product of symbols (`mN`, `deg`, `s`) or words (`degrees`, `microseconds`) with whole exponents:
 //! `N·m`, `mN.m`, `Nm`, `m/s^2`, `m s⁻²`, `deg per sec`, `deg_s`. If a text has several meanings, the
 //! expected quantity decides: `nm` means newton metres for a torque and nanometres for a length.
