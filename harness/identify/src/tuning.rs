@@ -190,7 +190,7 @@ pub const PAGE_POINTS: usize = 700;
 pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
 // Friction runs: `methods/friction.rs`.
-// Tests: `friction_fits_of_three_sets_of_runs_end_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_advice`, `noise_of_decays_shows_no_preferential_direction_and_friction_that_varies_by_10_per_cent_does`.
+// Tests: `friction_fits_of_three_sets_of_runs_end_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_advice`, `noise_shows_no_preferential_direction_and_a_variation_of_10_per_cent_does`.
 /// Length of the blocks of rows that are averaged for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
 /// Smallest number of blocks in the recording of a friction run.

@@ -703,8 +703,7 @@ mod tests {
     }
 
     #[test]
-    fn the_allan_fit_adds_a_bias_or_a_ramp_or_leaves_out_filtered_times_and_otherwise_reports_a_misfit()
-     {
+    fn the_allan_fit_extends_its_model_or_leaves_out_times_or_reports_a_misfit() {
         let bias = Noise { bias_instability: 1e-4, bias_time: 40.0, ..ALL };
         let bias = Noise { flicker: 0.0, rrw: 0.0, ..bias };
         let fit = Octaves::from_samples(STEP, &record(&bias, 1 << 17, 1)).describe().unwrap();

@@ -388,8 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_decays_shows_no_preferential_direction_and_friction_that_varies_by_10_per_cent_does()
-     {
+    fn noise_shows_no_preferential_direction_and_a_variation_of_10_per_cent_does() {
         let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
         // the 95 % band holds for the whole curve: 5 of 100 are expected, and 12 are three standard deviations more
         assert!(of(0.0) <= 12, "{}", of(0.0));

@@ -365,8 +365,7 @@ fn moved(offsets: [f64; 3]) -> (Question, Record) {
 
 /// The force balance has constant offsets, which are estimated as biases.
 #[test]
-fn parameters_of_a_tank_that_turns_about_an_offset_point_are_estimated_with_biases_of_the_balance()
-{
+fn a_turning_tank_and_the_biases_of_its_force_balance_are_estimated() {
     for offsets in [[0.0; 3], [0.2, 0.0, -0.03]] {
         let (mut question, record) = moved(offsets);
         if offsets != [0.0; 3] {
