@@ -247,7 +247,7 @@ fn findings(
         let unknown = &problem.unknowns[*j];
         let target = &system.targets[*j];
         let is_own = matches!(target, Target::Parameter(_)) && !unknown.bent;
-        // friction may be 0, so its smallest start is no bound
+        // a friction at its lower bound is not reported, because friction may be 0
         let least = LEAST_FRICTION * unknown.start;
         let is_zero =
             !unknown.log && unknown.bounds.0 >= 0.0 && solution.minimum.point.z[*j] <= 2.0 * least;
