@@ -1,8 +1,8 @@
 //! Contents of a tank that may drain: slosh masses, pendulum lengths and heights are functions of the mass m_liq of the
-//! remaining liquid. The outflow f, kg/s, changes it by m_liq' = -f, and the fixed mass is m_0 = m_liq - sum of m_n. A bob is at
-//! rho from O, and its hinge at P; the height h, the length l and the mass m change with m_liq. Newton's law for the liquid that
-//! stays in the bob determines the tension T of the rod and the motion of its direction p:
-//!
+//! remaining liquid. The outflow f, kg/s, changes this mass by m_liq' = -f, and the fixed mass is m_0 = m_liq - sum of
+//! m_n. A bob (slosh mass) is at rho from O, and its hinge at P; the height h, the length l and the mass m of the bob
+//! change with m_liq. Newton's law for the liquid that stays in the bob determines the tension T of the rod and the motion
+//! of the rod's direction p:
 //! ```text
 //! rho = P + l p,  P = d + h e
 //! m [a + w' x rho + w x (w x rho) + 2 w x rho' + rho''] = -T p - phi
@@ -12,22 +12,24 @@
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + P'' + 2 l' p' + (c l/m) p' + (k l/m) p_perp
 //! ```
 //!
-//! The bob of a planar mode swings in the plane through P perpendicular to b, a unit vector fixed in the tank. The tank guides the
-//! bob by the force -N b:
+//! The bob of a planar mode swings in the plane through P perpendicular to b, a unit vector fixed in the tank. The tank
+//! guides the bob by the force -N b, which is added to the right-hand side of Newton's law:
 //!
 //! ```text
-//! -N b to the right-hand side of Newton's law,   N = -m b.G = N_0 - m u.[a; w'],  u = [b; rho x b]
+//! N = -m b.G = N_0 - m u.[a; w'],  u = [b; rho x b]
 //! p'' = -(1 - p p^T - b b^T) G/l - |p'|^2 p                  p.b = p'.b = 0
 //! ```
 //!
-//! A bob with other coefficients of the third order than a pendulum's is on another surface than a sphere (`surface.rs`).
+//! If the coefficients of the third order of a bob differ from those of a pendulum, the bob moves on another surface
+//! than a sphere (`surface.rs`).
 //!
-//! A tank with planar modes does not drain. Perpendicular to its plane the bob moves as rigid liquid. With modes along two
-//! directions m_0 is the mass of the liquid less the masses of the modes in both directions, so that it may be negative.
+//! A tank with planar modes does not drain. Perpendicular to the plane of its mode a bob moves as rigid liquid. If a tank
+//! has modes along two directions, m_0 is the mass of the liquid minus the masses of the modes in both directions, so that
+//! m_0 may be negative.
 //!
-//! Mass leaves a bob with the bob's velocity, and leaves the craft with the velocity of the tank at the outlet, r_out = d + z_out
-//! e. In between, it flows from each bob to the axis at the bob's level, and along the tank's axis. The flow within the tank has
-//! the momentum K relative to the tank and the moment of momentum L about O:
+//! Mass leaves a bob with the velocity of the bob, and leaves the craft with the velocity of the tank at the outlet, r_out =
+//! d + z_out e. Between these two points it flows from each bob to the tank's axis, at the level of the bob, and then along
+//! the axis. The flow within the tank has the momentum K relative to the tank and the moment of momentum L about O:
 //!
 //! ```text
 //! K = j e + sum of m_n' l p_perp,   j = (m_0 H_0)' + sum of m_n' b_n + f z_out,   b_n = h + l e.p
@@ -49,11 +51,11 @@
 //!     - sum of (m' |V + w x rho + rho'|^2/2 - T (h' e.p + l') - phi.(h' e + l' p) + k l l' |p_perp|^2)
 //! ```
 //!
-//! drained' contains the power of force and torque, the energy of the mass that leaves bobs and rigid liquid, and the
-//! work of rods whose ends move. S_0, I_0: the rigid liquid's moments about O. V: velocity of O.
+//! drained' contains the power of force and torque, the energy of the mass that leaves bobs and rigid liquid, and the work
+//! of rods whose ends move. S_0 and I_0 are the rigid liquid's first and second moments about O, and V is the velocity of O.
 //!
-//! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out.
-//! The energy is that of `outputs.rs`, differentiated along the motion.
+//! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out. The power drained'
+//! is the derivative by time of the energy in `outputs.rs`.
 
 use alloc::format;
 use alloc::string::String;
@@ -75,9 +77,9 @@ use crate::state::Line;
 use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
 use crate::table::{FillCurves, Filling, Jet};
 
-/// A tank in its mounting position, with the quantities that do not change during a run. For a tank that does not drain, `still`
-/// holds the rigid liquid, and all liquid at rest, as rigid bodies. If the table gives the surfaces of the modes, `surfaces` are
-/// those at the start.
+/// A tank in its mounting position, with the quantities that do not change during a run. If the tank does not drain, `still`
+/// contains two rigid bodies: the rigid liquid, and all liquid at rest. If the fill table contains the coefficients of the
+/// modes' surfaces, `surfaces` are the surfaces at the start of the run.
 #[derive(Clone, Debug)]
 pub struct MountedTank {
     pub tank: Tank,
@@ -94,15 +96,15 @@ pub struct MountedTank {
     still: Option<[Rigid; 2]>,
 }
 
-/// Returns a constant as a [`Jet`], with derivatives of 0.
+/// Returns the constant `x` as a [`Jet`], whose derivatives are 0.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
 
-/// A bob with the terms of its equation that do not contain [a; w']: `u` is [p; P x p], `phi` is the force phi of the equations
-/// above, `known` is G without a + w' x rho, and `centring` is the energy of the centring stiffness. The rates belong to the
-/// changing mass of liquid: m', the velocity h' e + l' p of the rod's far end for a bob at rest on it, and `centring_d` = k l l'
-/// |p_perp|^2.
+/// A bob with the terms of its equation of motion that do not contain [a; w']: `u` is [p; P x p], `phi` is the force phi of
+/// the module's head, `known` is G without a + w' x rho, and `centring` is the energy of the centring stiffness. Three
+/// fields are 0 unless the tank drains: `m_d` is m', `end_rate` is the velocity h' e + l' p of the rod's end if the rod does
+/// not swing, and `centring_d` is k l l' |p_perp|^2.
 pub struct Swing<T> {
     m: T,
     l: T,
@@ -129,9 +131,9 @@ struct OnSurface<T> {
     rotary: Option<Rotary<T>>,
 }
 
-/// A tank's contents at an instant. The flow within the tank has the momenta K and L (`flow_momentum`) and
-/// acts on the craft with `flow_wrench` about O, both with the liquid's spin; `dissipation` is in W; `shrinking` holds m_0',
-/// S_0' and I_0' w of the rigid liquid.
+/// Contents of a tank at an instant. The flow within the tank and the spin of the liquid have the momenta K and L
+/// (`flow_momentum`) and act on the craft with the force and torque `flow_wrench` about O. `dissipation` is in W.
+/// `shrinking` contains m_0', S_0' and I_0' w of the rigid liquid.
 pub struct Contents<'a, T> {
     mounted: &'a MountedTank,
     pub rigid: Rigid<T>,
@@ -196,13 +198,13 @@ impl MountedTank {
         (0..self.tank.modes).any(|n| self.tank.follows(n))
     }
 
-    /// Returns modes and rigid liquid at a mass of liquid, kg; `None` if the tank has no table.
+    /// Returns slosh modes and rigid liquid for `liquid` kg of liquid in the tank; `None` if the tank has no fill table.
     pub fn filling<T: Number>(&self, liquid: T) -> Option<Filling<T>> {
         self.drains().then(|| self.curves.filling(self.tank.modes, liquid))
     }
 
-    /// Returns the liquid at rest as a rigid body. `liquid`, kg, has an effect only in tanks with a table, whose
-    /// [`MountedTank::filling`] is `filling`.
+    /// Returns the liquid at rest as a rigid body. For a tank with a fill table, `liquid` is the mass of the liquid, kg, and
+    /// `filling` is [`MountedTank::filling`] of this mass; for other tanks neither has an effect.
     pub fn at_rest<T: Number>(&self, liquid: T, filling: Option<&Filling<T>>) -> Rigid<T> {
         let tank = &self.tank;
         if let Some(whole) = self.rigid_at_rest() {
@@ -233,8 +235,9 @@ impl MountedTank {
         Rigid::on_axis([self.d, self.e], moments, [i_0, i_z])
     }
 
-    /// Returns hinge, p and p' of mode `n`, which counts from 0, projected into the plane of a planar mode.
-    // A separate function: craft without planar modes then take fewer instructions.
+    /// Returns hinge, direction p and rate p' of mode `n`, which counts from 0. If the mode is planar, they are
+    /// projected into its plane.
+    // This is a separate function because craft without planar modes then take fewer instructions.
     #[inline(never)]
     fn guided<T: Number>(&self, n: usize, [hinge, p, p_d]: [Vec3<T>; 3]) -> [Vec3<T>; 3] {
         let Some(b) = self.across[n].map(constant) else { return [hinge, p, p_d] };
@@ -242,10 +245,9 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// Returns the surface on which the bob of mode `n` moves, and the height of the bob. They follow from the length l
-    /// with its derivatives, the direction p, its rate p', the angular velocity w, and the liquid's rate of spin with
-    /// its derivative. `changing` has the large-wave coefficients s and kappa with their derivatives if the fill table
-    /// gives them. Modes count from 0.
+    /// Returns the surface on which the bob of mode `n` moves (`n` counts from 0), and the height of the bob. `l` is the
+    /// length with its derivatives, `turning` is the liquid's rate of spin with its derivative, and `changing` are the
+    /// large-wave coefficients s and kappa with their derivatives if the fill table contains them.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
@@ -265,9 +267,10 @@ impl MountedTank {
         Some((meridian, lift))
     }
 
-    /// Returns the contents at p and p' of each mode, `x`, and the liquid's angular momentum of spin, tank axes. `a` and
-    /// `w_d` give the acceleration along the tank on which the drag depends. The mass of liquid, the flow and its slope
-    /// have an effect only in tanks with a table.
+    /// Returns the contents of the tank. `x` has direction p and rate p' of each mode, and `spin` is the angular momentum of
+    /// the liquid's spin, both in tank axes. `motion` is [a, w, w']; a and w' determine the acceleration along the tank on
+    /// which the drag depends. `flow` is the mass of liquid, its outflow and the slope of the outflow, which have an effect
+    /// only in tanks with a fill table.
     pub fn contents<T: Number>(
         &self,
         x: &[T],
@@ -281,8 +284,8 @@ impl MountedTank {
         contents
     }
 
-    /// Returns the liquid's spin at its angular momentum `l` and p and p' of each mode, `x`, tank axes, and the angular
-    /// velocity `w`, body axes.
+    /// Returns the spinning liquid at the angular momentum `l` and with direction p and rate p' of each mode, `x`, both in
+    /// tank axes, while the craft rotates with `w`, body axes. `None` if the liquid has no spin.
     pub fn spin_now<T: Number>(&self, x: &[T], l: Vec3<T>, w: Vec3<T>) -> Option<SpinNow<T>> {
         let spin = self.spin.as_ref()?;
         let mut reaction = T::constant(0.0);
@@ -297,7 +300,8 @@ impl MountedTank {
         Some(spin.now(l, w, reaction))
     }
 
-    /// Writes the bobs' p' and p'' in tank axes, six numbers each, under the acceleration [a; w'].
+    /// Writes the derivatives p' and p'' of the bobs' states, six numbers for each bob in tank axes, for the accelerations
+    /// [a; w'].
     pub fn write_rates<T: Number>(
         &self,
         contents: &Contents<'_, T>,
@@ -346,7 +350,7 @@ impl MountedTank {
         bobs
     }
 
-    /// Projects the bobs of planar modes into their planes; `x` as in [`MountedTank::contents`].
+    /// Projects direction and rate of the bobs of planar modes into their planes; `x` is as in [`MountedTank::contents`].
     pub fn flatten(&self, x: &mut [f64]) {
         for n in 0..self.tank.modes {
             let Some(b) = self.tank.plane_normal(n) else { continue };
@@ -357,15 +361,15 @@ impl MountedTank {
         }
     }
 
-    /// Returns true if a bob is where the inertia along its meridian is too small for the model; `x` and
-    /// `liquid` as in [`MountedTank::contents`].
+    /// Returns true if a bob is at an angle at which its inertia is too small for the model. `x` and `liquid`
+    /// are as in [`MountedTank::contents`].
     #[inline(never)]
     pub fn is_beyond(&self, x: &[f64], liquid: f64) -> bool {
         (0..MODES).any(|n| self.least_inertia(n, x, liquid) < LEAST_INERTIA)
     }
 
-    /// Returns the smaller inertia, along the meridian or across it, of the bob of mode `n`, which counts
-    /// from 0, relative to a pendulum's.
+    /// Returns the inertia of the bob of mode `n` (which counts from 0) along the meridian or across it, whichever is
+    /// smaller, divided by the inertia of a pendulum.
     fn least_inertia(&self, n: usize, x: &[f64], liquid: f64) -> f64 {
         let Some(mut surface) = self.surfaces[n] else { return 1.0 };
         if self.tank.fill.points > 0
@@ -377,9 +381,9 @@ impl MountedTank {
         surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
-    /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's number, which counts
-    /// from 1, or 0 if the system has only one tank. The bound has a slack of 1e-6, because a step that cannot pass the bound
-    /// ends just before it.
+    /// Returns an error if a bob is at an angle at which its inertia along the meridian is too small for the model. `tank`
+    /// is the tank's number for the message; it counts from 1, and is 0 if the system has only one tank. The limit has a
+    /// tolerance of 1e-6, because a step that cannot pass the limit ends just before it.
     pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
         let is_near = |n: &usize| self.least_inertia(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
@@ -407,8 +411,8 @@ impl<T: Number> Swing<T> {
         add(add(a, cross(w_d, self.rho)), self.known)
     }
 
-    /// Returns force and torque about O on the craft under [a; w'], without the guide of a pendulum in a
-    /// plane.
+    /// Returns the force of the bob on the craft and its torque about O for the accelerations [a; w']. The force that guides
+    /// a pendulum in a plane is not included.
     fn wrench(&self, a: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         match &self.surface {
             Some(surface) => {
@@ -425,7 +429,7 @@ impl<T: Number> Swing<T> {
         }
     }
 
-    /// Returns the force of [`Swing::wrench`].
+    /// Returns the force of the bob on the craft, as in [`Swing::wrench`].
     fn pull(&self, a: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
         if self.surface.is_some() {
             return self.wrench(a, w_d)[0];
@@ -461,7 +465,7 @@ impl<T: Number> OnSurface<T> {
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
     }
 
-    /// Returns the angular momentum about the axis that rotary motion has in addition to the bob's, over m.
+    /// Returns, divided by m, the angular momentum about the tank's axis that the bob has in addition to a point mass.
     fn spin(&self) -> Option<Vec3<T>> {
         Some(scale(self.rotary.as_ref()?.spin(), self.e))
     }
@@ -483,8 +487,8 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// Evaluates new contents in place, without copies of them; see [`MountedTank::contents`] and
-    /// [`MountedTank::filling`] for the arguments.
+    /// Evaluates new contents in place, so that they are not copied. The arguments are explained at
+    /// [`MountedTank::contents`] and [`MountedTank::filling`].
     pub fn evaluate(
         &mut self,
         x: &[T],
@@ -499,8 +503,7 @@ impl<T: Number> Contents<'_, T> {
         let c = T::constant;
         let flow = if drains { flow } else { c(0.0) };
         let slope = if drains { slope } else { 0.0 };
-        // Converts derivatives by the mass of liquid to derivatives by time, with m' = -f, m'' =
-        // -f'.
+        // Converts derivatives by the mass of liquid to derivatives by time, with m' = -f and m'' = -f'.
         let follow = |[value, first, second]: Jet<T>| -> Jet<T> {
             [value, -(first * flow), second * flow * flow - first * slope]
         };
@@ -510,11 +513,11 @@ impl<T: Number> Contents<'_, T> {
         let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
         let axes: Mat3<T> = axes.map(constant);
         let zero = constant::<T>([0.0; 3]);
-        // The specific force along the tank's axis is e.a + axial.r at a point r.
+        // The specific force along the tank's axis at a point r is e.a + axial.r.
         let w_e = dot(e, w);
         let axial = add(cross(e, w_d), sub(scale(w_e, w), scale(dot(w, w), e)));
         let at_origin = dot(e, a);
-        // Sums of m' l p_perp and of b m' l p_perp, with their derivatives; sum of m' b and its derivative.
+        // Sums over the modes: of m' l p_perp and of b m' l p_perp with their derivatives, and of m' b with its derivative.
         let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
         let mut sinking = [c(0.0); 2];
         let mut turning = [c(0.0); 2];
@@ -573,7 +576,7 @@ impl<T: Number> Contents<'_, T> {
             let turned = cross(hinge, p);
             let mut centring = l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k);
             let (mut end_rate, mut centring_d) = (zero, c(0.0));
-            // Flow out of the bob.
+            // Mass flow out of the bob.
             if drains {
                 let height_d = dot(e, p_d);
                 let p_perp_d = sub(p_d, scale(height_d, e));
@@ -662,8 +665,8 @@ impl<T: Number> Contents<'_, T> {
         ];
     }
 
-    /// Adds the inertia of the bobs to the lower triangle of the craft's mass matrix: m u u^T along each rod, and for planar
-    /// modes also perpendicular to the plane of the mode.
+    /// Adds the inertia of the bobs to the lower triangle of the craft's mass matrix: m u u^T along each rod. A planar mode
+    /// also has inertia perpendicular to its plane.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
             if let Some(surface) = &bob.surface {
@@ -699,7 +702,7 @@ impl<T: Number> Contents<'_, T> {
         pendulums.map(|(bob, b)| (bob, constant(b)))
     }
 
-    /// Adds the guiding forces of planar modes under [a; w'] to a force and torque.
+    /// Adds the forces that guide planar modes, and their torques about O, for the accelerations [a; w'] to `sum`.
     #[inline(never)]
     fn add_guides(&self, sum: [Vec3<T>; 2], [a, w_d]: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let guides = self.planar().map(|(bob, b)| {
@@ -710,13 +713,14 @@ impl<T: Number> Contents<'_, T> {
         guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
     }
 
-    /// Returns the derivative of the angular momentum of the liquid's spin (tank axes), the energy of the spin (J) and
-    /// its rate (rad/s). `None` if the spin is not modelled.
+    /// Returns the derivative of the angular momentum of the liquid's spin (tank axes), and the energy (J) and the rate
+    /// (rad/s) of the spin. `None` if the spin is not modelled.
     pub fn spin(&self) -> Option<(Vec3<T>, [T; 2])> {
         self.spin.as_ref().map(|now| (now.rate, [now.energy, now.turning[0]]))
     }
 
-    /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's inertia.
+    /// Returns the force of the liquid on the craft and its torque about O if a = w' = 0, without those of the rigid
+    /// liquid's inertia.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(Swing::load);
         let sum =
@@ -738,8 +742,8 @@ impl<T: Number> Contents<'_, T> {
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 
-    /// Returns the power drained', W, with which the outflow takes energy from the system, at the velocity `v` of O. On
-    /// a pivot the energy contains the potential a.S, and `v` is 0.
+    /// Returns the power drained', W, that the outflow takes from the system if O has the velocity `v`. For a craft on a
+    /// pivot `v` is 0, and the energy includes the potential energy a.S of gravity.
     pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
         let half = 0.5;
         let (m_0_d, [s_d, turning]) = self.shrinking;
@@ -764,8 +768,8 @@ impl<T: Number> Contents<'_, T> {
     }
 }
 
-/// The outflow of a tank over one step. `at` is the index of the mass of liquid among the states; `tank` is
-/// the tank's number, which counts from 1, or 0 if the system has only one.
+/// The outflow of a tank over one step. `at` is the index of the mass of liquid in the state vector; `tank` is the tank's
+/// number, which counts from 1, or 0 if the system has only one tank.
 #[derive(Clone, Copy)]
 pub struct Outflow<'a> {
     pub mounted: &'a MountedTank,
@@ -779,7 +783,7 @@ impl Outflow<'_> {
         liquid - self.flow.integral(t)
     }
 
-    /// Refuses a flow that the liquid cannot sustain for `h` seconds.
+    /// Returns an error if the flow over the next `h` seconds would empty or overfill the tank.
     pub fn check(&self, liquid: f64, h: f64) -> Result<(), StepError> {
         let Outflow { mounted, flow, tank, .. } = *self;
         let [Some(low), Some(high)] =
@@ -787,7 +791,7 @@ impl Outflow<'_> {
         else {
             return Ok(());
         };
-        // Check where the flow reverses, and at the end.
+        // Checks the mass where the flow reverses, and at the end of the step.
         let turns = flow.value * flow.slope < 0.0 && flow.value.abs() < flow.slope.abs() * h;
         let turn = if turns { -flow.value / flow.slope } else { h };
         for t in [turn, h] {
@@ -797,15 +801,14 @@ impl Outflow<'_> {
             if !(low - slack..=high + slack).contains(&liquid) {
                 let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
                 return Err(StepError::Model(format!(
-                    "mass_flow{index} would leave {liquid} kg in tank{index} (allowed: {low} to {high} kg, \
-                     the ends of its table fill.liquid)"
+                    "mass_flow{index} would change the liquid in tank{index} to {liquid} kg (allowed: {low} to {high} kg, the ends of \n                     tank{index}.fill.liquid)"
                 )));
             }
         }
         Ok(())
     }
 
-    /// Returns the first time after `t`, but at most `h`, at which the tank passes a point of its table.
+    /// Returns the first time after `t`, but at most `h`, at which the mass of liquid passes a point of the fill table.
     fn next_point(&self, liquid: f64, t: f64, h: f64) -> f64 {
         let (flow, mut next) = (self.flow, h);
         for point in self.mounted.tank.fill.masses() {
@@ -813,13 +816,12 @@ impl Outflow<'_> {
             let gone = liquid - point;
             let square = flow.value * flow.value + 2.0 * flow.slope * gone;
             if square < 0.0 {
-                continue; // the flow turns before
+                continue; // the flow reverses before the mass reaches the point
             }
             let root = libm::sqrt(square);
             let sum = flow.value + if flow.value < 0.0 { -root } else { root };
             for (over, under) in [(2.0 * gone, sum), (-sum, flow.slope)] {
-                // Skips a point that is not reached, also if the division would overflow to a time
-                // after h.
+                // Skips a point that is not reached before `h`, without a division that could overflow.
                 if over.abs() >= under.abs() * h {
                     continue;
                 }
@@ -838,11 +840,11 @@ pub trait Drains<const D: usize>: System<D> + Sized {
 
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;
 
-    /// Refuses bobs beyond the bounds of their surfaces.
+    /// Returns an error if a bob is beyond the largest slosh angle of its surface.
     fn check_surfaces(&self, x: &[f64; D]) -> Result<(), StepError>;
 
-    /// Advances the states by `h` from the time `begin`, in stretches that end where a tank passes a point of
-    /// its table.
+    /// Advances the states by `h`. `begin` is the simulation time at the start, s, for messages. The solver ends a stretch
+    /// where the mass of liquid passes a point of a fill table, because the derivatives jump there.
     fn advance(
         &self,
         x: &mut [f64; D],
@@ -858,7 +860,7 @@ pub trait Drains<const D: usize>: System<D> + Sized {
         while t < h {
             let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
             let done = runge_kutta::advance(self, x, (t, end), limits.tolerance, &mut pace);
-            // A step that cannot pass the bound of a surface ends just before it.
+            // A step that cannot pass the largest angle of a surface ends just before this angle.
             self.check_surfaces(x)?;
             done.map_err(|why| why.delayed(begin))?;
             self.normalise(x, end);
@@ -871,7 +873,7 @@ pub trait Drains<const D: usize>: System<D> + Sized {
     }
 }
 
-/// Normalises directions and rates of bobs, from the first to the last index of the states.
+/// Normalises the directions of bobs and makes their rates perpendicular to the directions; `x` has six states for each bob.
 pub fn normalise_bobs(x: &mut [f64]) {
     for bob in x.chunks_exact_mut(6) {
         let [p, p_d] = on_sphere(vector_from(bob, 0), vector_from(bob, 3));
@@ -904,18 +906,18 @@ mod tests {
             assert_eq!(passes(sign, sign, 0.0, liquid), 1.0);
             assert_eq!(passes(sign, sign, 1.0, liquid), 10.0);
         }
-        // a constant flow drains 1.5 kg in 0.75 s, a closed outlet nothing
+        // A constant flow of 2 kg/s drains 1.5 kg in 0.75 s; a closed outlet drains nothing.
         assert_eq!(passes(2.0, 0.0, 0.0, 101.5), 0.75);
         assert_eq!(passes(-2.0, 0.0, 0.0, 98.5), 0.75);
         assert_eq!(passes(0.0, 0.0, 0.0, 101.5), 10.0);
-        // 4 t - t^2 = 3, too
+        // Here the time follows from 4 t - t^2 = 3.
         assert_eq!(passes(4.0, -2.0, 0.0, 103.0), 1.0);
         assert_eq!(passes(4.0, -2.0, 1.0, 103.0), 3.0);
     }
 
-    /// Liquid may be at the ends of its table, to rounding, and may flow while it stays between them. A flow
-    /// of 1 - t kg/s has drained half a kilogram when it reverses after a second, and has returned 4 kg after
-    /// 4 s.
+    /// The mass of liquid may be at the ends of its table, to rounding, and the flow is accepted while the mass
+    /// stays between them. A flow of 1 - t kg/s reverses after 1 s, when half a kilogram has drained, and has
+    /// returned 4 kg after 4 s.
     #[test]
     fn a_tank_drains_as_long_as_the_liquid_is_within_its_fill_table() {
         let tank = Tank::default();
@@ -939,7 +941,7 @@ mod tests {
         }
         for h in [0.5, 4.0] {
             assert!(goes_on(1.0, -1.0, 100.6, h) && goes_on(-1.0, 1.0, 999.4, h));
-            // 0.375 kg have drained after 0.5 s, the maximum is after 1 s
+            // 0.375 kg have drained after 0.5 s; the largest drained mass is reached after 1 s.
             assert_eq!(goes_on(1.0, -1.0, 100.4, h), h < 1.0);
             assert_eq!(goes_on(-1.0, 1.0, 999.6, h), h < 1.0);
         }

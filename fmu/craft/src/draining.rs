@@ -1,14 +1,15 @@
-//! A craft with tanks that drain, have planar modes, other modes than pendulums (`surface.rs`) or liquid that spins (`spin.rs`),
-//! each with its contents from `contents.rs`. Outputs and derivatives of such a craft are computed with these equations. If a
-//! tank drains, its steps are computed with them as well; otherwise `motion.rs` computes the steps.
+//! Equations of a craft with tanks that drain, have planar modes, have modes that are not pendulums (`surface.rs`) or have
+//! liquid that spins (`spin.rs`). The contents of each tank are from `contents.rs`. All outputs and derivatives of this
+//! craft are computed with these equations, and so are the steps if a tank drains; otherwise `motion.rs` computes the steps.
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of force ; tau - h_w' - w x (I w + h_w) + sum of torque ]
 //! M = M_R + sum of m u u^T
 //! ```
 //!
-//! as in `motion.rs`, with the loads of the flow within the tanks. A jump of a flow changes the momenta K and L of the flow
-//! within the tank by an impulse. The equations above give this impulse if only the flow's slope acts.
+//! The symbols are as in `motion.rs`; force and torque include those of the flow within the tanks. If a mass flow jumps, the
+//! momenta K and L of the flow within the tank change by an impulse. The equations above give this impulse if the slope of
+//! the flow is their only load.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -34,8 +35,8 @@ use crate::spin::SpinNow;
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
 use crate::table::Filling;
 
-/// Inputs of the craft at an instant, generic over the number type: force at O, torque minus the torque on the wheels
-/// (tau - h_w'), angular momentum of the wheels, and outflow of each tank with its slope.
+/// Inputs of the craft at an instant, generic over the number type: force at O, torque minus the torque on the wheels (tau -
+/// h_w'), angular momentum of the wheels, and outflow of each tank with the slope of the outflow.
 pub struct Acting<T> {
     pub force: Vec3<T>,
     pub torque: Vec3<T>,
@@ -65,7 +66,7 @@ impl Acting<f64> {
 }
 
 impl Acting<Dual> {
-    /// Returns the inputs with their derivatives in the direction `du`.
+    /// Returns the inputs as dual numbers, whose derivatives are the elements of `du`.
     pub fn with_directions(inputs: &Inputs, du: &[f64; INPUTS]) -> Acting<Dual> {
         let now = Acting::from_inputs(inputs, 0.0);
         let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::with_slope(x[i], du[at + i]));
@@ -78,8 +79,9 @@ impl Acting<Dual> {
         }
     }
 }
-/// A craft with at least one tank that can drain, or with planar modes, other modes than pendulums, or liquid that spins.
-/// `follows` is true if any drag depends on acceleration or amplitude; `moving` are the ranges of the states in use.
+/// A craft with at least one tank that can drain, or with planar modes, modes that are not pendulums, or liquid that
+/// spins. `follows` is true if any drag depends on acceleration or amplitude; `moving` are the index ranges of the states
+/// that this craft uses.
 #[derive(Clone, Debug)]
 pub struct Draining {
     craft: Rigid,
@@ -92,8 +94,8 @@ pub struct Draining {
     moving: Vec<Range<usize>>,
 }
 
-/// The craft at an instant, with its equations solved. `velocity` is the velocity of O, body axes; `by_pivot` is the power, W,
-/// that a pivot with a torque dissipates.
+/// Motion of the craft at an instant, with the accelerations that solve its equations. `velocity` is the velocity of O, body
+/// axes; `by_pivot` is the power, W, that stiffness, damping and friction of a pivot dissipate.
 struct Instant<T> {
     q: Quaternion<T>,
     axes: Mat3<T>,
@@ -105,14 +107,14 @@ struct Instant<T> {
     deformed: Option<Deformed<T>>,
 }
 
-/// A craft during one step.
+/// A craft under given inputs during one step, as a system of differential equations for the solver.
 pub struct Run<'a> {
     pub craft: &'a Draining,
     pub inputs: &'a Inputs,
 }
 
-/// Returns the scales of all states for error control: 1 for attitude and directions, and the given scales for rate, position,
-/// velocity, the bobs' rates, and the appendages' displacements and rates.
+/// Returns the scales to which the allowed errors of all states are relative: 1 for attitude and directions, `turn` for the
+/// angular velocity, `swing` for the bobs' rates, `flexing` for displacement and rate of the appendages.
 fn scales(
     turn: f64,
     position: f64,
@@ -120,7 +122,7 @@ fn scales(
     swing: impl Fn(usize) -> f64,
     flexing: [f64; 2],
 ) -> [f64; STATES] {
-    // Work, energies and liquid follow from the other states.
+    // Work, energies and masses of liquid follow from the states with finite scales.
     let mut scale = [f64::INFINITY; STATES];
     scale[..index::OMEGA].fill(1.0);
     scale[index::OMEGA..index::POSITION].fill(turn);
@@ -176,7 +178,8 @@ impl System<STATES> for Run<'_> {
     }
 }
 
-/// Iterates over the tanks whose liquid spins: their numbers, which count from 0, and the inertias of their liquids.
+/// Iterates over the tanks whose liquid spins: the number of each tank, which counts from 0, and the moments of
+/// inertia of its liquid.
 fn tanks_with_spin(tanks: &[MountedTank]) -> impl Iterator<Item = (usize, Vec3)> + Clone {
     let tanks = tanks.iter().enumerate();
     tanks.filter_map(|(i, mounted)| Some((i, mounted.tank.spin_inertias()?)))
@@ -203,8 +206,8 @@ impl Drains<STATES> for Run<'_> {
 }
 
 impl Draining {
-    /// Creates the equations; `None` if all tanks keep their liquid, which does not spin, and have pendulums that
-    /// swing in every direction.
+    /// Creates the equations. Returns `None` if no tank needs them: no tank drains or has spinning liquid, and all modes are
+    /// pendulums that swing in every direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         if !tanks.iter().any(Tank::has_contents) {
@@ -254,14 +257,15 @@ impl Draining {
         })
     }
 
-    /// Refuses masses of liquid outside their tables, bobs beyond the bounds of their surfaces, and appendages
-    /// beyond their linear model.
+    /// Returns an error if a mass of liquid is outside its fill table, a bob is beyond the largest angle of its surface, or
+    /// the deflection of an appendage is beyond its linear model.
     pub fn check(&self, x: &[f64; STATES]) -> Result<(), StepError> {
         self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))?;
         self.check_surfaces(x)
     }
 
-    /// Iterates over the tanks with surfaces other than spheres, with their numbers, which count from 0.
+    /// Iterates over the tanks in which a bob moves on a surface that is not a sphere, with the number of each tank,
+    /// which counts from 0.
     fn curved(&self) -> impl Iterator<Item = (usize, &MountedTank)> {
         self.tanks.iter().enumerate().filter(|(_, mounted)| mounted.is_curved())
     }
@@ -281,8 +285,8 @@ impl Draining {
         })
     }
 
-    /// Applies a change of the flows to `flow`. Where a flow jumps, the momentum of the flow within the tank
-    /// jumps by an impulse, and its change of energy counts as drained. Returns true if a flow jumps.
+    /// Changes the mass flows to `flow`. If a flow jumps, the flow within the tank gives an impulse to craft and liquid, and
+    /// the resulting change of the energy is added to the drained energy. Returns true if a flow jumps.
     pub fn set_flow(&self, state: &mut State, flow: &[Line; TANKS]) -> bool {
         let now = flow.map(|flow| flow.value);
         if now == state.flow {
@@ -290,7 +294,7 @@ impl Draining {
         }
         let before = self.energy(state);
         let jump = core::array::from_fn(|i| now[i] - state.flow[i]);
-        // Rates are linear in the slopes.
+        // The accelerations are linear in the slopes of the flows.
         let [with, without] =
             [jump, [0.0; TANKS]].map(|slope| self.rates(&state.x, &Acting::flowing(now, slope)));
         let x = &mut state.x;
@@ -312,8 +316,9 @@ impl Draining {
         true
     }
 
-    /// Adds to the drained energy the work of the wheels' impulse that has changed the state from `before`. If liquid flows, the
-    /// impulse also does work on the moving ends of the rods, as the tension T does in drained' (`contents.rs`).
+    /// Completes the energy balance after an impulse of the wheels has changed the state from `before` to `state`: if liquid
+    /// flows, this impulse also does work on the moving ends of the rods, as the tension T does in drained' (`contents.rs`).
+    /// This work is added to the drained energy.
     pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
         if state.flow != [0.0; TANKS] {
             let work = state.x[index::WORK] - before.x[index::WORK];
@@ -326,12 +331,14 @@ impl Draining {
         self.evaluate(&state.x, &acting).outputs(&state.x, |_| None).energy
     }
 
-    /// Returns the acceleration a of a craft on a pivot, where only gravity acts on it.
+    /// Returns the specific force a at the pivot, which is minus gravity in body axes, because the pivot does not
+    /// accelerate.
     fn held_acceleration<T: Number>(&self, axes: &Mat3<T>) -> Vec3<T> {
         transposed_times(axes, constant(self.gravity)).map(|x| -x)
     }
 
-    /// Solves the equations of motion, of whose `matrix` only the lower triangle is read, for [a; w'].
+    /// Solves the equations of motion for [a; w'], with a given by gravity if the craft is on a pivot. Only the lower
+    /// triangle of `matrix` is read.
     fn solve<T: Number>(
         &self,
         matrix: &Mat6<T>,
@@ -362,8 +369,8 @@ impl Draining {
         })
     }
 
-    /// Returns [a; w'] of craft and liquids at rest as one rigid body, if any drag depends on it
-    /// (`damping.rs`).
+    /// Returns the accelerations [a; w'] of craft and liquids at rest as one rigid body. If no drag depends on
+    /// them (`damping.rs`), returns 0.
     fn rigid_motion<T: Number>(
         &self,
         x: &[T; STATES],
@@ -386,7 +393,7 @@ impl Draining {
         if self.mount == Mount::Pivot {
             return self.solve(&whole.mass_matrix(), [force, torque], axes);
         }
-        // About the centre of mass c translation and rotation are independent.
+        // Translation and rotation are independent about the centre of mass c.
         let inverse = whole.mass.at_least(SMALLEST_DIVISOR).recip();
         let c = scale(inverse, whole.moment);
         let parallel = dot(c, whole.moment);
@@ -469,7 +476,7 @@ impl Draining {
         rate
     }
 
-    /// Writes the rates of all states that move; the others stay as they are.
+    /// Writes the derivatives of all states that this craft uses into `rate`; the other elements of `rate` are not changed.
     fn write_rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>, rate: &mut [T; STATES]) {
         let mut contents: [Option<Contents<'_, T>>; TANKS] = core::array::from_fn(|_| None);
         let Instant { q, axes, velocity, w, a, w_d, by_pivot, deformed } =
@@ -479,7 +486,7 @@ impl Draining {
         let mut put = |at: usize, numbers: &[T]| {
             rate[at..at + numbers.len()].copy_from_slice(numbers);
         };
-        // q o (0, w)/2
+        // This is the derivative q o (0, w)/2 of the attitude.
         let v = [q[1], q[2], q[3]];
         let turned = add(scale(q[0], w), cross(v, w)).map(|x| x * 0.5);
         put(index::Q, &[dot(v, w) * -0.5, turned[0], turned[1], turned[2]]);
@@ -515,8 +522,7 @@ impl Draining {
         put(index::DRAINED, &[drained]);
     }
 
-    /// Returns everything from which the outputs are computed, for the states x under the acting forces and
-    /// flows.
+    /// Returns all quantities from which the outputs are computed, for the states `x`, forces and flows.
     pub fn evaluate<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> Now<T> {
         let mut contents: [Option<Contents<'_, T>>; TANKS] = core::array::from_fn(|_| None);
         let Instant { axes, velocity, w, a, w_d, deformed, .. } =
@@ -595,8 +601,8 @@ mod tests {
         }
     }
 
-    /// Returns a craft with one to three draining tanks with slosh, rotated and off the axis. It starts at
-    /// rest at the origin, so position and velocity begin at 0.
+    /// Returns the parameters and inputs of a craft with one to three draining tanks, rotated and off the craft's axis, with
+    /// slosh. The craft is at rest at the origin at first.
     fn draining_craft(seed: u64) -> (Parameters, Inputs) {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut size = |size: f64| size * (2.0 * rng.f64() - 1.0);
@@ -606,12 +612,12 @@ mod tests {
             tank.position = [size(0.6), size(0.6), size(0.4)];
             tank.q = [1.0, size(0.1), size(0.1), size(0.3)];
             tank.modes = (seed as usize + i) % 4;
-            // All laws, and drag that grows with the amplitude.
+            // All damping laws occur, and drag that grows with the amplitude.
             tank.damping_law = DampingLaw::ALL[(seed as usize + i + 1) % 3];
             tank.zeta_amplitude = [0.02 * (seed % 2) as f64; MODES];
             tank.fill.points = crate::POINTS;
             tank.p_0 = [(); MODES].map(|()| [size(0.2), size(0.2), -1.0]);
-            // 382 kg in the tank, of which 52 to 232 kg flow out in 30 s, past two to five points of its table.
+            // The tank contains 382 kg, of which 52 to 232 kg flow out in 30 s, past two to five points of the fill table.
             mass_flow[i] = Line { value: 4.5 + size(2.0), slope: size(0.05) };
         }
         let mut ramp = |value: f64, slope: f64| Ramp {
@@ -633,7 +639,7 @@ mod tests {
         }
     }
 
-    /// Runs 30 s in steps of `h`. Returns the states at the end and the number of evaluations.
+    /// Simulates 30 s in steps of `h`. Returns the states at the end and the number of evaluations of the right-hand side.
     fn run(p: &Parameters, u: &Inputs, h: f64, tolerance: f64) -> ([f64; STATES], usize) {
         let mut x = Spacecraft::new(p, u, 0.0, tolerance).unwrap().continuous_states();
         let (craft, evaluations) = (Draining::new(p).unwrap(), Cell::new(0));
@@ -647,8 +653,8 @@ mod tests {
         (x, evaluations.get())
     }
 
-    /// Asserts that long and short steps of a craft end in the same state, and that long steps take at most
-    /// twice the work.
+    /// Asserts that a craft ends in the same state after steps of 0.02, 1, 5 and 30 s, and that longer steps need at most
+    /// twice as many evaluations in total as steps of 0.02 s.
     fn compare_lengths_of_steps(seed: u64, tolerances: &[f64]) {
         let (p, u) = draining_craft(seed);
         let (exact, _) = run(&p, &u, 1.0, 1e-14);
@@ -658,8 +664,8 @@ mod tests {
             for (x, evaluations) in core::iter::once(&pieces).chain(&longer) {
                 let most = 2 * pieces.1;
                 assert!(*evaluations <= most, "{seed} {tolerance}: {evaluations} {most}");
-                // Scales are 1 rad, 1 rad/s, 600 m and 40 m/s. Errors and rounding grow while the liquid swings for 30
-                // s.
+                // The scales are 1 rad, 1 rad/s, 600 m and 40 m/s. Errors and rounding grow while the liquid
+                // swings for 30 s.
                 let allowed = scales(1.0, 600.0, 40.0, |_| 1.0, [1.0; 2])
                     .map(|size| size * (30.0 * tolerance + 1e-10));
                 for i in 0..STATES {
@@ -670,16 +676,17 @@ mod tests {
         }
     }
 
-    /// One long step of a draining craft gives the same motion as many short steps, and takes at most twice the work
-    /// of one step. A single craft is tested at every tolerance; rounding limits the smallest tolerance.
+    /// Steps of 1, 5 and 30 s give the same motion of a draining craft as steps of 0.02 s and need at most twice
+    /// as many evaluations. To save time, each craft is tested at one or two tolerances; below 1e-12 rounding
+    /// would exceed the tolerance.
     #[test]
     fn a_long_step_of_a_draining_craft_equals_short_steps_at_most_twice_as_costly() {
         compare_lengths_of_steps(1, &[1e-6]);
         compare_lengths_of_steps(2, &[1e-8, 1e-12]);
     }
 
-    /// Sixteen random draining craft: one long step gives the same motion as many short steps, within the tolerance
-    /// of the solver.
+    /// Steps of 1, 5 and 30 s give the same motion of sixteen random draining craft as steps of 0.02 s, within the
+    /// tolerance of the solver.
     #[test]
     #[ignore = "minutes: .ci/run --nightly"]
     fn long_steps_of_draining_craft_equal_short_steps_at_every_tolerance() {

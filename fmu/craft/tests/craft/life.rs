@@ -587,7 +587,8 @@ fn an_impossible_outflow_is_refused() {
         u.mass_flow = flow(value);
         u.mass_flow[0].slope = -value / 2.0;
         let message = craft.step(&u, 4.0).unwrap_err().to_string();
-        let wanted = format!("mass_flow[1] would leave {} kg in tank[1]", 15.0 - missing);
+        let wanted =
+            format!("mass_flow[1] would change the liquid in tank[1] to {} kg", 15.0 - missing);
         assert!(message.contains(&wanted), "{message}");
     }
     // Of a tank alone there is one.
@@ -595,7 +596,10 @@ fn an_impossible_outflow_is_refused() {
     let of_tank = craft::TankInputs { mass_flow: flow(6.0)[0], ..craft::TankInputs::default() };
     let mut tank = super::component::SloshTank::new(&alone, &of_tank, 0.0, 1e-9).unwrap();
     let message = tank.step(&of_tank, 1.0).unwrap_err().to_string();
-    assert!(message.contains("mass_flow would leave 9 kg in tank (allowed"), "{message}");
+    assert!(
+        message.contains("mass_flow would change the liquid in tank to 9 kg (allowed"),
+        "{message}"
+    );
     u.mass_flow = flow(4.5);
     u.mass_flow[0].slope = -2.25;
     craft.step(&u, 4.0).unwrap();
