@@ -801,7 +801,8 @@ impl Outflow<'_> {
             if !(low - slack..=high + slack).contains(&liquid) {
                 let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
                 return Err(StepError::Model(format!(
-                    "mass_flow{index} would change the liquid in tank{index} to {liquid} kg (allowed: {low} to {high} kg, the ends of \n                     tank{index}.fill.liquid)"
+                    "mass_flow{index} would change the liquid in tank{index} to {liquid} kg (allowed: {low} to {high} kg, \
+                     the ends of tank{index}.fill.liquid)"
                 )));
             }
         }
