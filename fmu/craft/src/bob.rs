@@ -1,5 +1,5 @@
-//! One slosh mode: a bob at the end of a rod that can swing about a hinge on the tank's axis in
-//! every direction, also upwards.
+//! One slosh mode that is a pendulum: a bob (slosh mass) at the end of a rod, which can swing about a hinge on the tank's
+//! axis in every direction, also upwards.
 //!
 //! ```text
 //! m  mass, l  length, e  the tank's axis, P  the hinge from O, p  unit vector from hinge to bob
@@ -9,9 +9,9 @@
 //! T  tension of the rod, > 0 when it pulls the bob to the hinge
 //! ```
 //!
-//! The motion is expanded in p and in v = p' + w x p, the bob's velocity relative to the hinge over
-//! l in inertial axes. In these variables Newton's law is a polynomial, and w' occurs only at the
-//! hinge:
+//! The motion is expanded in p and in v = p' + w x p, the bob's velocity relative to the hinge divided by l, both
+//! relative to inertial axes. In these variables Newton's law is a polynomial, and w' occurs only in B, the specific
+//! force at the hinge:
 //!
 //! ```text
 //! p' = v - w x p
@@ -19,15 +19,15 @@
 //! T  = m (l |v|^2 - p.B) - k l |p_perp|^2                        (keeps |p| = 1 and p.v = 0)
 //! ```
 //!
-//! The bob loads the craft with T p at the hinge and with phi = c l p' + k l p_perp at the bob, the
-//! reaction of drag and centring:
+//! The bob acts on the craft with T p at the hinge and with phi = c l p' + k l p_perp at the bob, the reaction
+//! of drag and centring:
 //!
 //! ```text
 //! F = T p + phi,   moment about O = P x F + l p x phi
 //! ```
 //!
-//! Source: Newton's second law with the constraint eliminated. All vectors are in body axes.
-//! An independent formulation in p'' checks it (tests/craft/independent.rs).
+//! Source: Newton's second law, from which the tension as the constraint force is eliminated. All vectors are in body axes.
+//! tests/craft/independent.rs checks the equations against an independent formulation in p''.
 
 use taylor::number::Number;
 use taylor::series::{self, Series, ZERO};
@@ -40,9 +40,9 @@ use taylor::vector::{
 use crate::damping::Drag;
 use crate::parameters::Tank;
 
-/// Values of one bob for the outputs, body axes: position `rho` from O and velocity relative to the tank, hinge from O and
-/// direction of the tank's axis, and p in tank axes. `centring` is the energy of the centring stiffness, J; `spin` is the angular
-/// momentum that a bob has in addition to the angular momentum of a point mass; `None` if it has no such part.
+/// Values of one bob for the outputs, body axes: position `rho` from O and velocity relative to the tank, hinge from O,
+/// direction of the tank's axis, and p in tank axes. `centring` is the energy of the centring stiffness, J. `spin` is the
+/// angular momentum that the bob has in addition to a point mass; `None` if it has none.
 pub(crate) struct BobNow<T> {
     pub m: T,
     pub rho: Vec3<T>,
@@ -55,10 +55,9 @@ pub(crate) struct BobNow<T> {
     pub spin: Option<Vec3<T>>,
 }
 
-/// One bob that is a pendulum: its parameters and the power series of its motion, in body axes. `tank` and
-/// `mode` count from 0. `follows` is true if c depends on acceleration or amplitude; the series of c and c p'
-/// are then in use. The fields after the series are the terms of the current order that do not depend on [a;
-/// w'] of this order.
+/// One bob that is a pendulum: its parameters and the power series of its motion, in body axes. `tank` and `mode` count from
+/// 0. `follows` is true if the drag coefficient c depends on acceleration or amplitude, so that c and c p' are power series.
+/// The fields after the series are the terms of the current order that do not depend on [a; w'] of this order.
 #[derive(Clone, Debug)]
 pub struct Bob {
     pub tank: usize,
@@ -135,8 +134,8 @@ impl Bob {
         }
     }
 
-    /// Starts an expansion at the bob's direction and rate `x` (tank axes, six numbers), which are
-    /// normalised first. The craft rotates with the angular velocity `w`.
+    /// Starts an expansion at the bob's direction and rate `x` (six numbers in tank axes), which are normalised first, while
+    /// the craft rotates with the angular velocity `w`.
     #[inline(always)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let p = times(&self.axes, [x[0], x[1], x[2]]);
@@ -147,8 +146,8 @@ impl Bob {
         self.both.set(0, p, self.v[0]);
     }
 
-    /// Sets coefficient 1 of direction and velocity to their derivatives along `dx` (of the six numbers `x`)
-    /// and `dw` (of the angular velocity).
+    /// Sets coefficient 1 of direction and velocity to their derivatives for a change of the bob's states by `dx` and of the
+    /// angular velocity by `dw`, for directional derivatives.
     pub fn seed_direction(&mut self, x: &[f64; 6], dx: &[f64; 6], w: Vec3, dw: Vec3) {
         let body = |x: &[f64], i: usize| times(&self.axes, [x[i], x[i + 1], x[i + 2]]);
         let [dp, dp_d] = on_sphere_slope(body(x, 0), body(x, 3), body(dx, 0), body(dx, 3));
@@ -157,11 +156,12 @@ impl Bob {
         self.both.set(1, dp, self.v[1]);
     }
 
-    /// Returns direction and rate at `t` after the start at `x` in tank axes, normalised, from the series up
-    /// to order n. `w` is the craft's angular velocity at that time.
+    /// Returns the bob's direction and rate, normalised, in tank axes, at the time `t` after the start of the expansion,
+    /// from the series up to order n. `x` are direction and rate at the start, and `w` is the craft's angular velocity
+    /// at the time `t`.
     ///
-    /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding, so that a rotation to body axes
-    /// and back would shear direction and rate by the same 1e-16 in every step.
+    /// Only the change since the start is rotated from body axes into tank axes. The rotation matrix is orthogonal only to
+    /// rounding, so that rotating the whole vector to body axes and back would distort it by the same 1e-16 in every step.
     #[inline(always)]
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let [p, v] = self.both.value(n, t);
@@ -218,8 +218,7 @@ impl Bob {
         [force, add(cross(self.hinge, force), scale(l, twist))]
     }
 
-    /// Sets coefficient N of the specific force along the tank's axis at the hinge, on which the drag
-    /// depends.
+    /// Sets coefficient N of the specific force at the hinge along the tank's axis, on which the drag depends.
     #[inline(always)]
     pub fn set_axial<const N: usize>(&mut self, x: f64) {
         self.drag.set_axial(N, x);
@@ -253,8 +252,8 @@ impl Bob {
         self.dragged[N] = space::scale::<N>(&self.drag.c, &self.p_d);
     }
 
-    /// Sets coefficient N of tension and drag and N + 1 of direction and velocity, from coefficient N of [a;
-    /// w'].
+    /// Sets coefficient N of tension and drag, and coefficient N + 1 of direction and velocity, from coefficient N of
+    /// the accelerations [a; w'].
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
@@ -290,8 +289,8 @@ impl Bob {
         }
     }
 
-    /// Returns the rates of the bob's six states in tank axes, or for N = 1 their derivatives along
-    /// the direction: p' of the bob's direction p, and p'' = v' - w' x p - w x p' of its rate.
+    /// Returns coefficient N of the derivatives of the bob's six states in tank axes: p' of the direction p, and p'' = v' -
+    /// w' x p - w x p' of the rate. After [`Bob::seed_direction`] coefficient 1 is the directional derivative.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
@@ -314,8 +313,8 @@ impl Bob {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error of the bob's velocity v, 1/s, that arises because the series of the drag end at order n. `h`
-    /// (s) is the time since the start of the expansion.
+    /// Returns the error, 1/s, of the bob's velocity v at the time `h`, s, after the start of the expansion that arises
+    /// because the series of the drag end at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -354,8 +353,8 @@ impl Bob {
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// Returns force and torque of the bob on the craft for the case that the accelerations a and w' are 0. The tension
-    /// of the rod is then T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
+    /// Returns the force of the bob on the craft and its torque about O if the accelerations a and w' are 0. The tension of
+    /// the rod is then T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));

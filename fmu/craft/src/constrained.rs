@@ -1,5 +1,5 @@
-//! Power series of a bob that does not move as a pendulum: either it lies on another surface than a sphere (`surface.rs`), or
-//! the tank guides it in a plane (`contents.rs`). The tank does not drain. The quantities of one bob are:
+//! Power series of a bob (slosh mass) that does not move as a pendulum: either the bob lies on another surface than a sphere
+//! (`surface.rs`), or the tank guides it in a plane (`contents.rs`). The tank does not drain. The quantities of one bob are:
 //!
 //! ```text
 //! r   position of the bob from its hinge P over l, tank axes, e = e_z: rho = P + l r,  r = p + (kappa - 1) u^2/8 e
@@ -35,8 +35,8 @@
 //!
 //! In liquid that spins at the rate W (`spin.rs`) P = T tau - (1 - C) W, and D gains epsilon W^2.
 //!
-//! sigma' and tau' = (q x r' + w_e u)' belong to the newest order. m is perpendicular to n and d, so that H gains T/(1 + T u) m
-//! m^T; the row [a; w'] of tau' has - l u e in addition (`surface.rs`).
+//! The accelerations sigma' and tau' = (q x r' + w_e u)' belong to the newest order. m is perpendicular to n and d, so that
+//! H gains T/(1 + T u) m m^T. The coefficients of [a; w'] in tau' contain - l u e in addition (`surface.rs`).
 //!
 //! Source: Lagrange's equations of the first kind for the energies in `surface.rs`. tests/craft/independent.rs checks
 //! them against Newton's law in other variables, exchange.rs against `contents.rs`.
@@ -57,12 +57,11 @@ use crate::parameters::Tank;
 use crate::rigid::{Mat6, add_rank_one, along_rod};
 use crate::surface::{self, Higher, LEAST_INERTIA, Surface};
 
-/// One bob that is guided in a plane or moves on another surface than a sphere: its parameters and the power
-/// series of its motion, in tank axes, with the symbols above. `tank` and `mode` count from 0. `follows` is
-/// true if c depends on acceleration or amplitude; the series of c and c r' are then in use. `across` is b of
-/// a planar mode, `coefficients` are s and kappa, and `highest` is the value of eta at which the model ends,
-/// if it does. The last fields are the terms of the current order that do not depend on [a; w'] of this
-/// order.
+/// One bob that is guided in a plane or moves on another surface than a sphere: its parameters and the power series of its
+/// motion, in tank axes, with the symbols of the module's head. `tank` and `mode` count from 0. `follows` is true if the
+/// drag coefficient c depends on acceleration or amplitude, so that c and c r' are power series. `across` is b of a planar
+/// mode, `coefficients` are s and kappa, and `highest` is the value of eta at which the model ends, if any. The last fields
+/// are the terms of the current order that do not depend on [a; w'] of this order.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstrainedBob {
     pub tank: usize,
@@ -110,8 +109,9 @@ pub(crate) struct ConstrainedBob {
     slope_at_end: Vec3,
 }
 
-/// Series of the terms beyond the third order and of liquid that spins at the rate W (`liquid`), with the symbols above;
-/// `known` are the terms of D, P' and tau' of the current order without the newest [a; w'].
+/// Power series of the terms beyond the third order and of liquid that spins at the rate W (`liquid`), with the symbols
+/// of the module's head. `known` are the terms of D, P' and tau' of the current order, without those that contain [a;
+/// w'] of this order.
 #[derive(Clone, Debug)]
 struct HigherSeries {
     by: Higher,
@@ -180,7 +180,7 @@ impl HigherSeries {
         self.turning[n] = w_e;
         // sigma = q.q', tau = q x q' + w_e u
         let (mut inwards, mut twist, mut relative) = ([0.0; 2], [0.0; 2], 0.0);
-        // of order n, and of order n + 1 without what [a; w'] of order n decides
+        // Terms of order n, and terms of order n + 1 without those that depend on [a; w'] of order n.
         for (k, last) in [n, n + 1].into_iter().enumerate() {
             for j in k..=last {
                 let (a, b) = (r[j], r_d[last - j]);
@@ -196,7 +196,8 @@ impl HigherSeries {
         }
         (self.sigma[n], self.tau[n]) = (inwards[0], twist[0]);
         self.turned[n] = relative;
-        // S sigma of order n + 1 and T tau of orders n and n + 1, without coefficient 0 of S and T
+        // S sigma of order n + 1, and T tau of orders n and n + 1; both without the products that contain coefficient 0
+        // of S or T.
         let (mut faster, mut swirls) = (0.0, [0.0; 2]);
         for j in 1..=n + 1 {
             faster += by.inertia * u[j] * self.sigma[n + 1 - j];
@@ -235,8 +236,7 @@ impl HigherSeries {
         ]
     }
 
-    /// Sets coefficient n of the rate of the bob that determines its drag. [`HigherSeries::expand`]
-    /// must have computed order n.
+    /// Sets coefficient n of the bob's rate that enters the drag. [`HigherSeries::expand`] must have computed order n.
     fn set_rate(&mut self, n: usize, r: &Vector, r_d: Vec3, u: &Series) {
         let (mut radial, mut tangential) = (0.0, 0.0);
         for j in 1..=n {
@@ -289,8 +289,8 @@ fn dot_from_1(n: usize, a: &Vector, b: &Vector) -> f64 {
     sum[0] + sum[1] + sum[2]
 }
 
-/// Returns coefficient n of the square of a vector's part across the tank's axis, the components
-/// with the indices 0 and 1.
+/// Returns coefficient n of the square of the part of `a` that is perpendicular to the tank's axis, the components with the
+/// indices 0 and 1.
 fn square_across(n: usize, a: &Vector) -> f64 {
     let mut sum = [0.0; 2];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
@@ -300,8 +300,8 @@ fn square_across(n: usize, a: &Vector) -> f64 {
 }
 
 impl ConstrainedBob {
-    /// Creates the bob of mode `mode` of tank number `index`, which both count from 0; `None` for a pendulum
-    /// that swings in every direction, which is a [`Bob`](crate::bob::Bob).
+    /// Creates the bob of mode `mode` of tank number `index`; both count from 0. Returns `None` for a pendulum that swings
+    /// in every direction, because [`Bob`](crate::bob::Bob) models it.
     pub fn new(tank: &Tank, index: usize, mode: usize) -> Option<ConstrainedBob> {
         let (surface, across) = (tank.surface(mode), tank.plane_normal(mode));
         if surface.is_none() && across.is_none() {
@@ -356,8 +356,8 @@ impl ConstrainedBob {
         })
     }
 
-    /// Starts an expansion at the bob's direction and rate `x` (tank axes, six numbers), which are
-    /// normalised first. The craft rotates with the angular velocity `w`.
+    /// Starts an expansion at the bob's direction and rate `x` (six numbers in tank axes), which are normalised first, while
+    /// the craft rotates with the angular velocity `w`.
     #[inline(never)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let [p, p_d] = self.projected([x[0], x[1], x[2]], [x[3], x[4], x[5]]);
@@ -483,7 +483,7 @@ impl ConstrainedBob {
             by_higher = higher.expand(n, w[2], &self.r, &self.r_d, &self.u);
             higher.set_rate(n, &self.r, self.r_d[n], &self.u);
         }
-        // f without the newest multipliers.
+        // f of the newest order, without the terms of the multipliers of this order.
         let mut f = if self.follows {
             self.set_drag(n);
             scale(1.0 / self.m, self.dragged[n])
@@ -662,8 +662,7 @@ impl ConstrainedBob {
         self.follows
     }
 
-    /// Sets coefficient n of the specific force along the tank's axis at the hinge, on which the drag
-    /// depends.
+    /// Sets coefficient n of the specific force at the hinge along the tank's axis, on which the drag depends.
     pub fn set_axial(&mut self, n: usize, x: f64) {
         self.drag.set_axial(n, x);
     }
@@ -690,8 +689,8 @@ impl ConstrainedBob {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error of the bob's velocity V, 1/s, that arises because the series of the drag end at order n. `h`
-    /// (s) is the time since the start of the expansion.
+    /// Returns the error, 1/s, of the bob's velocity V at the time `h`, s, after the start of the expansion that arises
+    /// because the series of the drag end at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;

@@ -1,16 +1,17 @@
 //! The "ball" regime: liquid that has left the bottom of its tank, modelled as one body.
 //!
-//! If thrust reverses, or if the bobs pass 45 degrees (mean cosine of their angles by modal mass), no pendulum
-//! represents the liquid. With `ball.travel` > 0 all liquid of the tank then becomes one body, the lump. Its centre
-//! flies freely, bounces off the wall with losses and slides on it. The pendulums take it over again when it comes to
-//! rest at the bottom.
+//! If thrust reverses, or if the bobs pass 45 degrees (mean cosine of their angles by modal mass), no pendulum represents
+//! the liquid. With `ball.travel` > 0 all liquid of the tank then becomes one body, the lump. The centre of the lump flies
+//! freely, bounces off the wall with losses and slides on it. When the lump comes to rest at the bottom, the pendulums take
+//! over the liquid again.
 //!
-//! **Surface within reach.** Liquid at rest under a specific force of any direction has its centre on the tank's surface of
-//! centres of buoyancy. There the surface is perpendicular to the force. Its radius of curvature is I/V, the second moment of the
-//! free surface over the liquid's volume (Dupin 1822, as in the theory of ships). A mass point that slides on this surface rests
-//! where the liquid rests, with the same energy. For a spherical tank the surface is a sphere about the tank's centre through the
-//! settled liquid's centre. For any other tank the model uses an ellipsoid of revolution about the tank's axis, through the
-//! liquid's centres at the bottom and at the top:
+//! **Surface that the liquid's centre can reach.** The centre of liquid at rest under a specific force of any direction lies
+//! on the tank's surface of centres of buoyancy, where the surface is perpendicular to the force. The radius of curvature of
+//! this surface is I/V, the second moment of the free surface divided by the volume of the liquid (Dupin 1822, as in the
+//! theory of ships). A mass point that slides on this surface rests where the liquid's centre rests, with the same energy.
+//! For a spherical tank the surface is a sphere about the tank's centre on which the centre of the settled liquid lies. For
+//! any other tank the model uses an ellipsoid of revolution about the tank's axis, through the liquid's centres at the
+//! bottom and at the top:
 //!
 //! ```text
 //! f = 1 - x.D x >= 0,   D = diag(1/b^2, 1/b^2, 1/a^2) in tank axes,   x from the surface's centre
@@ -18,12 +19,14 @@
 //! a   = travel/2,   b^2 = a R_p or more,   R_p = sum of m l/m_liq
 //! ```
 //!
-//! With b^2 = a R_p the surface has at the bottom the curvature of the path of the pendulums' common centre, whose radius is I/V
-//! if all modes are modelled. For R_p <= a the pendulums' centre, on a sphere of radius R_p, then lies within the surface in
-//! every direction: f = q (1 - c)^2 (1 - q), q = R_p/a, c the cosine of the angle.
+//! With b^2 = a R_p the surface has at the bottom the curvature of the path of the pendulums' common centre; the radius
+//! of this path is I/V if all modes are modelled. For R_p <= a the pendulums' centre, on a sphere of radius R_p, then
+//! lies within the surface in every direction: f = q (1 - c)^2 (1 - q), where q = R_p/a and c is the cosine of the
+//! angle from the axis.
 //!
-//! **Motion.** u = x' + w x rho, rho from O, n outwards. The lump has the inertia of the shape in which it left the
-//! bottom. This inertia rotates with the tank (J_a, a massless part of the craft).
+//! **Motion.** The velocity of the lump is u = x' + w x rho, with rho from O; n is the normal outwards. The lump has
+//! the inertia of the shape in which the liquid left the bottom. This inertia, J_a, rotates with the tank as a part of
+//! the craft without mass.
 //!
 //! ```text
 //! x' = u - w x rho
@@ -31,27 +34,29 @@
 //! N  = (m/G.G) [x'.D x' - G.(a + w' x rho + w x (u + x'))]       keeps f = 0 while it slides, N > 0
 //! ```
 //!
-//! The drag's reaction may push the craft away from the lump. If the lump would leave the wall with drag, but stay on it without,
-//! the drag is off until the wall force exceeds twice the drag.
+//! The reaction of the drag may push the wall away from the lump. If the lump would leave the wall with drag, but stay on it
+//! without drag, the model sets the drag to 0 until the wall force exceeds twice the drag.
 //!
-//! Like a rod, the wall adds a matrix of rank one: N is affine in [a; w'], with slope -m G.(..)/G.G.
+//! Like a rod, the wall adds a matrix of rank one to the craft's mass matrix, because N is affine in [a; w'], with
+//! the slope -m G.(..)/G.G.
 //!
 //! **Impact** at the speed v_n = n.x': impulse J = (1 + e) mu v_n along n, 1/mu = 1/m + U.M^-1 U, U = [n; rho x n],
 //! with M of the craft and everything attached to it. Momentum is conserved, and (1 - e^2) mu v_n^2/2 is dissipated. A
 //! lump that is pressed to the wall and leaves an impact below `ball.contact_speed` stays on the wall (e = 0), which
 //! ends a sequence of bounces.
 //!
-//! **Hand-over.** In both directions each part of the liquid keeps its momentum until the body that it joins catches it
-//! plastically. The whole therefore keeps linear and angular momentum and its centre of mass, and loses energy (Carnot). On
-//! leaving, the shape absorbs relative motions within the liquid. On return, the tank catches m_0, and the bobs keep the motion
-//! that their rods allow. The pendulums take over the liquid only if |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30 deg, 1/l_s = sum of
-//! (m/l)/sum of m. The left side is the mean over the modes, by modal mass, of the energy that each mode takes over, so that the
-//! mean cosine stays far above cos 45 degrees. A hand-over that would raise the energy (through centring, or because the shape
-//! changes while the craft rotates) waits until the lump is nearest to the axis.
+//! **Hand-over.** If the liquid leaves the bottom or returns to it, each part of the liquid keeps its momentum until the
+//! body that it joins catches it plastically. Linear and angular momentum and the centre of mass of the whole are therefore
+//! conserved, and energy is lost (Carnot). When the liquid leaves, its motions relative to its centre end. When it returns,
+//! the tank catches m_0, and the bobs keep the motion that their rods allow. The pendulums take over the liquid only if
+//! |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30 deg, 1/l_s = sum of (m/l)/sum of m. The left side is the mean over the modes, by
+//! modal mass, of the energy that each mode takes over, so that the mean cosine stays far above cos 45 degrees. A hand-over
+//! may raise the energy through the centring stiffness, or because the shape changes while the craft rotates. In this case
+//! it waits until the lump is nearest to the axis.
 //!
-//! **Validity.** Times and momenta of crossings are valid, impacts only to an order of magnitude. The model does not represent
-//! wall pressure, sprays, films or the liquid's path along the wall. The coefficient of restitution e and the drag d are guesses
-//! unless they were measured.
+//! **Validity.** Times and momenta of crossings are valid, impacts only to an order of magnitude. The model does not
+//! represent wall pressure, sprays, films or the liquid's path along the wall. The coefficient of restitution e and the drag
+//! d are guesses unless they were measured.
 
 use taylor::number::Number;
 use taylor::root::first_root;
@@ -71,27 +76,25 @@ use crate::state::BallState;
 /// Cosine of the largest angle from the axis at which a bob represents liquid.
 pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
-/// Largest coefficient of the series of the detached liquid's position, m, whose square is
-/// computed. Larger coefficients could overflow.
+/// Largest coefficient, m, of the power series of the detached liquid's position that may be squared without overflow.
 const LARGEST_COEFFICIENT: f64 = 1e75;
 const TOUCHING: f64 = 1e-10;
 const RESTING: f64 = 1e-9;
-/// Value of f'', 1/s2, relative to the terms of its sum, below which nothing presses the detached
-/// liquid to the wall. It allows for rounding.
+/// Smallest value of f'' (f is the function that describes the wall), relative to the terms of its sum, at which detached
+/// liquid on the wall counts as pressed to it. Smaller values may be rounding errors.
 const PRESSING: f64 = 1e-9;
-/// Distance in time from an event, relative to the event's time, over which the slope of the
-/// function that crosses zero there is computed.
+/// Distance in time from an event, relative to the event's time, between the two points from which the slope of the
+/// event's function is computed.
 const NEAR: f64 = 1e-6;
-/// Largest change of an event's time in one iteration that improves it, relative to this time.
+/// Largest change of an event's time in one iteration of [`Lump::polish`], relative to this time.
 const FAR: f64 = 0.1;
 const ITERATIONS: usize = 4;
-/// Square of the sine of the largest swing, 30 degrees, with which the pendulums take over detached
-/// liquid.
+/// Square of the sine of the largest slosh angle, 30 degrees, at which the pendulums may take over detached liquid.
 const SWING: f64 = 0.25;
 
-/// Event of a tank's liquid: it leaves the bottom, meets the wall, is no longer pressed to the wall (`Release`), is pressed
-/// strongly enough for the drag, or is taken over by the pendulums (`Settle`). At `Look` one of several conditions for settling
-/// is met, so that the others have to be examined again.
+/// Event of the liquid of a tank: it leaves the bottom, hits the wall, is no longer pressed to the wall (`Release`), is
+/// pressed to the wall strongly enough for drag to act (`Drag`), or is taken over by the pendulums (`Settle`). At `Look` one
+/// of several conditions for settling is fulfilled, so that the others have to be checked again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
     Leave,
@@ -102,9 +105,9 @@ pub(crate) enum Due {
     Look,
 }
 
-/// Function that crosses zero at an event. `Exact` stands for functions whose series are as exact as the motion's: the wall force
-/// and the bobs' mean cosine. `Axial` is the specific force along the axis over its lower limit, `Passage` half of the derivative
-/// of the square of the distance from the axis, and `Excess` the wall force beyond the force from which on drag acts.
+/// Function that crosses zero at an event. `Exact` are the wall force and the bobs' mean cosine, whose series are as exact
+/// as the series of the motion. `Axial` is the specific force along the axis minus its lower limit, `Passage` is half of the
+/// derivative of the squared distance from the axis, and `Excess` is the wall force minus the force above which drag acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Crossing {
     Exact,
@@ -117,17 +120,15 @@ enum Crossing {
 
 pub(crate) type Directions = [Vec3; MODES];
 
-/// One tank's detached liquid and the series of its motion, body axes, with the symbols above. `drag` is d,
-/// 1/s; `axes` turns tank axes to body axes; the surface within reach has its centre at `height` on the
-/// tank's axis and the semi-axes `half` along it and `across`; `gyration` is R_p. `shares` are the modes'
-/// shares of the modal mass, and l_s is the length whose inverse is the mean of 1/l by these shares. The
-/// liquid leaves the bottom below the specific force `lowest` along the axis and comes back above `floor`,
-/// m/s2.
+/// The detached liquid of one tank and the power series of its motion, body axes, with the symbols of the module's head.
+/// `drag` is d, 1/s. `axes` rotates from tank axes to body axes. The surface that the liquid's centre can reach has its own
+/// centre at `height` on the tank's axis and the semi-axes `half` along the axis and `across`. `gyration` is R_p. `shares`
+/// are the modes' shares of the modal mass, and l_s is the length whose inverse is the mean of 1/l weighted by these shares.
+/// The liquid leaves the bottom if the specific force along the axis is below `lowest`, and returns above `floor`, m/s2.
 #[derive(Clone, Debug)]
 pub(crate) struct Lump {
     pub tank: usize,
-    /// State of the liquid, such as sliding on the wall, for which the present expansion was
-    /// started.
+    /// State of the liquid, such as sliding on the wall, at the start of the present expansion.
     pub state: BallState,
     pub m: f64,
     restitution: f64,
@@ -168,8 +169,8 @@ pub(crate) struct Lump {
     sum: Vector,
     turned: Vector,
     u_turned: Vec3,
-    /// Derivative of the shape's inertia J_a along the seeded direction, kg m2, body axes; 0 in an expansion
-    /// over time.
+    /// Derivative of the shape's inertia J_a for a directional derivative, kg m2, body axes; 0 if the expansion is over
+    /// time.
     pub shape_slope: Mat3,
     known_pull: f64,
     known_force: Vec3,
@@ -193,8 +194,8 @@ fn product(a: &Series, b: &Series, n: usize) -> f64 {
 }
 
 impl Lump {
-    /// Creates the lump of tank number `index`, which counts from 0 and whose derived parameters are
-    /// resolved. Returns `None` without a model of detached liquid.
+    /// Creates the detached liquid of tank number `index`, which counts from 0. `tank` must be the result of
+    /// [`Tank::resolve`]. Returns `None` if the tank has no model of detached liquid.
     pub fn new(tank: &Tank, index: usize) -> Option<Lump> {
         let surface = tank.ball_surface()?;
         let axes = rotation(&unit_quaternion(tank.q));
@@ -263,8 +264,7 @@ impl Lump {
         })
     }
 
-    /// Returns position and velocity of the liquid's centre when the liquid is settled and at rest,
-    /// six numbers in tank axes.
+    /// Returns position and velocity (six numbers in tank axes) of the centre of liquid that rests at the bottom.
     pub fn at_rest(&self) -> [f64; 6] {
         [0.0, 0.0, self.height - self.half, 0.0, 0.0, 0.0]
     }
@@ -278,8 +278,8 @@ impl Lump {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
     }
 
-    /// Returns true if the wall's drag on the liquid acts. It never acts for d = 0, because
-    /// rounding would then make a released lump alternate between the states `Sliding` and `Light`.
+    /// Returns true if the wall exerts drag on the liquid. Without a drag coefficient (d = 0) it is always false, because
+    /// rounding would otherwise make detached liquid alternate between the states `Sliding` and `Light`.
     pub fn drags(&self) -> bool {
         self.drag() > 0.0
     }
@@ -288,8 +288,7 @@ impl Lump {
         matches!(self.state, BallState::Sliding | BallState::Light | BallState::Held)
     }
 
-    /// Returns for the rigid liquid and each bob the mass and the position from O. The directions
-    /// of the bobs' rods are `p`.
+    /// Returns mass and position from O of the rigid liquid and of each bob, with the directions `p` of the bobs' rods.
     fn parts(&self, p: &Directions) -> [(f64, Vec3); MODES + 1] {
         core::array::from_fn(|i| match i {
             0 => (self.m_0, self.s),
@@ -307,8 +306,8 @@ impl Lump {
         scale(1.0 / self.m, moment)
     }
 
-    /// Returns the liquid's shape, with its inertia J_a about its own centre, as a rigid body. The
-    /// directions of the bobs' rods are `p`.
+    /// Returns the shape of the liquid as a rigid body with the inertia J_a about its own centre. `p` are the directions
+    /// of the bobs' rods.
     pub fn shape(&self, p: &Directions) -> Rigid {
         let center = self.common_center(p);
         let around =
@@ -317,8 +316,8 @@ impl Lump {
         Rigid { mass: 0.0, moment: [0.0; 3], inertia }
     }
 
-    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre of the liquid also moves,
-    /// but the first moment about it is 0, so that its velocity drops out.
+    /// Sets the derivative of the inertia J_a in [`Lump::shape`] for a change of the directions `p` by `dp`. The velocity of
+    /// the liquid's centre has no effect, because the first moment about the centre is 0.
     pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
         let center = self.common_center(p);
         let mut slope = [[0.0; 3]; 3];
@@ -336,16 +335,16 @@ impl Lump {
         self.shape_slope = slope;
     }
 
-    /// Returns the six numbers (position and velocity in tank axes) of a lump whose centre is at
-    /// `rho` from O and moves with `rate` relative to the tank.
+    /// Returns position and velocity in tank axes (six numbers) of detached liquid whose centre is at `rho` from O and moves
+    /// with `rate` relative to the tank.
     pub fn numbers(&self, rho: Vec3, rate: Vec3) -> [f64; 6] {
         let at = transposed_times(&self.axes, sub(rho, self.origin));
         let rate = transposed_times(&self.axes, rate);
         [at[0], at[1], at[2], rate[0], rate[1], rate[2]]
     }
 
-    /// Returns the lump's six states (position and rate, tank axes) with the position moved onto the wall and the rate
-    /// projected onto the wall's tangent plane.
+    /// Returns the six states of the detached liquid (position and rate, tank axes) with the position moved onto the wall
+    /// and the rate projected onto the wall's tangent plane.
     fn on_wall(&self, x: &[f64; 6]) -> [f64; 6] {
         let [across, along] = [self.radius, self.half].map(|r| 1.0 / (r * r));
         let at = [x[0], x[1], x[2] - self.height];
@@ -356,8 +355,8 @@ impl Lump {
         [at[0], at[1], at[2] + self.height, rate[0], rate[1], rate[2]]
     }
 
-    /// Starts an expansion at position and rate (tank axes, six numbers) while the craft rotates with `w`. A
-    /// sliding lump is first moved onto the wall, with its velocity along it.
+    /// Starts an expansion at the position and rate `x` (six numbers in tank axes) while the craft rotates with `w`. If the
+    /// liquid slides, its position is first moved onto the wall and its velocity made parallel to the wall.
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let x = if self.slides() { self.on_wall(x) } else { *x };
         self.x_0 = times(&self.axes, [x[0], x[1], x[2] - self.height]);
@@ -367,8 +366,8 @@ impl Lump {
         self.u[0] = add(self.x_d[0], cross(w, self.rho[0]));
     }
 
-    /// Sets coefficient 1 of position and velocity to their derivatives along `dx` (of the six numbers) and
-    /// `dw` (of the angular velocity). The numbers of a sliding lump must be on the wall.
+    /// Sets coefficient 1 of position and velocity to their derivatives for a change of the six states by `dx` and of the
+    /// angular velocity by `dw`. The position of sliding liquid must be on the wall.
     pub fn seed_direction(&mut self, dx: &[f64; 6], w: Vec3, dw: Vec3) {
         let mut at = times(&self.axes, part(dx, 0));
         let mut rate = times(&self.axes, part(dx, 3));
@@ -382,9 +381,9 @@ impl Lump {
         self.u[1] = add(rate, add(cross(dw, self.rho[0]), cross(w, at)));
     }
 
-    /// Returns the lump's position and rate at `t`, s, after the start of the expansion, from the
-    /// series up to order n. `x` is its state at that start; `w` is the craft's angular velocity at
-    /// the time `t`.
+    /// Returns position and rate of the detached liquid (six numbers in tank axes) at `t`, s, after the start of the
+    /// expansion, from the series up to order n. `x` are position and rate at the start, and `w` is the craft's angular
+    /// velocity at the time `t`.
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (rho, u) = (space::value(&self.rho, n, t), space::value(&self.u, n, t));
         let rate = sub(u, cross(w, rho));
@@ -396,9 +395,9 @@ impl Lump {
         if self.slides() { self.on_wall(&x) } else { x }
     }
 
-    /// Returns coefficient n of the power series of force and torque about O with which the lump acts on the craft. The
-    /// terms that contain coefficient n of the accelerations [a; w'] are left out, because the mass matrix contains
-    /// them.
+    /// Returns coefficient n of the power series of force and torque about O with which the detached liquid acts
+    /// on the craft. The terms that contain coefficient n of the accelerations [a; w'] are left out, because the
+    /// mass matrix contains them.
     pub fn reaction(&mut self, n: usize, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         self.x_d[n] = sub(self.u[n], crosses(w, &self.rho, 0, n));
         self.u_turned = crosses(w, &self.u, 0, n);
@@ -429,9 +428,8 @@ impl Lump {
         [self.known_force, torque]
     }
 
-    /// Returns the normal n of the wall at a sliding lump and its moment rho x n about O, at the start of the
-    /// expansion. The lump adds inertia to the craft's mass matrix only along this direction. `None` if the lump does
-    /// not slide.
+    /// Returns the normal n of the wall at sliding liquid and the moment rho x n of the normal about O, at the start of the
+    /// expansion. The liquid adds inertia to the craft's mass matrix only in this direction. `None` if it does not slide.
     pub fn along_normal(&self) -> Option<[f64; 6]> {
         self.slides().then(|| along_rod(self.outwards(), self.rho[0]))
     }
@@ -449,8 +447,8 @@ impl Lump {
         self.x_d[0]
     }
 
-    /// Sets coefficient n of the forces on the lump, and coefficient n + 1 of its position and
-    /// velocity, from coefficient n of the craft's accelerations [a; w'].
+    /// Sets coefficient n of the forces on the detached liquid, and coefficient n + 1 of its position and velocity, from
+    /// coefficient n of the craft's accelerations [a; w'].
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let specific = add(a, cross(w_d, self.rho[0]));
         if self.slides() {
@@ -472,8 +470,8 @@ impl Lump {
         if drag > 0.0 { self.m * drag * dots(&self.x_d, &self.x_d, 0, n) } else { 0.0 }
     }
 
-    /// Returns coefficient n (0 or 1) of the rates of the lump's six states: of x' for its position x, and of x'' = u'
-    /// - w' x rho - w x x' for its rate.
+    /// Returns coefficient n (0 or 1) of the derivatives of the detached liquid's six states, tank axes: x' of the position
+    /// x, and x'' = u' - w' x rho - w x x' of the rate.
     pub fn rates(&self, n: usize, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let u_d = scale((n + 1) as f64, self.u[n + 1]);
         let turned = add(crosses(w_d, &self.rho, 0, n), crosses(w, &self.x_d, 0, n));
@@ -482,7 +480,8 @@ impl Lump {
         [x_d[0], x_d[1], x_d[2], x_dd[0], x_dd[1], x_dd[2]]
     }
 
-    /// Returns the scale of the lump's velocity u within the time `t` (s), m/s, for error control.
+    /// Returns the scale, m/s, to which the allowed error of the detached liquid's velocity u is relative: its speed,
+    /// estimated over the next `t` seconds.
     pub fn speed_scale(&self, w: Vec3, t: f64) -> f64 {
         largest(self.x_d[0]) + self.half * largest(w) + largest(self.u[1]) * t
     }
@@ -500,8 +499,8 @@ impl Lump {
         [force, cross(Self::value_and_slope(&self.rho), force)]
     }
 
-    /// Returns the gradient G = D x of the function f that describes the wall, at the position of a
-    /// sliding lump, and its square G.G.
+    /// Returns the gradient G = D x of the function f that describes the wall, at the position of sliding liquid,
+    /// and its square G.G.
     fn gradient<T: Number>(&self) -> (Vec3<T>, T) {
         let g = times(
             &self.d.map(constant),
@@ -510,8 +509,8 @@ impl Lump {
         (g, dot(g, g))
     }
 
-    /// Returns force and torque about O of the lump on the craft for the case that the
-    /// accelerations a and w' are 0, with the wall force N that belongs to this case.
+    /// Returns the force of the detached liquid on the craft and its torque about O if the accelerations a and w' are 0. The
+    /// wall force N is the one for these accelerations.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
@@ -526,8 +525,8 @@ impl Lump {
         [force, cross(rho, force)]
     }
 
-    /// Returns the added mass of a sliding lump, (m/G.G) u u^T, as the factor m/G.G and the vector u = [G; rho x G],
-    /// where G is the normal of the wall without normalisation. `None` if the lump does not slide.
+    /// Returns the added mass of sliding liquid, (m/G.G) u u^T, as the factor m/G.G and the vector u = [G; rho x G], where G
+    /// is the gradient of the function f that describes the wall. `None` if the liquid does not slide.
     pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
         let (g, squared) = self.gradient::<T>();
         let along = || along_rod(g, Self::value_and_slope::<T>(&self.rho));
@@ -548,9 +547,9 @@ impl Lump {
         }
     }
 
-    /// Updates the lump's rate for an impulse on the craft that changes the velocity of O by `dv`
-    /// and the angular velocity by `dw`. In flight the lump keeps its velocity; on the wall it
-    /// keeps only its velocity along the wall.
+    /// Updates the rate of the detached liquid after an impulse has changed the velocity of O by `dv` and the angular
+    /// velocity of the craft by `dw`. In flight the liquid keeps its velocity; on the wall it keeps only the velocity
+    /// component along the wall.
     pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
         let mut kick = add(dv, cross(dw, self.rho[0]));
         if self.slides() {
@@ -563,8 +562,8 @@ impl Lump {
         }
     }
 
-    /// Returns the impulse on the craft, as force and torque impulse about O, if the lump hits the wall with its
-    /// present normal speed v_n and the coefficient of restitution `e`.
+    /// Returns the impulse (N s) on the craft and its moment about O if detached liquid hits the wall with its present
+    /// normal speed v_n and the coefficient of restitution `e`. `matrix` are the factors of the mass matrix.
     pub fn impulse(&self, matrix: &Factors, e: f64) -> [Vec3; 2] {
         let n = self.outwards();
         let u = [n, cross(self.rho[0], n)];
@@ -577,8 +576,8 @@ impl Lump {
         dot(self.outwards(), self.x_d[0]).max(0.0)
     }
 
-    /// Returns the coefficient of restitution, and the speed after an impact below which the lump may stay on
-    /// the wall, m/s.
+    /// Returns the coefficient of restitution, and the speed after an impact, m/s, below which the liquid stays on the wall
+    /// if it is pressed to it.
     pub fn restitution(&self) -> (f64, f64) {
         (self.restitution, self.contact_speed)
     }
@@ -587,17 +586,17 @@ impl Lump {
         self.pull[0] > 0.0
     }
 
-    /// Returns directions of the bobs' rods with which the pendulums' common centre is as near to
-    /// the lump as possible.
+    /// Returns the directions of the bobs' rods for which the common centre of the pendulums is nearest to the detached
+    /// liquid.
     pub fn hanging(&self) -> Directions {
         let in_tank = transposed_times(&self.axes, self.x_0);
         let [x, y] = [in_tank[0] / self.gyration, in_tank[1] / self.gyration];
         [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
     }
 
-    /// Returns the impulse on the craft when the tank catches the lump's parts, rigid liquid and
-    /// bobs, and the rates p' of the bobs afterwards. Before, all parts move with `rate` relative
-    /// to the tank; the directions of the rods are `p`.
+    /// Returns the impulse on the craft at a hand-over to the pendulums, when the tank catches rigid liquid and bobs, and
+    /// the rates p' of the bobs after it. Before the hand-over all parts move with `rate` relative to the tank; `p` are the
+    /// directions of the rods.
     pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
         let mut impulse = scale(self.m_0, rate);
         let mut torque = cross(self.s, impulse);
@@ -614,8 +613,8 @@ impl Lump {
         ([impulse, torque], rates)
     }
 
-    /// Returns the momentum of the bobs' motion in the tank, divided by the mass of the liquid, and
-    /// the moment of this momentum about the liquid's centre.
+    /// Returns the momentum of the bobs' motion relative to the tank and its moment about the liquid's centre `center`, both
+    /// divided by the mass of the liquid.
     pub fn stirred(&self, center: Vec3, bobs: impl Iterator<Item = BobNow<f64>>) -> [Vec3; 2] {
         bobs.fold([[0.0; 3]; 2], |[rate, moment], bob| {
             let momentum = scale(bob.m, bob.rate);
@@ -641,9 +640,9 @@ impl Lump {
         axial
     }
 
-    /// Returns the coefficients below n of three quantities, each with the magnitude of its rounding terms:
-    /// the remaining swing, thrust along the tank, depth below the surface's centre. All must be positive
-    /// before the pendulums take over the liquid.
+    /// Returns the coefficients below n of the three functions that must be positive before the pendulums may take over the
+    /// liquid: largest allowed minus expected swing, thrust along the tank, and depth below the centre of the wall's
+    /// surface. With each, returns the magnitude of its rounding errors.
     fn settling(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> [(Series, f64); 3] {
         let mut thrust = self.axial(n, a, w, w_d);
         thrust[0] -= self.floor;
@@ -661,7 +660,7 @@ impl Lump {
             swing[k] =
                 product(&thrust, &left, k) - dots(&self.x_d, &self.x_d, 0, k) / self.swing_length;
         }
-        // Rounding terms: the specific force of everything that rotates, and its factors.
+        // Magnitudes for rounding errors: the specific force from all rotations, and the factors of the products.
         let arm = largest(self.hinge);
         let turning = largest(w[0]) * largest(w[0]) + largest(w_d[0]);
         let of_thrust = 1e-10 * self.floor + 1e-12 * (largest(a[0]) + turning * arm);
@@ -671,8 +670,8 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// Returns the next event of the liquid within `h`, s, after the start of the expansion, and
-    /// its time. The series are used up to order n. `bobs` are the bobs of the lump's tank.
+    /// Returns the next event of the liquid and its time within `h`, s, after the start of the expansion, from the series up
+    /// to order n. `bobs` are the bobs of the tank.
     pub fn next<'a>(
         &self,
         n: usize,
@@ -731,10 +730,10 @@ impl Lump {
         }
     }
 
-    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of series
-    /// is up to 2^k times as large as the coefficients of its factors, so that the product's series up to order n is
-    /// less exact than the motion. Therefore the time is corrected with values of the function that are computed from
-    /// the motion near the event.
+    /// Returns an improved time of an event, of which `t` is the root of the series of its function. Coefficient k of a
+    /// product of series is up to 2^k times as large as the coefficients of its factors, so that the product's series up to
+    /// order n is less exact than the motion. Therefore the time is corrected with values of the function that are computed
+    /// from the motion near the event.
     fn polish(
         &self,
         mut t: f64,
@@ -753,7 +752,7 @@ impl Lump {
         let root = t;
         for _ in 0..ITERATIONS {
             let (now, before) = (value(t), value(t * (1.0 - NEAR)));
-            // Where the function only touches zero its slope tells nothing.
+            // Where the function only touches zero, its slope gives no estimate of the time.
             let change = t * NEAR * now;
             if change.abs() > FAR * t * (before - now).abs() || before == now {
                 return root;
@@ -767,7 +766,8 @@ impl Lump {
         t
     }
 
-    /// Returns the lump with its motion at `t` as coefficients 0, from the series up to order n.
+    /// Returns a copy whose expansion starts at the time `t`: coefficients 0 are the motion at `t` from the series
+    /// up to order n.
     fn advanced(&self, n: usize, t: f64) -> Lump {
         let mut then = self.clone();
         then.rho[0] = space::value(&self.rho, n, t);
@@ -812,11 +812,11 @@ impl Lump {
 
     fn next_contact(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
-        // Squares of what a diverging host hands over must not overflow.
+        // A host whose integration diverges may set states so large that their squares overflow.
         if !(0..=n).all(|k| largest(x(k)) < LARGEST_COEFFICIENT) {
             return None;
         }
-        // f is exact for the series of x up to order n. Cut at order n, it could miss an impact.
+        // f is exact for the series of x up to order n. If the series of f ended at order n, an impact could be missed.
         let mut f = [0.0; 2 * ORDER + 1];
         for (k, f) in f.iter_mut().enumerate().take(2 * n + 1) {
             let term = |i: usize| dot(x(i), times(&self.d, x(k - i)));
@@ -837,9 +837,8 @@ impl Lump {
         first_root(&f[..=2 * n], h)
     }
 
-    /// Returns true if a lump on or outside the wall moves outwards or is pressed outwards, so that
-    /// an impact is due. `f` has coefficients 0 to 2 of the function f that describes the wall, and
-    /// `x_2` is coefficient 2 of the position.
+    /// Returns true if an impact is due: the liquid is on or outside the wall and moves outwards or is pressed outwards. `f`
+    /// has coefficients 0 to 2 of the function f that describes the wall, and `x_2` is coefficient 2 of the position.
     fn meets_wall(&self, f: [f64; 3], x_2: Vec3) -> bool {
         if f[0] > TOUCHING || f[1] > RESTING {
             return false;
@@ -851,11 +850,10 @@ impl Lump {
         f[1] < -RESTING || f[2] < -PRESSING * size
     }
 
-    /// Returns the value of f, the function that describes the wall, for hosts that integrate
-    /// themselves. Order 0 of the expansion must be computed. The value is below zero only if an
-    /// impact is due. After an impact the lump may be outside by rounding and move inwards, or be
-    /// on the wall without being pressed to it. In these cases the value is above zero, so that a
-    /// host that compares signs does not miss a bounce shorter than its step.
+    /// Returns the value of f, the function that describes the wall, as an event indicator for hosts that integrate the
+    /// states themselves. Order 0 of the expansion must be computed. The value is below zero only if an impact is due. It is
+    /// above zero if after an impact the liquid is outside the wall by rounding but moves inwards, or is on the wall without
+    /// being pressed to it. A host that compares signs therefore does not miss a bounce shorter than its step.
     fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
         let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
         let f = 1.0 - dot(x, g);
@@ -868,9 +866,9 @@ impl Lump {
         if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
     }
 
-    /// Returns true if the current indicators show that a host that integrates itself has passed an event.
+    /// Returns true if the present event indicators show that a host that integrates the states itself has passed an event.
     pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
-        // After the passage nearest to the axis, this indicator of a held lump stays below zero.
+        // If the state is `Held`, this indicator stays below zero after the liquid has passed the point nearest to the axis.
         leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
     }
 
@@ -878,15 +876,14 @@ impl Lump {
         1.0 - dot(self.x_0, times(&self.d, self.x_0)) < -TOUCHING
     }
 
-    /// Returns the point of the wall, as a position from O, at which a ray from the wall's centre
-    /// through the lump meets the wall.
+    /// Returns the point of the wall, as a position from O, on the ray from the wall's centre through the detached liquid.
     pub fn on_wall_beside(&self) -> Vec3 {
         let size = libm::sqrt(dot(self.x_0, times(&self.d, self.x_0)));
         add(self.center, scale(1.0 / size, self.x_0))
     }
 
-    /// Returns the coefficients below n of the squared wall force minus the square of twice the
-    /// drag force that would act. This difference crosses zero where drag begins.
+    /// Returns the coefficients below n of the squared wall force minus the square of twice the drag force. This difference
+    /// rises through zero where drag begins to act.
     fn excess(&self, n: usize) -> Series {
         let (mut pull, mut excess) = (ZERO, ZERO);
         for (k, x) in pull.iter_mut().enumerate().take(n) {
@@ -934,15 +931,15 @@ impl Lump {
         }
     }
 
-    /// Returns true if the pendulums may take over the liquid at the start of the expansion, by the
-    /// conditions on swing, thrust and depth in the module's head.
+    /// Returns true if the pendulums may take over the liquid at the start of the expansion, by the conditions on swing,
+    /// thrust and depth of [`Lump::settling`].
     pub fn may_settle(&self, a: &Vector, w: &Vector, w_d: &Vector) -> bool {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
 
-    /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are the bobs of the tank. The
-    /// indicators cross zero where [`Lump::next`] finds the event. They use directions of unit length, because a host's
-    /// directions need not have it.
+    /// Returns event indicators for hosts that integrate the states themselves; `bobs` are the bobs of the tank. They cross
+    /// zero where [`Lump::next`] finds an event. They are computed from directions of unit length, although the directions
+    /// that a host integrates may have another length.
     pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],
@@ -972,8 +969,8 @@ impl Lump {
     }
 }
 
-/// Returns the time within `h` (s) at which the function with the power series `a`, taken up to order n, rises through
-/// zero; `None` if it does not. At h = 0, for hosts that have found the event themselves, returns 0 if a is positive.
+/// Returns the time within `h`, s, at which the function with the power series `a`, up to order n, rises through zero;
+/// `None` if it does not rise through zero. For h = 0, when a host has found the event itself, returns 0 if a is positive.
 fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     let size = a[..n].iter().rev().fold(0.0, |sum, x| sum * h.min(1.0) + x.abs());
     let below = a.map(|x| -x);
@@ -987,8 +984,8 @@ fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Three of the power series are t - 1/4, 1/4 - t, and t - 1/4 from far below; another only
-    /// touches zero.
+    /// t - 1/4 rises through zero at 0.25, and t^2 - 1/4 at 0.5. Not counted are 1/4 - t, which falls, 1/4 + t, which is
+    /// above zero, and t - 1e-12, which is zero at the start except for rounding.
     #[test]
     fn a_power_series_counts_as_rising_if_it_crosses_zero_from_below() {
         let series = |terms: &[f64]| {
@@ -1006,11 +1003,11 @@ mod tests {
         for falling in [[0.25, -1.0], [0.25, 1.0], [-0.25, -1.0], [-1e-12, 1.0]] {
             assert_eq!(rise(&series(&falling), 2, 1.0), None, "{falling:?}");
         }
-        // a host at an event: value above zero or not
+        // A host that stops at an event: the event is due if the value is above zero.
         assert_eq!([1e-9, -1e-9].map(|a| rise(&series(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
     }
 
-    /// Returns detached liquid of the default tank at the bottom, in a surface 2 m high and 2 m wide.
+    /// Returns the detached liquid of the default tank, at the bottom of a surface that is 2 m high and 2 m wide.
     fn lump(state: BallState) -> Lump {
         let mut tank = Tank::default();
         tank.ball.travel = 0.6;
@@ -1034,8 +1031,8 @@ mod tests {
         along_x(terms).map(|[x, y, z]| [z, y, x])
     }
 
-    /// Returns the next event within a second of detached liquid in a tank without specific force,
-    /// so that the pendulums cannot take it over.
+    /// Returns the next event of detached liquid within one second. Without specific force the pendulums cannot
+    /// take over the liquid.
     fn next(lump: &Lump) -> Option<(f64, Due)> {
         lump.next(4, 1.0, [&ZERO_VECTOR; 3], core::iter::empty())
     }
@@ -1045,9 +1042,9 @@ mod tests {
         assert!((found.0 - t).abs() < 1e-9 && found.1 == due, "{found:?} {t} {due:?}");
     }
 
-    /// The wall force N |n| must be twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s are 6 N. If it rises
-    /// from 4.5 N by 4 N/s, this happens after 0.375 s. No event is due if drag already acts, or if |n| is a
-    /// half.
+    /// Drag acts if the wall force N |n| is above twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s = 6 N. A wall
+    /// force of 4.5 N that rises by 4 N/s reaches this value after 0.375 s. No event is due if drag already acts, or if
+    /// |n| is a half.
     #[test]
     fn drag_of_light_detached_liquid_begins_where_the_wall_force_is_twice_the_drag() {
         let mut lump = lump(BallState::Light);
@@ -1061,13 +1058,13 @@ mod tests {
         lump.squared[0] = 1.0;
         lump.state = BallState::Sliding;
         assert_eq!(next(&lump), None);
-        // a rate that grows, too
+        // Here the rate grows with time as well.
         lump.x_d = along_x(&[2.0, 1.0]);
         assert_eq!(lump.excess(3)[1], 36.0 - 36.0);
     }
 
-    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s. The lump passes the axis after 0.25 or
-    /// 0.75 s.
+    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s, so the liquid is released. It is nearest to the axis
+    /// after 0.25 s or 0.75 s.
     #[test]
     fn the_earlier_of_release_and_settling_is_the_next_event() {
         let mut lump = lump(BallState::Held);
@@ -1080,14 +1077,14 @@ mod tests {
         }
         lump.pull[1] = 0.0;
         assert_event(next(&lump), 0.75, Due::Settle);
-        // motion along the axis is not motion away from it
+        // The liquid moves along the axis, so that its distance from the axis does not change.
         (lump.x_d, lump.rho) = (along_z(&[1.0]), along_z(&[0.0, 1.0]));
         assert_eq!(next(&lump), None);
     }
 
-    /// A lump halfway down with 3 m/s reaches the top in half a second, as does one that leaves the wall with
-    /// 4 m/s. The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump
-    /// that falls away from rest never meets the wall.
+    /// Detached liquid halfway down that rises with 3 m/s reaches the top in half a second, and so does liquid that leaves
+    /// the wall with 4 m/s. The impact is immediate if the liquid moves into the wall, or rests on it and is pressed to it.
+    /// Liquid that falls away from the wall never hits it.
     #[test]
     fn the_impact_time_of_detached_liquid_on_the_wall_ahead_is_exact() {
         let mut lump = lump(BallState::Flying);
@@ -1108,13 +1105,13 @@ mod tests {
             let found = next(&lump);
             assert_eq!(found == Some((0.0, Due::Impact)), at_once, "{terms:?}: {found:?}");
         }
-        // near the wall its curvature counts: 1 m/s along it is 1 m/s² towards it
+        // Near the wall the curvature matters: 1 m/s along the wall is an acceleration of 1 m/s² towards it.
         lump.rho = along_x(&[0.0, 1.0]);
         assert_eq!(next(&lump), Some((0.0, Due::Impact)));
     }
 
-    /// The allowed error of detached liquid's velocity is relative to the sum of the speeds of the
-    /// liquid in the tank, of the tank, and of the turning lever.
+    /// The allowed error of the detached liquid's velocity is relative to the sum of its speed relative to the tank (2 m/s),
+    /// the speed of the rotating tank (3 m/s), and acceleration times time (0.5 m/s).
     #[test]
     fn the_speed_scale_of_detached_liquid_adds_the_speeds_of_all_its_motions() {
         let mut lump = lump(BallState::Flying);
