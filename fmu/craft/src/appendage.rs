@@ -17,11 +17,12 @@
 //! sum of V_P.(p eta' + w x p eta) + w.r eta' + eta'^2/2 - omega^2 eta^2/2
 //! ```
 //!
-//! These are the terms of the kinetic energy of the deformed appendage that its participations determine: all terms that are
-//! linear in eta, except w.(dI w)/2, where dI is the change of the inertia about P. Terms of the second order, such as the
-//! centrifugal softening of the mode itself, are left out as well. The terms that are left out change eta by the order
-//! (w/omega)^2. The Lagrangian does not change if the craft is moved, turned, or given a constant velocity, so momentum and
-//! angular momentum balance exactly at every amplitude, and energy balances with the dissipated power c eta'^2. Lagrange's equations are
+//! These are the terms of the kinetic energy of the deformed appendage that its participations determine: all terms that
+//! are linear in eta, except w.(dI w)/2, where dI is the change of the inertia about P. Terms of the second order, such as
+//! the centrifugal softening of the mode itself, are left out as well. The omitted terms would change eta by a fraction of
+//! the order (w/omega)^2. The Lagrangian does not change if the craft is moved, turned, or given a constant velocity, so
+//! momentum and angular momentum balance exactly at every amplitude, and energy balances with the dissipated power c
+//! eta'^2. Lagrange's equations are
 //!
 //! ```text
 //! eta'' + c eta' + omega^2 eta = -p.a_P - r.w',   a_P = a + w' x P + w x (w x P),   c = 2 zeta omega
@@ -53,9 +54,9 @@ use crate::rigid::{
 use crate::sizes::APPENDAGES;
 use crate::state::{STATES, index};
 
-/// One mode of a flexible appendage with its interface held, with unit modal mass: natural frequency, Hz,
-/// damping ratio, and participation (translation, kg^0.5, and rotation about the interface point `position`,
-/// kg^0.5 m, body axes). `eta` and `eta_dot` are its displacement, kg^0.5 m, and its rate at the start.
+/// One mode of a flexible appendage, normalised to unit modal mass, with the interface to the craft fixed: natural
+/// frequency, Hz, damping ratio `zeta`, and participation in translation, kg^0.5, and in rotation about the interface point
+/// `position`, kg^0.5 m, body axes. `eta` and `eta_dot` are modal displacement, kg^0.5 m, and its rate at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Appendage {
@@ -75,7 +76,8 @@ impl Default for Appendage {
 }
 
 impl Appendage {
-    /// Returns true if the mode has any effect: it moves the craft, or it moves at the start.
+    /// Returns true if the mode can have an effect: it participates in the motion of the craft, or is deflected or
+    /// moving at the start.
     pub(crate) fn acts(&self) -> bool {
         self.participation != [0.0; 6] || self.eta != 0.0 || self.eta_dot != 0.0
     }
@@ -120,24 +122,24 @@ impl Mode {
         }
     }
 
-    /// Returns w.(D w), the quadratic form of this mode's matrix D in the craft's angular velocity w. `ww` has the
-    /// products xx, yy, zz, xy, xz, yz of the components of w.
+    /// Returns w.(D w) of this mode, where w is the craft's angular velocity. `ww` has the products xx, yy, zz, xy, xz, yz
+    /// of the components of w.
     fn turning<T: Number>(&self, ww: Symmetric<T>) -> T {
         let [xx, yy, zz, xy, xz, yz] = self.growth;
         ww[0] * xx + ww[1] * yy + ww[2] * zz + (ww[3] * xy + ww[4] * xz + ww[5] * yz) * 2.0
     }
 
-    /// Returns minus the acceleration eta'' of the mode, without its parts that depend on the
-    /// craft's acceleration a and on its angular acceleration w'. `turning` is w.(D w), see the
-    /// module's head.
+    /// Returns the part of -eta'' that does not depend on the craft's accelerations a and w'. `turning` is w.(D w);
+    /// see the module's head.
     fn pull<T: Number>(&self, eta: T, rate: T, turning: T) -> T {
         rate * self.damping + eta * self.stiffness - turning * 0.5
     }
 }
 
-/// The modes of all appendages. `effective` is the sum of u u^T. `shares` has for each mode a bound of the share of the dry
-/// craft's inertia that its displacement eta takes or gives, per unit of eta. `is_too_heavy` is true if the undeformed appendages
-/// leave the craft no inertia.
+/// The modes of all appendages. `effective` is the sum of u u^T. `dry` is the dry craft with its appendages
+/// undeformed. `shares` has for each mode an upper bound of the fraction of the dry craft's inertia by which a
+/// displacement eta = 1 changes the inertia. `is_too_heavy` is true if the participations leave the craft no inertia,
+/// even if nothing is deflected.
 #[derive(Clone, Debug)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,
@@ -147,8 +149,9 @@ pub(crate) struct Structure {
     is_too_heavy: bool,
 }
 
-/// The deformed appendages at an instant: `body` has the changes of the first and second moments, `momentum` is [K; L], `slope`
-/// is the derivative of the body's inertia by time, and `energy` is the energy of the modes without the craft's motion.
+/// The deformed appendages at an instant. `body` has the first and second moments that the deflections add to the craft,
+/// `momentum` is [K; L], `slope` is the derivative of the body's inertia by time, and `energy` is the energy of the modes in
+/// a craft at rest.
 pub(crate) struct Deformed<T> {
     eta: [T; APPENDAGES],
     rate: [T; APPENDAGES],
@@ -247,8 +250,8 @@ impl Structure {
             .map(move |(mode, (eta, rate))| (mode, mode.pull(*eta, *rate, mode.turning(ww))))
     }
 
-    /// Returns force and torque about O on the craft without the terms in [a; w'] and without the inertial
-    /// wrench of [`Deformed::body`].
+    /// Returns the force of the appendages on the craft and its torque about O, without the terms that contain [a; w'] and
+    /// without the inertial forces of [`Deformed::body`].
     pub fn loads<T: Number>(&self, now: &Deformed<T>, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [momentum, moment] = now.momentum;
         let turned = cross(w, momentum);
@@ -261,8 +264,8 @@ impl Structure {
         [force, torque]
     }
 
-    /// Subtracts the sum of u u^T over all modes from the craft's mass matrix, because the modes move freely along
-    /// their participations u = [p; l].
+    /// Subtracts the sum of u u^T over all modes from the craft's mass matrix. A mode with free interface displacement takes
+    /// no part in an acceleration along its participation u = [p; l].
     pub fn reduce<T: Number>(&self, matrix: &mut Mat6<T>) {
         for (row, effective) in matrix.iter_mut().zip(&self.effective) {
             for (x, effective) in row.iter_mut().zip(effective) {
@@ -271,7 +274,7 @@ impl Structure {
         }
     }
 
-    /// Returns eta' and eta'' of all modes, 0 for those that are not in use.
+    /// Returns the derivatives eta' and eta'' of all modes, and 0 for modes that are not in use.
     pub fn rates<T: Number>(
         &self,
         now: &Deformed<T>,
@@ -290,8 +293,8 @@ impl Structure {
         modes.fold(T::constant(0.0), |sum, (mode, rate)| sum + *rate * *rate * mode.damping)
     }
 
-    /// Returns the largest speed of a mode, |eta'| + omega |eta| + |eta''| t, to which its allowed
-    /// error is relative.
+    /// Returns the scale to which the allowed error of the modes' rates is relative: the largest |eta'| + omega |eta| +
+    /// |eta''| t of all modes.
     pub fn speed_scale(&self, eta: &[f64], rate: &[f64], second: &[f64], t: f64) -> f64 {
         let states = eta.iter().zip(rate.iter().zip(second));
         self.modes.iter().zip(states).fold(0.0, |most, (mode, (eta, (rate, second)))| {
@@ -300,13 +303,14 @@ impl Structure {
         })
     }
 
-    /// Returns true if the appendages leave the craft no inertia: at any deflection if their participations belong to a heavier
-    /// craft, otherwise only at deflections far beyond the range of a linear model.
+    /// Returns true if the appendages leave the craft no positive inertia. This holds at any deflection if the
+    /// participations are too large for the mass of the craft, and otherwise only at deflections far beyond the range
+    /// of a linear model.
     pub fn is_beyond(&self, eta: &[f64]) -> bool {
         if self.is_too_heavy {
             return true;
         }
-        // Most deflections take far less than the inertia that the craft has; NaN does not pass.
+        // Quick check: usual deflections take far less than the craft's inertia. NaN does not pass it.
         let taken =
             self.shares.iter().zip(eta).fold(0.0, |sum, (share, eta)| sum + share * eta.abs());
         if taken < 0.5 {
@@ -335,8 +339,8 @@ pub(crate) fn beyond_message(eta: &[f64]) -> String {
     )
 }
 
-/// Appendages with the power series of their motion. The fields after the series are the terms of the current
-/// order that do not depend on [a; w'] of this order.
+/// Appendages with the power series of their motion. The fields after the series are the terms of the current order that do
+/// not depend on the accelerations [a; w'] of this order.
 #[derive(Clone, Debug)]
 pub(crate) struct Flexing {
     pub structure: Structure,
@@ -346,7 +350,7 @@ pub(crate) struct Flexing {
     momentum: Vector,
     moment: Vector,
     growth: [Symmetric; ORDER + 1],
-    /// The vectors w x y and D w, and the sums of these vectors with K and L (see the module's
+    /// `turned` and `grown` are the vectors w x y and D w; `flow` and `spin` are their sums with K and L (see the module's
     /// head).
     turned: Vector,
     grown: Vector,
@@ -354,8 +358,7 @@ pub(crate) struct Flexing {
     spin: Vector,
     pull: [f64; APPENDAGES],
     second: [f64; APPENDAGES],
-    /// True while coefficient 1 of the series is a derivative along a direction of the states and
-    /// not a derivative by time.
+    /// True while coefficient 1 of the series is a directional derivative instead of a derivative by time.
     along: bool,
 }
 
@@ -391,7 +394,7 @@ impl Flexing {
         self.grown[0] = times(&symmetric(self.growth[0]), w);
     }
 
-    /// Sets coefficient 1 to the derivatives along `dx` (of the states) and `dw` (of the angular velocity).
+    /// Sets coefficient 1 to the derivatives for a change of the states by `dx` and of the angular velocity by `dw`.
     pub fn seed_direction(&mut self, dx: &[f64; STATES], w: Vec3, dw: Vec3) {
         self.along = true;
         for j in 0..self.structure.len() {
@@ -454,7 +457,7 @@ impl Flexing {
             self.eta[j][n + 1] = self.rate[j][n] / order;
         }
         self.set_displacement(n + 1);
-        // Rates of w x y and D w without the newest w'.
+        // Derivatives of w x y and D w by time, without the terms that contain w' of the newest order.
         let [turned, grown] = if self.along && n == 1 {
             self.rates_along(w, w_d)
         } else {
@@ -490,8 +493,8 @@ impl Flexing {
         [force, torque]
     }
 
-    /// Returns the derivatives of two vectors along the direction, with w' held constant: of w' x y + w x K, and of D
-    /// w' + (sum of D eta') w. The module's head defines y, K and D.
+    /// Returns the directional derivatives of w' x y + w x K and of D w' + (sum of D eta') w while w' is constant. The
+    /// module's head defines y, K and D.
     fn rates_along(&self, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         let [slope, slope_1] =
             [0, 1].map(|n| self.structure.growth(&self.coefficients(&self.rate, n)));
@@ -518,7 +521,8 @@ impl Flexing {
         self.grown[n + 1] = add(self.grown[n + 1], times(&symmetric(self.growth[0]), w));
     }
 
-    /// Returns eta' and eta'' of order n, or their derivatives along the direction.
+    /// Returns coefficient n of eta' and eta'' of all modes; in a directional derivative, coefficient 1 is the derivative of
+    /// both.
     pub fn rates(&self, n: usize) -> [[f64; APPENDAGES]; 2] {
         [self.coefficients(&self.rate, n), self.second]
     }
@@ -530,8 +534,8 @@ impl Flexing {
             .fold(0.0, |sum, (mode, rate)| sum + mode.damping * series::square(n, rate))
     }
 
-    /// Returns the scale of the modes' rates eta' within the time `t`, s, to which their allowed
-    /// error is relative.
+    /// Returns the scale to which the allowed error of the modes' rates eta' is relative, estimated over the next `t`
+    /// seconds.
     pub fn speed_scale(&self, t: f64) -> f64 {
         let [eta, rate, second] = [(&self.eta, 0), (&self.rate, 0), (&self.rate, 1)]
             .map(|(of, n)| self.coefficients(of, n));

@@ -9,27 +9,29 @@
 //! f(x) = (d + sqrt(d^2 + delta^2))/2 - (-s_b + sqrt(s_b^2 + delta^2))/2,   d = x - s_b
 //! ```
 //!
-//! q = 1/2: a laminar layer at the wall; 1: constant damping ratio; 0: constant c (`DampingLaw`). x is the specific
-//! force along the tank's axis at the hinge. SloshTank takes x from the given motion, Spacecraft from craft and liquids
-//! as one rigid body (`motion.rs`). The bobs' own drag would change x by about 1e-4 and make it the solution of an
-//! equation. a_+ equals x if thrust presses the liquid to the tank's bottom, falls smoothly to 0 if thrust pulls the
-//! tank away, and is a_f/2 without thrust. zeta_A makes the damping ratio grow with the amplitude, zeta + zeta_A A.
-//! A_0, far below any motion of interest, keeps the root analytic.
+//! q depends on the `DampingLaw`: 1/2 for a laminar layer at the wall, 1 for a constant damping ratio, 0 for a constant c. x
+//! is the specific force along the tank's axis at the hinge. SloshTank computes x from the given motion of the host,
+//! Spacecraft from the motion of craft and liquids as one rigid body (`motion.rs`). The drag of the bobs would change x by
+//! about 1e-4, but x would then be the solution of an equation. a_+ equals x if thrust presses the liquid to the tank's
+//! bottom, falls smoothly to 0 if thrust pulls the tank away, and is a_f/2 without thrust. With zeta_A the damping ratio
+//! grows with the amplitude A, as zeta + zeta_A A. A_0 is far below any motion of interest and keeps the root analytic.
 //!
-//! Breaking waves dissipate in proportion to max(0, k a - s_b). k a is the steepness: wave number times elevation at the wall. In
-//! an upright cylinder k = xi_n/R, and the elevation per slosh angle is 2 R/(xi_n^2 - 1), at any depth (`formulas::cylinder`). A
-//! general tank has no parameter for its wave number, and `wave` may be left at 0. So every mode takes the cylinder's steepness
-//! per angle, 1.54 for mode 1, and s_b belongs to it. A box has k a = 4/pi A: multiply a measured s_b by 1.21. f is the function
-//! max(0, x - s_b) with its corner rounded over delta and shifted so that f(0) = 0. Written as
+//! Breaking waves dissipate in proportion to max(0, k a - s_b). k a is the steepness: wave number times elevation at the
+//! wall. In an upright cylinder k = xi_n/R, and the elevation per slosh angle is 2 R/(xi_n^2 - 1), at any depth
+//! (`formulas::cylinder`). A tank of another shape has no parameter for its wave number, and its `wave` may be 0. Therefore
+//! every mode of every tank uses the cylinder's steepness per angle, which is 1.54 for mode 1, and s_b refers to this
+//! steepness. For a box, where k a = 4/pi A, a measured s_b has to be multiplied by 1.21. f is the function max(0, x - s_b)
+//! with its corner rounded over delta and shifted so that f(0) = 0. Written as
 //!
 //! ```text
 //! f(x) = x [1 + (x - 2 s_b)/(sqrt(d^2 + delta^2) + sqrt(s_b^2 + delta^2))]/2
 //! ```
 //!
-//! f is never negative, not even by rounding. Every part of c is positive or 0, so the drag never drives.
+//! f is never negative, not even by rounding. Since every part of c is positive or 0, the drag never drives the motion.
 //!
-//! Source of the law: peaks of forced waves in a box (Baeuerlein and Avila). At k a = 0.22, 0.40, 0.66 and 0.81 they need
-//! zeta = 0.0079, 0.0082, 0.0091 and 0.0142. So s_b is 0.60 to 0.66 and zeta_b about 0.04, in other records 0.03 to 0.09.
+//! Source: peaks of forced waves in a box, measured by Baeuerlein and Avila. To reproduce the peaks at k a = 0.22, 0.40,
+//! 0.66 and 0.81 the damping ratio must be 0.0079, 0.0082, 0.0091 and 0.0142. This gives s_b from 0.60 to 0.66 and zeta_b of
+//! about 0.04; other records give 0.03 to 0.09.
 
 use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
@@ -42,8 +44,8 @@ const SMALLEST: f64 = 1e-4;
 
 const CORNER: f64 = 0.02;
 
-/// Damping by breaking waves of a mode: zeta_b, the steepness s_b at which breaking `begins`, with
-/// sqrt(s_b^2 + delta^2), and the steepness per amplitude k a/A, 1/rad.
+/// Damping of a mode by breaking waves: zeta_b, the steepness s_b at which breaking `begins`, `root` = sqrt(s_b^2 +
+/// delta^2), and the steepness per amplitude, k a/A, 1/rad.
 #[derive(Clone, Copy, Debug)]
 struct Breaking {
     zeta: f64,
@@ -64,7 +66,7 @@ impl Breaking {
     }
 }
 
-/// Largest step as a share of the time to the nearest singularity of a power series.
+/// Largest step of the solver as a fraction of the estimated radius of convergence of a power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
 /// Power series of the damping by breaking waves, w f(k a), and of the products in it.
@@ -116,9 +118,9 @@ impl Excess {
     }
 }
 
-/// One mode's drag in a tank with constant contents, with the series of its law. `growth` is 2 m zeta_A, kg/rad; `c_ref` is c at
-/// g_ref without its dependence on the amplitude, N s/m; `w2_ref` is w_ref^2 and `floor2` is a_f^2. `instant` is the same law,
-/// with m and l, for values at an instant, against which the series is checked.
+/// Drag of one mode in a tank that does not drain, with the power series of c. `growth` is 2 m zeta_A, kg/rad; `c_ref` is c
+/// at g_ref without the terms that depend on the amplitude, N s/m; `w2_ref` is w_ref^2 and `floor2` is a_f^2. `instant`
+/// computes c directly from values at one instant, to which the series is compared.
 #[derive(Clone, Debug)]
 pub struct Drag {
     law: DampingLaw,
@@ -227,9 +229,9 @@ impl Drag {
     /// Estimates the time, s, over which the series of the drag coefficient c converge reliably, from their
     /// coefficients 0 to 2.
     ///
-    /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that
-    /// crosses zero passes close by the first. On both sides a_+ is almost linear in x, or almost 0, so its
-    /// coefficients do not show the singularity.
+    /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that crosses zero passes
+    /// close to x = +-i a_f. Before and after the crossing a_+ is almost linear in x, or almost 0, so that its coefficients
+    /// do not show the singularity.
     pub fn convergence_radius(&self) -> f64 {
         let [_, slope, bend] = [0, 1, 2].map(|n| self.x[n].abs());
         let mut time = time_within(self.root[0], slope, bend);
@@ -241,8 +243,8 @@ impl Drag {
         SHARE_OF_RADIUS * time.min(excess)
     }
 
-    /// Returns the error, 1/s, of the drag coefficient per mass, c/m, that arises because its series ends at order n.
-    /// `h` (s) is the time since the start of the expansion.
+    /// Returns the error, 1/s, of c/m (drag coefficient divided by mass) at the time `h`, s, after the start of the
+    /// expansion that arises because the series of c ends at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let (law, size) = self.instant;
         let [x, c] = values([&self.x, &self.c], n, h);
@@ -309,7 +311,7 @@ impl Law {
     ) -> T {
         let stiffness = m.recip() * self.k;
         let reference = (l.recip() * self.g_ref + stiffness).sqrt();
-        // Evaluated in the order of `Tank::drag`, so that a constant c is bit-identical.
+        // The order of evaluation is as in `Tank::drag`, so that a constant c is bit-identical to it.
         let viscous = match zeta {
             Some(zeta) => m * reference * (zeta * 2.0),
             None => m * reference * (2.0 * self.zeta),

@@ -1,8 +1,7 @@
-//! Hand-over of a liquid between pendulums and detached liquid (`lump.rs`), and impacts of the detached liquid:
-//! impulses on the carrier of the tank, a craft or a host.
+//! Transitions of a liquid between slosh (pendulums) and detached liquid (`lump.rs`), and impacts of the detached liquid on
+//! the wall. They are impulses on the carrier of the tank, which is a spacecraft or the host of a SloshTank.
 //!
-//! Each hand-over conserves momentum and angular momentum about the common centre of mass, and loses energy; see
-//! `lump.rs`.
+//! Each transition conserves momentum and angular momentum about the common centre of mass, and loses energy; see `lump.rs`.
 
 use taylor::space::Vector;
 use taylor::vector::{Vec3, add, cross, dot, scale, sub, times};
@@ -14,38 +13,38 @@ use crate::rigid::{Factors, Rigid};
 use crate::sizes::MODES;
 use crate::state::BallState;
 
-/// Carrier of tanks whose liquid can detach: the spacecraft, or the host's craft of a SloshTank. `lump` is
-/// the number of a detached liquid, `t` is the time since the start of the call, s. Vectors are in body axes.
+/// Carrier of tanks whose liquid can detach: the spacecraft, or the host of a SloshTank. In all methods `lump` is the index
+/// of the detached liquid and `t` is the time since the start of the call, s. Vectors are in body axes.
 pub(crate) trait Carrier {
-    /// Copy of everything that a change may alter, from which the carrier can be restored.
+    /// Copy of all data that [`Carrier::change`] may alter, from which they can be restored.
     type Memory;
 
     fn memory(&self) -> Self::Memory;
 
     fn restore(&mut self, memory: &Self::Memory);
 
-    /// Computes all quantities of the equations of motion at the time `t`, from the present states.
+    /// Computes all quantities of the equations of motion from the present states at the time `t`.
     fn evaluate_at(&mut self, t: f64);
 
     fn lump(&self, lump: usize) -> &Lump;
 
     fn ball_state(&mut self, lump: usize) -> &mut BallState;
 
-    /// Returns position and velocity of the detached liquid number `lump`, six numbers, among the
-    /// carrier's states.
+    /// Returns the position and velocity (six numbers) of detached liquid in the carrier's state vector.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
-    /// Returns the six states of one bob of the lump's tank: its direction p and its velocity v relative to the hinge.
+    /// Returns direction p and rate p' (six numbers) of bob `n` in the tank of the detached liquid, in the carrier's state
+    /// vector.
     fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
 
     fn directions(&self, lump: usize) -> Directions;
 
-    /// Returns the bobs of the tank in which the detached liquid number `lump` is, with their
-    /// present motion. [`Carrier::evaluate_at`] must have been called.
+    /// Returns the bobs of the tank to which the detached liquid belongs, with their present motion.
+    /// [`Carrier::evaluate_at`] must have been called.
     fn bobs_beside(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>>;
 
-    /// Returns the masses that move in the tanks, all bobs and all detached liquids, with their
-    /// present motion. [`Carrier::evaluate_at`] must have been called.
+    /// Returns all masses that move within the tanks, that is, bobs and detached liquids, with their present motion.
+    /// [`Carrier::evaluate_at`] must have been called.
     fn points(&self) -> impl Iterator<Item = BobNow<f64>>;
 
     fn rigid(&self) -> Rigid;
@@ -54,7 +53,7 @@ pub(crate) trait Carrier {
         None
     }
 
-    /// Returns the acceleration a, the angular velocity w and the angular acceleration w' of the carrier.
+    /// Returns the power series of the carrier's acceleration a, angular velocity w and angular acceleration w'.
     fn motion(&self) -> [&Vector; 3];
 
     /// Returns the factorised mass matrix of the carrier with everything attached to it.
@@ -62,16 +61,16 @@ pub(crate) trait Carrier {
 
     fn dissipated(&mut self) -> &mut f64;
 
-    /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of the velocity V
-    /// of O and of the angular velocity w.
+    /// Applies an impulse and its moment about O to the carrier and to the liquid that moves with it. Returns the changes of
+    /// the velocity V of O and of the angular velocity w.
     fn apply_impulse(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
 
     fn shift(&mut self, by: Vec3);
 
     fn is_pressed(&mut self, lump: usize, t: f64) -> bool;
 
-    /// Performs the event `due` of the lump at the time `t`: it leaves the bottom, meets the wall, is
-    /// released from it, begins or ends to feel drag, or settles.
+    /// Performs the event `due` of a liquid at the time `t`: the liquid leaves the bottom, hits the wall, leaves the wall,
+    /// starts or ceases to have drag, or is taken over by the pendulums.
     #[inline(never)]
     fn change(&mut self, lump: usize, due: Due, t: f64) {
         self.evaluate_at(t);
@@ -107,8 +106,9 @@ pub(crate) trait Carrier {
         self.lump(lump).may_settle(a, w, w_d)
     }
 
-    /// Returns the kinetic energy and the energy of the centring springs in a frame in which O moves with `v`, body axes, after
-    /// [`Carrier::evaluate_at`]. With a small `v` no large terms cancel, however fast the carrier is.
+    /// Returns the kinetic energy plus the energy of the centring stiffness, in a frame in which O moves with the
+    /// velocity `v`, body axes. With a small `v` no large terms cancel, however fast the carrier is.
+    /// [`Carrier::evaluate_at`] must have been called.
     fn energy_with(&self, v: Vec3) -> f64 {
         let (w, mut rigid, mut energy) = (self.motion()[1][0], self.rigid(), 0.0);
         if let Some(deformed) = self.deformed() {
@@ -126,7 +126,7 @@ pub(crate) trait Carrier {
         energy
     }
 
-    /// Returns the mass of everything and the velocity of its centre relative to O, body axes.
+    /// Returns the mass of carrier and liquids and the velocity of their common centre of mass relative to O, body axes.
     fn drift_of_center(&self) -> (f64, Vec3) {
         let (w, rigid) = (self.motion()[1][0], self.rigid());
         let mut momentum = cross(w, rigid.moment);
@@ -142,9 +142,8 @@ pub(crate) trait Carrier {
         (mass, scale(1.0 / mass, momentum))
     }
 
-    /// Detaches the liquid of the tank with the number `lump` from the bottom at the time `t`. The
-    /// liquid's centre keeps its velocity. Motions within the liquid end in its shape, and the
-    /// carrier takes over their moment of momentum.
+    /// Detaches the liquid of a tank from the bottom. The centre of the liquid keeps its velocity. Motions of the bobs
+    /// relative to the centre end, and the carrier receives their angular momentum.
     fn leave(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let center = self.lump(lump).common_center(&self.directions(lump));
@@ -161,8 +160,7 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// Reflects the detached liquid at the wall, or holds it there if it is slow and pressed to the
-    /// wall.
+    /// Lets detached liquid bounce off the wall, or puts it into a sliding state if it is slow and pressed to the wall.
     fn throw_back(&mut self, lump: usize, t: f64) {
         let before = self.memory();
         let (e, contact_speed) = self.lump(lump).restitution();
@@ -181,9 +179,8 @@ pub(crate) trait Carrier {
         self.strike(lump, e, t);
     }
 
-    /// Moves detached liquid that has passed through the wall in a step of the host's integrator
-    /// back onto the wall. Its velocity, the common centre of mass and the angular momentum stay as
-    /// they are.
+    /// Moves detached liquid back onto the wall if a step of the host's integrator has carried it through the wall. The
+    /// velocity of the liquid, the common centre of mass and the angular momentum do not change.
     fn bring_to_wall(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();
@@ -202,8 +199,7 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// Puts the detached liquid on the wall in the state `on_wall`. Returns true if the wall
-    /// presses on it.
+    /// Puts the detached liquid on the wall in the sliding state `on_wall`. Returns true if it is pressed to the wall there.
     fn try_on_wall(&mut self, lump: usize, on_wall: BallState, t: f64) -> bool {
         *self.ball_state(lump) = on_wall;
         self.is_pressed(lump, t)
@@ -219,20 +215,20 @@ pub(crate) trait Carrier {
         for i in 3..6 {
             numbers[i] += change[i];
         }
-        // (1 + e) mu v_n = J
+        // The impulse is J = (1 + e) mu v_n.
         let j = libm::sqrt(dot(impulse[0], impulse[0]));
         *self.dissipated() += (1.0 - e) * j * v_n / 2.0;
     }
 
-    /// Hands the detached liquid over to the tank's pendulums. Returns true if the hand-over loses
-    /// energy, as it must. Otherwise the states are unusable and the caller has to restore them.
+    /// Lets the pendulums of the tank take over the detached liquid. Returns true if the energy decreases, as it must. If it
+    /// returns false, the states are invalid and the caller has to restore them.
     fn settle(&mut self, lump: usize, t: f64) -> bool {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();
         let (settling, w) = (self.lump(lump), self.motion()[1][0]);
         let p = settling.hanging();
-        // The parts move to their hinges, each with its velocity, so that the whole keeps its angular momentum about
-        // the same centre of mass.
+        // Each part of the liquid moves to its hinge with its velocity unchanged, so that the angular momentum about the
+        // common centre of mass is conserved.
         let moved = sub(settling.common_center(&p), settling.position());
         let velocity = add(cross(w, settling.position()), settling.rate());
         let lever = scale(-settling.m, cross(moved, sub(velocity, of_center)));
@@ -253,7 +249,7 @@ pub(crate) trait Carrier {
         self.evaluate_at(t);
         let loss = before - self.energy_with(dv);
         *self.dissipated() += loss;
-        // Rounding error.
+        // The tolerance is for rounding errors.
         loss >= -1e-14 * before
     }
 }

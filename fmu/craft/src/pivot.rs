@@ -1,4 +1,5 @@
-//! Forces of a pivot other than holding O: stiffness against tilt, damping and dry friction about each axis.
+//! Torques of a pivot, besides the force that keeps O in place: stiffness against tilt, damping and dry
+//! friction about each axis.
 //!
 //! The pivot's axis is the inertial z axis. Z = C^T e_z is its direction in body axes, (0, 0, 1) for an upright craft.
 //! Z_y and -Z_x are the craft's small tilt angles about x and y.
@@ -13,16 +14,17 @@
 //! r_z act on rotation about the axis, through any number of revolutions. Without dry friction the torque is a polynomial in Z
 //! and w and enters the series unchanged.
 //!
-//! r is Stribeck's curve (Rubaga's thesis, eq. 5.1) with its jump at rest smoothed over eps, as in HubSlosh's friction
-//! `stribeck_smooth`. An axis that should stick creeps instead, at |w| ~ eps |torque|/(C + D).
+//! r is Stribeck's curve (Rubaga's thesis, eq. 5.1), in which the jump at rest is smoothed over eps, as in HubSlosh's
+//! friction model `stribeck_smooth`. Instead of sticking, an axis under a torque below the static friction therefore creeps,
+//! at |w| ~ eps |torque|/(C + D).
 
 use taylor::number::Number;
 use taylor::series::{self, Series, ZERO};
 use taylor::space::{Vector, products};
 use taylor::vector::{Mat3, Vec3};
 
-/// Stiffness against tilt about x and y, N m/rad, damping coefficient about each axis, N m s/rad, and dry
-/// friction of the pivot, body axes.
+/// Pivot of the craft at O, body axes: stiffness `k` against tilt about x and y, N m/rad, damping coefficient `c` about each
+/// axis, N m s/rad, and dry friction.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Pivot {
@@ -31,8 +33,8 @@ pub struct Pivot {
     pub friction: PivotFriction,
 }
 
-/// Dry friction about each axis: Coulomb torque `c` and excess `d` of the static friction torque, N m,
-/// Stribeck speed `omega_s` and width `eps` of the smoothed sign, rad/s, both above 0.
+/// Dry friction of the pivot about each body axis: Coulomb torque `c` and excess `d` of the static friction torque over it,
+/// N m, Stribeck speed `omega_s` and width `eps` of the smoothed sign function, rad/s, both above 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct PivotFriction {
@@ -105,8 +107,8 @@ impl Pivot {
     }
 }
 
-/// Power series of the dry friction about one axis: of w, of u' and e = exp u with u = -(w/w_s)^2, of v' and t = tanh
-/// v with v = w/eps, of 1 - t^2, and of C + D e and r.
+/// Power series of the dry friction about one axis, with u = -(w/w_s)^2, e = exp u, v = w/eps and t = tanh v: the series of
+/// w, u', e, v', t, 1 - t^2, C + D e and r.
 #[derive(Clone, Debug)]
 pub(crate) struct Rubbing {
     c: f64,
@@ -159,10 +161,11 @@ impl Rubbing {
     /// Estimates the time, s, over which the series of the friction torque converges reliably, from the first three
     /// coefficients w, w' and w''/2 of the rate.
     ///
-    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so flat that its
-    /// coefficients do not show the poles, so the method uses half of this distance. exp(-v^2), v = w/w_s, has no poles. Beyond v
-    /// = 3 its terms are too small for any tolerance but grow before they decay: over dv the term of order n is (2 v dv)^n/n!.
-    /// The limit either keeps v above 5.3, where the term stays below 1e-12, or makes the terms decay from order 5 on.
+    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Where |v| is large tanh is so flat
+    /// that its coefficients do not show the poles; therefore half of this distance is used. exp(-v^2) with v = w/w_s has
+    /// no poles. Beyond v = 3 its terms are too small for any tolerance but grow before they decay: over dv the term of
+    /// order n is (2 v dv)^n/n!. The limit either keeps v above 5.3, where the term stays below 1e-12, or makes the terms
+    /// decay from order 5 on.
     pub(crate) fn convergence_radius(&self, w: [f64; 3]) -> f64 {
         if self.c + self.d == 0.0 {
             return f64::INFINITY;
@@ -203,7 +206,7 @@ mod tests {
         let (torque, dissipation, energy) = PIVOT.present(&axes, W);
         assert_eq!(torque, [1.125 - 0.25, 0.9375 + 0.25, 0.25 - 4.0]);
         assert_eq!((dissipation, energy), (8.375, 0.53125));
-        // U' = -torque.w, for Z' = Z x w, minus the dissipation
+        // U' = -torque.w for Z' = Z x w, apart from the dissipation.
         let turning = cross(Z, W);
         let change = 3.0 * Z[1] * turning[1] + 5.0 * Z[0] * turning[0];
         assert_eq!(change, -dot(torque, W) - dissipation);
@@ -232,8 +235,8 @@ mod tests {
         }
     }
 
-    /// The craft turns about one axis at the Stribeck speed; the friction torque opposes the rate with the parameters of
-    /// this axis.
+    /// The craft turns about one axis at the Stribeck speed of this axis. The friction torque opposes the rate and has the
+    /// value that the parameters of this axis give.
     #[test]
     fn dry_friction_of_a_pivot_has_its_own_stribeck_curve_about_each_axis() {
         let friction =
@@ -259,9 +262,9 @@ mod tests {
         }
     }
 
-    /// The power series are used up to half of the distance to the nearest pole of tanh, v = i
-    /// pi/2, by v'' t^2/2 alone and by v' t. With an excess D of static friction, from w = 4 w_s
-    /// on, they are used over 2.5/4 of w_s if this is shorter.
+    /// Near rest the series are used up to half of the distance to the nearest pole of tanh, v = i pi/2. The distance in
+    /// time follows from v' t, or from v'' t^2/2 if v' = 0. With an excess D of static friction, from w = 4 w_s on, they are
+    /// used only while w changes by less than 2.5/4 of w_s, if this time is shorter.
     #[test]
     fn power_series_of_dry_friction_are_used_up_to_half_the_distance_to_the_nearest_pole() {
         let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };
@@ -270,11 +273,11 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
         near(rubbing.convergence_radius([0.0, 0.0, 3.0]), libm::sqrt(way / 300.0));
         near(rubbing.convergence_radius([0.0, -3.0, 0.0]), way / 300.0);
-        // both terms: (v')^2 + 4 v''/2 way = 10^2 + 4 100 way
+        // v' and v'' both count: (v')^2 + 4 v''/2 way = 10^2 + 4 100 way.
         let speed = 10.0 + libm::sqrt(100.0 + 400.0 * way);
         near(rubbing.convergence_radius([0.0, 0.1, -1.0]), 2.0 * way / speed);
         assert_eq!(rubbing.convergence_radius([0.0; 3]), f64::INFINITY);
-        // away from 0 the pole is farther: v = 3
+        // At v = 3, away from rest, the pole is farther away.
         near(rubbing.convergence_radius([0.03, 0.01, 0.0]), 0.5 * libm::sqrt(9.0 + 2.4674));
         let curved = Rubbing::new(&PivotFriction { d: [1.0; 3], ..friction }, 0);
         near(curved.convergence_radius([0.4, 0.01, 0.0]), 2.5 / 4.0 / 0.1);

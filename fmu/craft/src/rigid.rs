@@ -1,4 +1,4 @@
-//! Rigid bodies seen from O, and the 6 x 6 system that the craft's motion solves:
+//! Mass properties of rigid bodies about O, and the 6 x 6 linear system that the craft's accelerations solve:
 //!
 //! ```text
 //! M = [ m 1     -[S]x ]     S = sum of m s,  I = sum of J + m (|s|^2 1 - s s^T), both about O
@@ -12,8 +12,8 @@ use core::ops::Mul;
 use taylor::number::Number;
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
-/// Smallest element of D in the factorisation L D L^T, relative to the matrix's diagonal, with
-/// which a mass matrix counts as regular.
+/// Smallest ratio of an element of D, in the factorisation L D L^T of a mass matrix, to the diagonal element of the matrix.
+/// A matrix with a smaller ratio counts as singular.
 pub(crate) const SINGULAR: f64 = 1e-12;
 
 pub type Mat6<T = f64> = [[T; 6]; 6];
@@ -47,8 +47,7 @@ impl Rigid {
         }
     }
 
-    /// Returns the body as numbers with derivatives. Only its inertia changes, with the derivative
-    /// `slope`, kg m2.
+    /// Returns the body as dual numbers. Only its inertia has a derivative, `slope`, kg m2.
     pub fn with_inertia_slope<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
         let element = |i: usize, j: usize| T::with_slope(self.inertia[i][j], slope[i][j]);
         Rigid { inertia: [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j))), ..self.lift() }
@@ -56,9 +55,9 @@ impl Rigid {
 }
 
 impl<T: Number> Rigid<T> {
-    /// Creates an axially symmetric body on the axis e through the point d, from the moments m, m z and m z^2 of its mass along
-    /// the axis, where z is the distance from d, and from its moments of inertia without their parts m z^2: `i_z` about e, and
-    /// `i_0` about axes perpendicular to e.
+    /// Creates an axially symmetric body on the axis e through the point d. Its mass distribution along the axis has the
+    /// moments m, m z and m z^2, where z is the distance from d. `i_z` is the moment of inertia about e, and `i_0` the
+    /// moment of inertia about a perpendicular axis without the part m z^2.
     pub fn on_axis([d, e]: [Vec3; 2], [m, first, second]: [T; 3], [i_0, i_z]: [T; 2]) -> Rigid<T> {
         let across = i_0 + second + m * dot(d, d) + first * (2.0 * dot(d, e));
         let along = i_z - i_0 - second;
@@ -149,12 +148,12 @@ pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
 
-/// Largest inverse of a mass, 1/kg, or inertia, 1/(kg m2), that is used. Products of this inverse
-/// with masses up to 1e12 kg and arms up to 1e9 m do not overflow.
+/// Largest inverse of a mass, 1/kg, or of a moment of inertia, 1/(kg m2), for which products with masses up to 1e12 kg and
+/// arms up to 1e9 m do not overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
-/// Smallest divisor in the solution of a linear system. With it the factors of any matrix are
-/// finite; its inverse is above [`LARGEST_INVERSE`].
+/// Smallest divisor in the solution of a linear system, so that the factors of any matrix are finite. Its inverse is above
+/// [`LARGEST_INVERSE`], by which a singular matrix is recognised.
 pub(crate) const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 
 /// Factorisation L D L^T of a symmetric positive definite matrix; L has ones on its diagonal and is used only
@@ -175,9 +174,9 @@ impl<T: Number, const N: usize> Factors<T, N> {
         factors
     }
 
-    /// Factorises a matrix that may be far from positive definite, because a host whose integration diverges
-    /// hands over any states. If the matrix is not positive definite, all factors are 0 and
-    /// [`Factors::solve`] returns 0: products of the true factors could overflow.
+    /// Factorises a matrix that may not be positive definite, because a host whose integration diverges sets any
+    /// states. For such a matrix all factors are 0 and [`Factors::solve`] returns 0, because products of the
+    /// true factors could overflow.
     pub fn definite_or_zero(matrix: &[[T; N]; N]) -> Factors<T, N> {
         let zero = T::constant(0.0);
         let mut factors = Factors { l: [[zero; N]; N], inverse: [zero; N] };
@@ -191,7 +190,7 @@ impl<T: Number, const N: usize> Factors<T, N> {
         factors
     }
 
-    /// Factorises another matrix in place, because copies of matrices would take a fortieth of a step's
+    /// Replaces the factors by those of another matrix in place, because a copy would take a fortieth of a step's
     /// instructions.
     #[inline(always)]
     pub fn set(&mut self, matrix: &[[T; N]; N]) {
@@ -225,8 +224,8 @@ impl<T: Number, const N: usize> Factors<T, N> {
 }
 
 impl<M: Copy> Factors<M> {
-    /// Solves the linear system of the factorised matrix for the right-hand side `b`. The matrix may be constant
-    /// although `b` has derivatives.
+    /// Solves the linear system of the factorised matrix for the right-hand side `b`, which may be dual numbers although
+    /// the matrix is constant.
     #[inline(always)]
     pub fn solve<T: Number + Mul<M, Output = T>>(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];
@@ -256,9 +255,9 @@ impl<M: Copy, const N: usize> Factors<M, N> {
     }
 }
 
-/// Returns the smallest ratio of an element of D, in the factorisation L D L^T, to the matrix's
-/// diagonal element. It is small if the matrix is nearly singular, and 0 for a matrix that is not
-/// positive definite or whose inverse exceeds [`LARGEST_INVERSE`].
+/// Returns the smallest ratio of an element of D, in the factorisation L D L^T, to the matrix's diagonal element. It is
+/// small if the matrix is nearly singular, and 0 if the matrix is not positive definite or its inverse exceeds
+/// [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
     let Factors { inverse, .. } = Factors::new(matrix);
     // NaN is outside the range.
@@ -284,16 +283,16 @@ impl Factors {
     }
 }
 
-/// Returns the largest eigenvalue of M^-1 A for symmetric matrices M and A, with M given by its
-/// factors `m`. Jacobi rotations diagonalise a symmetric matrix with the same eigenvalues.
+/// Returns the largest eigenvalue of M^-1 A for symmetric matrices M and A, where `m` are the factors of M. It is computed
+/// by Jacobi rotations of a symmetric matrix with the same eigenvalues.
 pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
     let rows = a.map(|row| m.half_solve(&row));
     let mut b: Mat6 = core::array::from_fn(|i| m.half_solve(&rows.map(|row| row[i])));
-    // Convergence is quadratic: six sweeps reach rounding, the rest is margin.
+    // Convergence is quadratic: six sweeps reach rounding accuracy, the others are a margin.
     for _ in 0..12 {
         for p in 0..5 {
             for q in p + 1..6 {
-                // Negligible, and the following expressions would overflow.
+                // The element is negligible, and the following expressions would overflow.
                 if b[p][q].abs() <= 1e-150 * (b[q][q] - b[p][p]).abs() {
                     continue;
                 }
@@ -339,8 +338,8 @@ mod tests {
             let b = matrix.map(|row| (0..6).map(|i| row[i] * x[i]).sum::<f64>());
             let [a, w_d] = factors.solve([[b[0], b[1], b[2]], [b[3], b[4], b[5]]]);
             for (got, want) in a.iter().chain(&w_d).zip(x) {
-                // Rounding times the condition number, which is below 100 with rows scaled to each
-                // other.
+                // The error is rounding times the condition number of the matrix, which is below 100 after its rows are
+                // scaled.
                 assert!((got - want).abs() < 1e-13, "{got} {want}");
             }
         }

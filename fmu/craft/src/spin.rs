@@ -1,4 +1,5 @@
-//! Spin of a tank's liquid: angular momentum L of the liquid's vorticity about the tank's centre, three states in tank axes.
+//! Spin of a tank's liquid: angular momentum L of the liquid's vorticity about the tank's centre, three continuous
+//! states in tank axes.
 //!
 //! ```text
 //! H gains Gamma L,  E gains L.I^-1 L/2        Gamma = diag(gamma, gamma, 1),  I = diag(A', A', I_zz)
@@ -8,8 +9,8 @@
 //! ```
 //!
 //! With no other torque H' = -w x H in body axes, and E' = w.(H' + w x H) - s.K s: momentum is conserved and the energy
-//! decreases by exactly the dissipation, in motions of any size. L' does not contain w', so that neither mass matrix nor
-//! impulses change.
+//! decreases by exactly the dissipation, in motions of any size. L' does not contain w', so that the spin changes neither
+//! the mass matrix nor the response to an impulse.
 //!
 //! The liquid of a full spheroid with the semi-axes a, a, c moves so without approximation (Poincare): A' = m (a^2 + c^2)/5,
 //! I_zz = 2 m a^2/5, gamma = 2 a c/(a^2 + c^2), and the inertia of its potential flow, m (a^2 - c^2)^2/(5 (a^2 + c^2)), is the
@@ -36,7 +37,8 @@ use taylor::vector::{
 use crate::constrained::ConstrainedBob;
 use crate::parameters::Tank;
 
-/// Parameters of a tank's spinning liquid, with the symbols above; vectors are diagonals in tank axes.
+/// Parameters of a tank's spinning liquid, with the symbols of the module's head. Vectors are the diagonals of
+/// matrices in tank axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spin {
     axes: Mat3,
@@ -45,8 +47,8 @@ pub(crate) struct Spin {
     friction: Vec3,
 }
 
-/// The spinning liquid at an instant: `torque` on the craft and angular momentum Gamma L, body axes; L', tank
-/// axes; energy and dissipation; W and W'.
+/// The spinning liquid at an instant: `torque` on the craft and angular momentum Gamma L, body axes; derivative L' by time,
+/// tank axes; energy and dissipated power; rate of spin W and its derivative W'.
 pub(crate) struct SpinNow<T> {
     pub torque: Vec3<T>,
     pub momentum: Vec3<T>,
@@ -61,7 +63,7 @@ fn multiply<T: Number>(diagonal: Vec3, x: Vec3<T>) -> Vec3<T> {
 }
 
 impl Spin {
-    /// Returns `None` for a tank whose liquid has no spin.
+    /// Returns the parameters of the spin; `None` if the tank's liquid has no spin.
     pub fn new(tank: &Tank) -> Option<Spin> {
         let inertia = tank.spin_inertias()?;
         let (gamma, [axial, across]) = (tank.spin_coupling, tank.spin_decay);
@@ -103,9 +105,8 @@ impl Spin {
     }
 }
 
-/// Quantities of mode 1 that determine the natural frequency omega_0 with which a spin rate is
-/// compared: 1/l, 1/m; k/m, 1/s2; and the smallest specific force along the tank, m/s2, that is
-/// used in omega_0^2.
+/// Quantities of mode 1 that give its natural frequency omega_0, to which the rate of spin is compared: 1/l, 1/m; k/m, 1/s2;
+/// and the smallest specific force along the tank, m/s2, that is used in omega_0^2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpinScale {
     pub inv_l: f64,
