@@ -1,4 +1,4 @@
-//! The craft's equations as power series: rigid body, wheels and bobs.
+//! The equations of motion of the craft (rigid body, wheels, bobs of the slosh modes) as power series in time:
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of F ; tau - h_w' - w x (I w + h_w) + sum of torque ]
@@ -8,11 +8,10 @@
 //! work' = f.C^T V + (tau - h_w').w
 //! ```
 //!
-//! F and torque are the bobs' loads on the craft at O without their added mass. M is factorised
+//! F and torque are the forces of the bobs on the craft and their torques about O, without the terms in M. M is factorised
 //! once per expansion, because coefficient n of [a; w'] solves the same system at every order.
 //!
-//! Velocity and position are expanded from their values at the start of the step, V_0 and r_0, in
-//! body axes:
+//! Velocity and position are expanded in body axes, as changes of V_0 and r_0, their values at the start of the step:
 //!
 //! ```text
 //! V = V_0 + C gain,        gain' = a - w x gain
@@ -20,17 +19,18 @@
 //! C^T V_0 = drift,        drift' = -w x drift
 //! ```
 //!
-//! The rounding error is then relative to the change in a step, however fast and far the craft is.
+//! The rounding error is then relative to the change within a step, however fast and far from the origin the craft is.
 //!
-//! With O on a pivot a = -C^T g is given, a' = -w x a. Only the lower half of the system remains, and tau includes the
-//! pivot's torque (pivot.rs), with the pivot's axis Z = C^T e_z, Z' = -w x Z.
+//! If O is on a pivot, a = -C^T g is given, and a' = -w x a. Then only the lower half of the system is solved. tau includes
+//! the pivot's torque (pivot.rs), which depends on the pivot's axis Z = C^T e_z, with Z' = -w x Z.
 //!
-//! Bobs that move on other surfaces than spheres, or in planes, add matrices of rank one to M (constrained.rs).
+//! Bobs that are guided in planes or move on other surfaces than spheres add matrices of rank one to M (constrained.rs).
 //!
 //! Liquid that spins (spin.rs) adds a couple, which depends on w and on the states of the tank.
 //!
-//! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the tank
-//! (lump.rs). The change from bobs to lump and back is an impulse at the root of an event function.
+//! If the liquid of a tank has detached, the tank has no rigid liquid and no bobs. Instead it has one free body, the
+//! lump, and an inertia that rotates with the tank (lump.rs). The change from bobs to lump and back is an impulse at the
+//! root of an event function.
 //!
 //! Source: Newton-Euler about O with the bobs' tensions eliminated.
 
@@ -66,12 +66,12 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::spin::SpinSeries;
 use crate::state::{BallState, Inputs, STATES, State, index};
 
-/// Time, s, over which the largest rates of a motion are estimated, because rates change only in a
-/// step much longer than this.
+/// Longest time, s, over which the change of rates is included in the scale of allowed errors. Only steps much longer than
+/// this could change the rates by more.
 pub const SCALE_TIME: f64 = 0.1;
 
-/// Returns coefficient n of the matrix w w^T - |w|^2 1, which maps a vector y to w x (w x y). The argument is
-/// coefficient n of w w^T, of which the elements xx, yy, zz, xy, xz, yz are given.
+/// Returns coefficient n of the matrix w w^T - |w|^2 1, which maps a vector y to w x (w x y). The argument is coefficient n
+/// of the elements xx, yy, zz, xy, xz, yz of w w^T.
 #[inline(always)]
 pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
     [[-yy - zz, xy, xz], [xy, -xx - zz, yz], [xz, yz, -xx - yy]]
@@ -86,8 +86,8 @@ fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
 }
 
-/// Replaces the upper half of a matrix so that the upper half of the solution equals the upper half of the right-hand side, which
-/// on a pivot is the given acceleration a.
+/// Replaces the upper three rows of the mass matrix so that the upper half of the solution equals the upper half of the
+/// right-hand side, which on a pivot is the given acceleration a.
 #[inline(always)]
 fn hold_upper_rows(matrix: &mut Mat6) {
     for i in 0..3 {
@@ -101,19 +101,20 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
-    /// In `state.kept`, whose expansion the step continues.
+    /// The states are in `state.kept`, because the step continues the expansion of an earlier step.
     Kept,
-    /// At the start of the step, in `before`, because the expansion starts with the step.
+    /// The states are in `before`, because the expansion starts together with the step.
     Step,
-    /// The states at the start are in `begin`, because the expansion starts within the step.
+    /// The states are in `begin`, because the expansion starts within the step.
     Within,
 }
 
-/// The craft at its current state and the series of its motion. `craft` is the dry craft, `parked` the bobs
-/// of tanks whose liquid has detached, and `whole` craft and liquids at rest as one rigid body, on whose
-/// motion along the tanks the bobs' drag depends. M is `matrix`; `w_both` is (w, w); `torque` is tau - h_w'.
-/// `couple` is the torque of pivot and spinning liquids, `loss_of_couple` its dissipation. The fields with `allowed` are 1 over
-/// the allowed errors of attitude, rate, the bobs' v, velocity, the lumps' u, and the spins' I^-1 L.
+/// State of the craft and the power series of its motion. `craft` is the dry craft. `parked` are the bobs of tanks
+/// whose liquid has detached. `whole` is one rigid body of craft and liquids at rest, whose acceleration along the
+/// tanks determines the drag of the bobs. `matrix` is M, `w_both` is the pair (w, w), and `torque` is tau - h_w'.
+/// `couple` is the torque of pivot and spinning liquids, and `loss_of_couple` its dissipated power. The fields with
+/// `allowed` are the inverses of the allowed errors of attitude, angular velocity, bobs' v, velocity, lumps' u,
+/// appendages' rates, and spins' I^-1 L.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
     pub state: State,
@@ -139,11 +140,9 @@ pub struct CraftMotion {
     flexing: Option<Box<Flexing>>,
     any_apart: bool,
     has_events: bool,
-    /// Index of the constrained bob, if any, that is at the end of its surface, the slosh angle up
-    /// to which the model is valid, when the expansion ends.
+    /// Index of the constrained bob that reaches the largest angle of its surface at the end of the expansion, if any.
     beyond: Option<usize>,
-    /// Number of the detached liquid that has an event at the end of the expansion, and this event,
-    /// if there is one.
+    /// Number of the detached liquid that has an event at the end of the expansion, and this event, if any.
     due: Option<(usize, Due)>,
     follows: bool,
     whole: Rigid,
@@ -175,13 +174,13 @@ pub struct CraftMotion {
     pub before: [f64; STATES],
     /// States at the start of the expansion if it starts within a step ([`Start::Within`]).
     begin: [f64; STATES],
-    /// Derivatives of w and V at the end of a series, body axes.
+    /// Derivatives of w and V at the end of the expansion, body axes.
     slopes: [Vec3; 2],
 }
 
 impl CraftMotion {
     pub fn new(p: &Parameters, state: State) -> CraftMotion {
-        // Only tanks in use: parameters of the others can be anything within their ranges.
+        // Parameters of tanks that are not in use may have any value within their ranges.
         let tanks: Vec<Tank> = p.tank[..p.tanks].iter().map(Tank::resolve).collect();
         let liquids: Vec<Rigid> = tanks.iter().map(Tank::rigid).collect();
         let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.combined_with(tank));
@@ -268,8 +267,8 @@ impl CraftMotion {
         motion
     }
 
-    /// Computes craft and liquids at rest as one rigid body. The drag of the bobs depends on this
-    /// body's acceleration along their tanks.
+    /// Computes one rigid body of craft and liquids at rest. The acceleration of this body along the tanks determines the
+    /// drag of the bobs.
     fn freeze(&mut self) {
         let point = |m: f64, at: Vec3| Rigid::new(m, at, &[[0.0; 3]; 3]);
         let constrained = self.constrained.iter().map(|bob| point(bob.m, bob.at_rest()));
@@ -310,8 +309,8 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Computes the mass matrix M with the bobs in their present directions, and factorises it. On
-    /// a pivot the upper rows of the linear system hold the given acceleration a.
+    /// Computes the mass matrix M for the present directions of the bobs, and factorises it. On a pivot the upper three rows
+    /// only pass on the given acceleration a.
     #[inline(always)]
     fn factorise(&mut self) {
         self.matrix = self.mass_matrix;
@@ -398,7 +397,8 @@ impl CraftMotion {
         self.evaluate_at(0.0);
     }
 
-    /// Computes coefficients 0 and 1 of every quantity along the direction (dx, du).
+    /// Computes coefficients 0 and 1 of every quantity, where coefficient 1 is the derivative for a change of the states by
+    /// dx and of the inputs by du.
     pub fn evaluate_direction(
         &mut self,
         inputs: &Inputs,
@@ -443,8 +443,8 @@ impl CraftMotion {
         self.expansion.overwrite(2);
     }
 
-    /// Returns the rotation vector (rad, body axes) that coefficient 1 of the attitude's power series describes. With
-    /// it coefficient 1 is q_1 = q_0 o (0, turn)/2.
+    /// Returns the rotation vector `turn` (rad, body axes) that corresponds to coefficient 1 of the attitude's power series:
+    /// q_1 = q_0 o (0, turn)/2.
     fn turn(&self) -> Vec3 {
         let [a, x, y, z] = self.q.get(0);
         let [b, v @ ..] = self.q.get(1);
@@ -458,10 +458,11 @@ impl CraftMotion {
         self.expansion.clear();
     }
 
-    /// Advances the states by `h` > 0, s. The step starts from the states in `before`, or, if the
-    /// inputs have jumped (`has_jumped`), from the present states. After an error the states are
-    /// unusable, and the kept expansion is unchanged.
-    // Separate from the preparation of a step: compiled together, both take more instructions.
+    /// Advances the states by `h` > 0, s. If the inputs have jumped (`has_jumped`), the step starts from the present
+    /// states, otherwise from the states in `before`. If an error is returned, the states are invalid, and the expansion
+    /// in `state.kept` is unchanged.
+    // This is a function apart from the preparation of a step, because both take more instructions if they are compiled
+    // together.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
         let (begin, mut steps) = (self.state.time, limits.steps());
@@ -497,8 +498,8 @@ impl CraftMotion {
 
     #[inline(always)]
     fn expand_rates<const N: usize>(&mut self) {
-        // The couples of pivot and spinning liquids come first. Between the sums below they would take registers from every
-        // craft, 4 % of a step.
+        // The torques of pivot and spinning liquids are computed before the sums below. After them they would occupy
+        // registers in every craft, which costs 4 % of a step.
         if self.has_couples {
             self.set_couples::<N>();
         }
@@ -588,9 +589,8 @@ impl CraftMotion {
         self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
     }
 
-    /// Computes, for each tank and hinge, coefficient N of the specific force along the tank's axis, e.(a + w' x P +
-    /// w x (w x P)). The accelerations a and w' are computed as if craft and liquids were one rigid body; P is the
-    /// position of the hinge.
+    /// Computes, for each tank and hinge, coefficient N of the specific force along the tank's axis at the hinge P, e.(a +
+    /// w' x P + w x (w x P)). Here a and w' are the accelerations of craft and liquids at rest as one rigid body.
     #[inline(never)]
     fn set_axial<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
@@ -607,7 +607,7 @@ impl CraftMotion {
         if self.has_couples {
             torque = add(torque, self.couple);
         }
-        // No zip, which some compilers do not inline here: 1 % of a step.
+        // `zip` is not used because some compilers do not inline it here, which costs 1 % of a step.
         for (i, bob) in self.bobs.iter_mut().enumerate() {
             let [by_force, by_torque] = self.along[i];
             let [e, _] = bob.along_axis();
@@ -631,8 +631,8 @@ impl CraftMotion {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the error of the bobs' velocities v over the allowed error, as far as it arises
-    /// because the series of the drag end at order n.
+    /// Returns the error of the bobs' velocities at the time `h`, divided by the allowed error, that arises because the
+    /// series of the drag end at order n.
     #[inline(never)]
     fn drag_defect(&self, n: usize, h: f64) -> f64 {
         let constrained = self.constrained.iter().map(|bob| bob.defect(n, h));
@@ -726,7 +726,8 @@ impl Motion for CraftMotion {
         let rate = RATE_FLOOR + largest(self.w[0]) + largest(self.w[1]) * time;
         let swing = rate
             + self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
-        // The force may pass zero, too.
+        // A velocity that is scaled only by the present force would have no scale while the force crosses zero; RATE_FLOOR
+        // and the bobs' speed avoid this.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
         if !self.spins.is_empty() {
@@ -740,8 +741,9 @@ impl Motion for CraftMotion {
         if self.rubbing.is_empty() { h } else { h.min(self.friction_convergence_radius()) }
     }
 
-    /// Returns the criterion by which the search for the order of the series ends. With dry friction it requires four negligible terms in
-    /// succession, because three successive terms of tanh vanish by symmetry if the motion starts at rest.
+    /// Returns the criterion by which the solver finds the number of terms of the series. With dry friction it
+    /// requires four negligible terms in succession, because three successive terms of tanh vanish by symmetry if the
+    /// motion starts at rest.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         if self.rubbing.is_empty() { Convergence::Decay } else { Convergence::Terms(4) }
@@ -752,7 +754,7 @@ impl Motion for CraftMotion {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let [attitude, rate, swing, speed] = self.inv_allowed;
         let [q_0, q @ ..] = self.q.get(n);
-        // The matrix C is quadratic in q: its coefficients are up to 2^n times those of q.
+        // The matrix C is quadratic in q, so that its coefficients are up to 2^n times as large as those of q.
         let q = larger(q_0.abs(), largest(q)) * (1_u64 << n) as f64;
         let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
         let body = larger(q * attitude, largest(self.w[n]) * rate);
@@ -867,8 +869,8 @@ impl KeptMotion for CraftMotion {
     }
 }
 
-// Constrained bobs, detached liquid (lump.rs) and appendages (appendage.rs), apart from the equations of a craft without them,
-// which then take fewer instructions.
+// Functions for constrained bobs, detached liquid (lump.rs) and appendages (appendage.rs). They are apart from the equations
+// of a plain craft, which then take fewer instructions.
 impl CraftMotion {
     #[inline(never)]
     fn add_inertia_apart(&mut self) {
@@ -922,8 +924,8 @@ impl CraftMotion {
         }
     }
 
-    /// Adds coefficient n of the force and the torque about O with which constrained bobs and lumps
-    /// act on the craft to the given ones.
+    /// Adds coefficient n of the force and of the torque about O with which constrained bobs and detached liquid act on the
+    /// craft to `force` and `torque`.
     #[inline(never)]
     fn add_reactions_apart(&mut self, n: usize, [mut force, mut torque]: [Vec3; 2]) -> [Vec3; 2] {
         let ww = product_coefficients(n, &self.w);
@@ -937,7 +939,7 @@ impl CraftMotion {
             force = add(force, f);
             torque = add(torque, tau);
             if n == 1 {
-                // Wrench of the inertia's derivative: dJ w' + w x (dJ w).
+                // Adds the force and torque of the derivative dJ of the inertia: dJ w' + w x (dJ w).
                 let (w, slope) = (self.w[0], &lump.shape_slope);
                 let turned = vector::cross(w, times(slope, w));
                 torque = sub(torque, add(times(slope, self.w_d[0]), turned));
@@ -950,9 +952,8 @@ impl CraftMotion {
         [force, torque]
     }
 
-    /// Computes coefficient n of the accelerations of constrained bobs, lumps and appendages from
-    /// coefficient n of the craft's accelerations. Returns the dissipated power `dissipation` plus
-    /// their dissipated power.
+    /// Computes coefficient n of the accelerations of constrained bobs, detached liquid and appendages from coefficient n of
+    /// the craft's accelerations. Returns `dissipation` plus their dissipated power.
     #[inline(never)]
     fn accelerate_apart(&mut self, n: usize, mut dissipation: f64) -> f64 {
         for bob in &mut self.constrained {
@@ -974,7 +975,7 @@ impl CraftMotion {
     fn set_error_scale_apart(&mut self, time: f64, allowed: f64, rate: f64) {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let swing = self.constrained.iter().map(ConstrainedBob::rate_scale).fold(0.0, larger);
-        // One scale for all bobs, and the speed that it gives the craft.
+        // All bobs share one scale, which also contributes to the scale of the craft's velocity.
         let [_, _, swings, speed] = &mut self.inv_allowed;
         let fastest = 1.0 / (allowed * (rate + swing));
         *swings = swings.min(fastest);
@@ -1000,8 +1001,8 @@ impl CraftMotion {
             .fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
-    /// Adds the rigid liquids and bobs of tanks with settled liquid to the craft, and removes those
-    /// of tanks whose liquid has detached. Does not allocate.
+    /// Updates the craft for the present state of its liquids, without allocating: the rigid liquids and bobs of tanks with
+    /// settled liquid belong to the craft, those of tanks with detached liquid do not.
     fn arrange(&mut self) {
         let mut changed = false;
         for lump in &mut self.lumps {
@@ -1009,7 +1010,7 @@ impl CraftMotion {
             let was_loose = lump.is_loose();
             lump.state = state;
             if lump.is_loose() {
-                // The shape has the directions with which the liquid left the bottom.
+                // The shape of detached liquid depends on the directions that the bobs had when the liquid left the bottom.
                 let shape = lump.shape(&directions(&self.state.x, lump.tank));
                 changed |= self.liquids[lump.tank] != shape;
                 self.liquids[lump.tank] = shape;
@@ -1041,11 +1042,11 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Advances the states of constrained bobs and lumps by a step of length `h`, s. Returns true
-    /// if the new states are finite and the models are valid for them.
+    /// Advances the states of constrained bobs, detached liquids and appendages by `h`, s. Returns true if the new states
+    /// are finite and not too large.
     ///
     /// # Errors
-    /// If a bob is at the end of its surface, or an appendage beyond its linear model.
+    /// If a bob has reached the largest angle of its surface, or the deflection of an appendage is beyond its linear model.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -1074,19 +1075,18 @@ impl CraftMotion {
         Ok(finite)
     }
 
-    /// Returns an error if the deflection of an appendage is so large that its linear model is not
-    /// valid.
+    /// Returns an error if the deflection of an appendage is so large that its linear model is not valid.
     pub fn check_appendages(&self) -> Result<(), StepError> {
         self.flexing.as_ref().map_or(Ok(()), |flexing| flexing.structure.check(&self.state.x))
     }
 
-    /// Returns the deformed appendages from coefficients 0 and 1 of their motion.
+    /// Returns the deformed appendages, or their directional derivatives, from coefficients 0 and 1 of their motion.
     pub fn deformed<T: Number>(&self) -> Option<Deformed<T>> {
         self.flexing.as_ref().map(|flexing| flexing.now())
     }
 
-    /// Returns the time, s, of the first event within `h`: an event of detached liquid, or a
-    /// constrained bob that reaches the end of its surface.
+    /// Returns the time, s, of the first event within `h`: an event of detached liquid, or a constrained bob reaches the
+    /// largest angle of its surface.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_lumps(n, h);
@@ -1116,13 +1116,13 @@ impl CraftMotion {
         first
     }
 
-    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if there were
-    /// any, and `None` if the states are so large that products of their series could overflow.
+    /// Performs all events of detached liquid that are due now, for hosts that integrate the states themselves. Returns true
+    /// if there were events, and `None` if states are so large that products of their series could overflow.
     pub fn take_due(&mut self, inputs: &Inputs) -> Option<bool> {
         self.inputs = *inputs;
         let mut any = false;
         let is_bounded = |x: &[f64; STATES]| x.iter().all(|x| x.abs() < MAX_MAGNITUDE);
-        // The largest number of successive events of a lump, for every tank.
+        // The detached liquid of each tank has at most four successive events at one instant.
         for _ in 0..4 * self.lumps.len() {
             if !is_bounded(&self.state.x) {
                 return None;

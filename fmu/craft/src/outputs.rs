@@ -8,13 +8,13 @@
 //!     + sum of k l^2 |p_perp|^2/2           E' = f.V + (tau - h_w').w - dissipation - drained'
 //! ```
 //!
-//! The appendages add their K to P, their L to H, and V.K + w.L and the energy of the modes to E (`appendage.rs`); their deformed
-//! body is part of m, S, I.
-//! H also has the angular momentum of rotary motion (`surface.rs`) and of the liquid's spin (`spin.rs`), and E their energies.
-//! m, S, I: dry craft and rigid liquids about O. Sums run over the bobs. r_c: centre of mass of everything from O. V is
-//! in body axes. H is about r_c and does not contain V, so nothing cancels after a long thrust. drained':
-//! `contents.rs`. On a pivot H is about O, and E includes the potential a.S of all masses and the pivot's U
-//! (`pivot.rs`).
+//! The appendages add K to P, L to H, and V.K + w.L and the energy of the modes to E (`appendage.rs`). The deformed
+//! appendages also contribute to m, S and I. H also contains the angular momentum of rotary motion (`surface.rs`) and of the
+//! liquid's spin (`spin.rs`), and E contains their energies. m, S and I are mass, first moment and inertia of dry craft and
+//! rigid liquids about O. The sums are over the bobs. r_c is the centre of mass of craft and liquids from O, m_all their
+//! mass, and V is in body axes. H refers to r_c and does not contain V, so that no large terms cancel after a long thrust.
+//! drained' is in `contents.rs`. On a pivot H refers to O, and E includes the potential energy a.S of all masses and the
+//! pivot's energy U (`pivot.rs`).
 
 use taylor::number::Number;
 use taylor::vector::{
@@ -31,11 +31,11 @@ use crate::sizes::{MODES, TANKS};
 use crate::spin::SpinScale;
 use crate::state::{BallState, Ranges, STATES, index};
 
-/// Outputs of one tank, with the names, units and axes of the FMUs' outputs `tank[].…`, which their variable tables describe.
-/// `force` and `torque` are exerted by the tank's whole liquid on the craft, body axes, about O. Directions `p` and angles,
-/// sin(angle_x) = p_x, are in tank axes. `axial` is the specific force along the tank at the first hinge, m/s2, and `turning` the
-/// rate at which the liquid turns about the tank's axis, rad/s. `ball_position` is the liquid's centre at rest while it is
-/// settled.
+/// Outputs of one tank; names, units and axes are those of the FMUs' outputs `tank[].…` and described in the FMUs' variable
+/// tables. `force` is the force of all liquid of the tank on the craft, and `torque` its torque about O, both in body axes.
+/// Directions `p` and angles, sin(angle_x) = p_x, are in tank axes. `axial` is the specific force along the tank at the
+/// first hinge, m/s2, and `turning` the rate at which the liquid rotates about the tank's axis, rad/s. While the liquid is
+/// settled, `ball_position` is the position that its centre has at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct TankOutputs {
@@ -56,11 +56,11 @@ pub struct TankOutputs {
     pub ball_velocity: Vec3,
 }
 
-/// Outputs of the craft at one instant, with the names, units and axes of the FMU's outputs, which its
-/// variable table describes: the motion of O, the force and torque of all liquids on the craft about O,
-/// momenta in inertial axes (the angular momentum about the centre of mass, on a pivot about O), the terms of
-/// the energy balance since the start, J, and the mass properties with the bobs as point masses at their
-/// current positions. Tanks that are not in use have zero force.
+/// Outputs of the craft at one instant; names, units and axes are those of the FMU's outputs and described in the FMU's
+/// variable table: the motion of O, the force of all liquids on the craft and its torque about O, momenta in inertial axes
+/// (the angular momentum about the centre of mass, or on a pivot about O), the terms of the energy balance since the
+/// start, J, and the mass properties with the bobs as point masses at their current positions. The force of a tank that is
+/// not in use is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Outputs {
@@ -86,8 +86,8 @@ pub struct Outputs {
 }
 
 impl TankOutputs {
-    /// Returns the outputs of a tank's modes from the tank's part of the states, or their
-    /// derivatives from a direction of these states.
+    /// Returns the outputs of a tank's modes from the tank's part `x` of the state vector, or their derivatives if `x` is a
+    /// change of the states.
     pub(crate) fn from_states(x: &[f64]) -> TankOutputs {
         let part = |n: usize, at: usize| {
             let at = 6 * n + at;
@@ -112,8 +112,8 @@ impl TankOutputs {
         }
     }
 
-    /// Sets the outputs that depend on the slosh masses. `liquid` is the rate at which the liquid
-    /// spins; if it is `None`, the liquid is assumed to turn with the tank.
+    /// Sets the outputs that depend on the bobs. `liquid` is the rate of the liquid's spin; if it is `None`, the liquid is
+    /// assumed to rotate with the tank.
     pub(crate) fn set_angles<'a, T: Number + 'a>(
         &mut self,
         [a, w, w_d]: [Vec3<T>; 3],
@@ -143,7 +143,7 @@ impl TankOutputs {
     }
 }
 
-/// Mass, first and second moment about O of rigid liquid and bobs at their current positions.
+/// Mass, and first and second moment of the mass about O, of rigid liquid and bobs at their current positions.
 pub(crate) struct MassProperties<T> {
     pub mass: T,
     moment: Vec3<T>,
@@ -164,7 +164,7 @@ impl<T: Number> MassProperties<T> {
 
     pub fn center(&self) -> Vec3<T> {
         let is_something = self.mass.value() > 0.0;
-        // The compiler would divide before it checks for mass, and hosts can trap divisions by 0.
+        // `black_box` keeps the compiler from dividing before the check for mass, because hosts can trap divisions by 0.
         let divisor = core::hint::black_box(if is_something { self.mass.value() } else { 1.0 });
         let share = T::with_slope(divisor, self.mass.result()).recip();
         if is_something { scale(share, self.moment) } else { constant([0.0; 3]) }
@@ -191,10 +191,10 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
-/// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, `wrench` force and torque
-/// about O on the craft, `flow_momentum` momentum and moment of momentum about O of the flow within the tank
-/// (`draining.rs`) with the momentum of the liquid's spin, `spin` the energy and the rate of this spin, and `lump` the detached
-/// liquid, if any.
+/// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, and `wrench` the force of the liquid
+/// on the craft and its torque about O. `flow_momentum` are momentum and moment of momentum about O of the flow within
+/// the tank (`draining.rs`) and of the liquid's spin, `spin` are energy and rate of the spin, and `lump` is the
+/// detached liquid, if any.
 pub(crate) struct TankNow<T> {
     pub rigid: Rigid<T>,
     pub wrench: [Vec3<T>; 2],
@@ -205,8 +205,8 @@ pub(crate) struct TankNow<T> {
     pub ball_state: BallState,
 }
 
-/// The craft at an instant, or its derivative along a direction. `velocity` is the velocity of O in body axes, `axes` turns body
-/// axes to inertial axes, and the pivot of a free craft has no stiffness and damping.
+/// The craft at an instant, or its directional derivative. `velocity` is the velocity of O in body axes, and `axes` rotates
+/// from body axes to inertial axes. `pivot` has neither stiffness nor damping if the craft is free.
 pub(crate) struct Now<T> {
     pub a: Vec3<T>,
     pub w: Vec3<T>,
@@ -222,7 +222,7 @@ pub(crate) struct Now<T> {
 }
 
 impl CraftMotion {
-    /// Returns the craft at an instant from coefficients 0 and 1 of the motion.
+    /// Returns the craft at an instant from coefficient 0 of the motion, or as dual numbers from coefficients 0 and 1.
     pub fn now<T: Number>(&self) -> Now<T> {
         let number = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
         let (a, w, w_d) = (number(&self.a), number(&self.w), number(&self.w_d));
@@ -273,8 +273,9 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// Returns the outputs. `scale_of_spin` returns the scale of a tank's spin; tanks count from 0. If it is `None`, the tank's
-    /// `spin_ratio` and `spin_number` are 0.
+    /// Returns the outputs. `scale_of_spin` returns the quantities with which the spin of the liquid is compared, by
+    /// the number of the tank, which counts from 0. If it returns `None`, the outputs `spin_ratio` and `spin_number` of
+    /// the tank are 0.
     pub fn outputs(
         &self,
         x: &[f64; STATES],
@@ -304,7 +305,7 @@ impl<T: Number> Now<T> {
             slosh_force = add(slosh_force, out.force);
             slosh_torque = add(slosh_torque, out.torque);
         }
-        // m times the part of the velocity that O does not share, and its moment about O.
+        // m times the velocity of the masses relative to O, and its moment about O.
         let inner = cross(w, rigid.moment);
         let (mut inner_momentum, mut inner_angular) = (inner, times(&rigid.inertia, w));
         let half = 0.5;

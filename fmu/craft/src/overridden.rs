@@ -4,9 +4,9 @@ use alloc::string::String;
 use crate::parameters::{Parameters, Tank};
 
 impl Tank {
-    /// Returns the reason why the value of a parameter is not used although its tank and mode are in use; `None` if it is used,
-    /// or if the mode is not in use. `field` is the parameter's name in the FMUs after `tank.`, and `indices` are the indices of
-    /// the element, which count from 0.
+    /// Returns the reason why the value of a parameter has no effect although its tank and mode are in use. Returns `None`
+    /// if it has an effect, or if the mode is not in use. `field` is the parameter's name in the FMUs after `tank.`, and
+    /// `indices` are the indices of its element, which count from 0.
     pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
         let n = *indices.first().unwrap_or(&0);
         let is_of_mode = matches!(
@@ -71,8 +71,8 @@ impl Tank {
 }
 
 impl Parameters {
-    /// Applies [`Tank::overridden`] to any parameter of a craft by its name in the FMU, such as
-    /// `tank[].mass`, where the first index is the tank.
+    /// Returns [`Tank::overridden`] for any parameter of a craft. `name` is its name in the FMU, such as `tank[].mass`, and
+    /// the first of the `indices` is the tank.
     pub fn overridden(&self, name: &str, indices: &[usize]) -> Option<String> {
         let (field, (i, rest)) = (name.strip_prefix("tank[].")?, indices.split_first()?);
         let tank = self.tank[..self.tanks].get(*i)?;

@@ -1,11 +1,11 @@
-//! Ranges in which the pendulums represent the liquid.
+//! Ranges of validity, in which the pendulums represent the liquid.
 //!
-//! Linear theory holds while the wave at the wall is low compared with the radius R of the free surface. Below 0.15 R
-//! it holds, from 0.15 R to 0.25 R it loses validity, above 0.25 R forces are only indications (Rubaga's thesis
-//! 2.3.5, after Dodge). R is computed as for an upright cylinder that has the same wave height per slosh angle as the
-//! tank, R = wave (xi^2 - 1)/2, because the tank's own radius is not a parameter. For an upright cylinder R is exact.
+//! The linear theory is valid while the wave at the wall is low compared with the radius R of the free surface. Up to 0.15 R
+//! it is valid, from 0.15 R to 0.25 R it loses validity, and above 0.25 R its forces are only indications (Rubaga's thesis,
+//! section 2.3.5, after Dodge). Since the tank's own radius is not a parameter, R is the radius of the upright cylinder that
+//! has the same wave height per slosh angle as the tank, R = wave (xi^2 - 1)/2. For an upright cylinder this R is exact.
 //!
-//! The reasons for which a tank is out of range, in the order in which they are given if there are several:
+//! A tank may be out of range for these reasons. If there are several, the first one in this order is reported:
 //!
 //! ```text
 //! contact              x/l + k/m <= 0, or the liquid is detached (`lump.rs`)
@@ -17,13 +17,13 @@
 //! third_order          A above angle_limit, or above 45 degrees
 //! ```
 //!
-//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m the squared frequency of mode 1, and sin A
-//! = |p_perp|. Omega is the rate of the liquid's spin (`spin.rs`) or, for liquid without spin, the rate of the tank about its
-//! axis. With x/l + k/m below 0 a slosh mass would swing over while real liquid would fall. Beyond 45 degrees from the tank's
-//! axis a slosh mass represents no liquid surface.
+//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m is the squared natural frequency of
+//! mode 1, and sin A = |p_perp|. Omega is the rate of the liquid's spin (`spin.rs`) or, for liquid without spin, the
+//! rotation rate of the tank about its axis. If x/l + k/m is below 0, a slosh mass would swing over while real liquid would
+//! fall. Beyond 45 degrees from the tank's axis a slosh mass does not represent a liquid surface.
 //!
-//! Motion is rotary if the ellipse of the bob has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2 + q'^2), which
-//! does not depend on the phase.
+//! Motion counts as rotary if the ellipse of the bob's path has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2
+//! + q'^2). This condition does not depend on the phase of the motion.
 
 use crate::lump::COS_45;
 use crate::outputs::TankOutputs;
@@ -38,18 +38,17 @@ use formulas::limits::{
 use formulas::regime::Regime;
 use formulas::third_order;
 
-/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion on wider ellipses counts
-/// as rotary.
+/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion with a larger swirl
+/// number counts as rotary.
 const ROTARY: f64 = 0.8;
 
-/// Mass of liquid at which a tank counts as empty, relative to the liquid of the first point of its
-/// fill table. It exceeds 1 because a host integrates the mass with rounding errors.
+/// Mass of liquid at which a tank counts as empty, divided by the mass at the first point of its fill table. It exceeds 1
+/// because a host integrates the mass with rounding errors.
 const EMPTY: f64 = 1.0 + 1e-9;
 
-/// Limits within which the pendulums of a tank represent its liquid. For a draining tank they
-/// belong to its initial contents, except `over_fill`. `radius` is R, m, 0 if no wave is given;
-/// `lowest` is the lower bound of x per mode, below which the liquid leaves the bottom; `g_floor`
-/// is the smallest x in w^2, m/s2.
+/// Limits within which the pendulums of a tank represent its liquid. If the tank drains, they are the limits of its initial
+/// contents, except for `over_fill`. `radius` is R, m, and 0 if the tank has no `wave`. `lowest` is for each mode the value
+/// of x below which the liquid leaves the bottom. `g_floor` is the smallest x in w^2, m/s2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
@@ -62,8 +61,8 @@ pub(crate) struct Bounds {
     spin: SpinLimit,
 }
 
-/// Largest slosh angles of a mode, rad: of any motion, of rotary motion, and the angle at which
-/// waves begin to break; 0 if a limit is not known. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
+/// Limits of the slosh angle of a mode, rad: for any motion (`angle`), for rotary motion (`swirl`), and the angle at which
+/// waves begin to break. A limit that is not known is 0. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
 #[derive(Clone, Copy, Debug)]
 struct ModeBounds {
     angle: f64,
@@ -82,9 +81,9 @@ struct OverFill {
 }
 
 impl OverFill {
-    /// Returns the largest slosh angles of mode `n`, rad, interpolated linearly over the mass of
-    /// liquid. Between a point of the fill table with a known limit and a point with an unknown
-    /// limit the result is 0, that is, unknown.
+    /// Returns the limits of the slosh angle of mode `n`, rad, for any and for rotary motion, interpolated linearly over the
+    /// mass of liquid. Between a point of the fill table with a known limit and a point with an unknown limit the result is
+    /// 0, which means unknown.
     fn limits_at(&self, n: usize, liquid: f64) -> [f64; 2] {
         let masses = &self.liquid[..self.points];
         let last = self.points - 2;
@@ -141,7 +140,7 @@ impl Bounds {
             return Ranges { regime: Regime::Nonlinear, limited_by, is_physical: false };
         }
         let upright = self.are_upright(out.p.map(|p| p[2]));
-        // Without a wave per angle, use that of a cylinder: 2 R/(xi^2 - 1).
+        // If the tank has no wave height per angle, the one of a cylinder is used: 2 R/(xi^2 - 1).
         let height = match self.radius > 0.0 {
             true => out.wave_height / self.radius,
             false => 2.0 * libm::hypot(out.angle_x[0], out.angle_y[0]) / (XI[0] * XI[0] - 1.0),
@@ -198,17 +197,17 @@ impl Bounds {
         if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
     }
 
-    /// Returns the quantities of mode 1 that the outputs `spin_ratio` and `spin_number` need;
-    /// `None` for a tank without modes.
+    /// Returns the quantities of mode 1 from which the outputs `spin_ratio` and `spin_number` are computed; `None` for
+    /// a tank without modes.
     pub fn spin_scale(&self) -> Option<SpinScale> {
         let ModeBounds { inv_l, k_m, .. } = self.mode[0];
         let scale = SpinScale { inv_l, k_m, g_floor: self.g_floor, limit: self.spin };
         (self.modes > 0).then_some(scale)
     }
 
-    /// Returns true if the motion can be that of liquid: thrust holds the liquid at the bottom and
-    /// the bobs are within 45 degrees of the axis. `heights` are the components p_z of the bobs'
-    /// directions, `axial` is the specific force along the axis, m/s2.
+    /// Returns true if pendulums can represent the liquid: thrust holds it at the bottom, and the bobs are within 45
+    /// degrees of the axis. `heights` are the components p_z of the bobs' directions, and `axial` is the specific force
+    /// along the axis, m/s2.
     pub fn contain(&self, heights: [f64; MODES], axial: f64) -> bool {
         self.is_held(axial) && self.are_upright(heights)
     }
@@ -221,8 +220,8 @@ impl Bounds {
     /// the specific force `axial` along the tank no longer holds the liquid of every mode at the bottom, and
     /// never 0.
     pub fn held_indicator(&self, axial: f64) -> f64 {
-        /// Smallest value of the indicator while the liquid is held. The margin of liquid at rest
-        /// without thrust is 0, but an indicator must not be 0.
+        /// Smallest value of the indicator while the liquid is held. Without thrust the margin of the condition is 0, but
+        /// the indicator of an FMU must not be 0 between events.
         const HELD: f64 = 1e-9;
         let margins = self.lowest[..self.modes].iter().map(|lowest| axial - lowest);
         let margin = margins.fold(1.0 / HELD, f64::min);
@@ -235,8 +234,8 @@ impl Bounds {
 }
 
 impl Tank {
-    /// Returns the slosh angles, rad, at which mode `n`, which counts from 0, and its rotary motion leave their range; 0 if they
-    /// are not known. Mode 1 of a cylinder of known dimensions has the limits of potential flow.
+    /// Returns the slosh angles, rad, at which mode `n`, which counts from 0, leaves its range in any motion and in rotary
+    /// motion; 0 if they are not known. The limits of mode 1 of a cylinder of known dimensions follow from potential flow.
     fn limits(&self, n: usize) -> [f64; 2] {
         let given = [self.angle_limit[n], self.swirl_limit[n]];
         if n > 0 || self.diameter <= 0.0 {
