@@ -1,26 +1,26 @@
-//! Steps of 20 ms, `telecom` 0.1 s, for counting instructions: `cost KIND STEPS TOLERANCE`.
+//! Simulates 20 ms steps (0.1 s for `telecom`) so that their instructions can be counted: `cost KIND STEPS TOLERANCE`.
 //!
-//! | KIND | what |
+//! | KIND | simulated system |
 //! | --- | --- |
 //! | `hubslosh` | HubSlosh's bench, spherical model, no friction |
-//! | `bench` | a craft with the same liquid, one tank and one mode, under 1 g, held to one axis by its mass |
+//! | `bench` | a craft with the same liquid, one tank and one mode, under 1 g, turning about one axis only because of its mass |
 //! | `one` | 1180 kg under 2400 N, one tank, one mode |
-//! | `two` | the same, two tanks of one mode, as in the comparison with Basilisk |
-//! | `four` | the same, four tanks of three modes each |
+//! | `two` | as `one`, with two tanks of one mode, as in the comparison with Basilisk |
+//! | `four` | as `one`, with four tanks of three modes each |
 //! | `telecom`, `pendulums` | the satellite of example 14 at a fill of 60 %, with and without s and κ |
 //! | `flexible`, `flexible_six` | `two` with one and with six modes of appendages |
 //! | `drain`, `drain_bent` | `one` with three modes while its tank drains, with and without s and κ |
 //!
-//! `valgrind --tool=callgrind --toggle-collect='*Spacecraft*step*' cost bench 1000 1e-6` counts the
-//! steps alone (`'*Plant*step*'` for `hubslosh`).
+//! `valgrind --tool=callgrind --toggle-collect='*Spacecraft*step*' cost bench 1000 1e-6` counts the instructions of the
+//! steps only (for `hubslosh` the filter is `'*Plant*step*'`).
 
 use craft::{Inertia, Inputs, Parameters, Ramp, Spacecraft};
 use plant::{FrictionModel, Plant, SloshModel};
 
 const STEP: f64 = 0.02;
 
-/// Returns a torque that oscillates at `w`, rad/s, at the start of step number `k`, and its slope
-/// over this step.
+/// Returns a torque that oscillates at `w`, rad/s, at the start of step number `k`, and its slope over this step of
+/// the length `step`, s.
 fn torque(size: f64, w: f64, step: f64, k: usize) -> (f64, f64) {
     let at = |k: usize| size * f64::sin(w * step * k as f64);
     (at(k), (at(k + 1) - at(k)) / step)
@@ -40,7 +40,7 @@ fn hubslosh(steps: usize, tolerance: f64) {
     }
 }
 
-/// Sets the satellite of example 14: 1400 kg with a sphere and a capsule of two modes each.
+/// Sets the parameters of the satellite of example 14: 1400 kg with a spherical tank and a capsule tank of two modes each.
 fn telecom(p: &mut Parameters) {
     p.tanks = 2;
     p.craft.mass = 1400.0;
@@ -86,7 +86,7 @@ fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
                 .iter()
                 .find_map(|(name, modes)| (*name == kind).then_some(*modes))
                 .unwrap_or(0);
-            // Two arrays of 40 kg and 4 m: their modes bend across them and turn the craft.
+            // The two solar arrays have 40 kg and 4 m each; their modes bend across them and rotate the craft.
             for (k, mode) in p.appendage.iter_mut().enumerate() {
                 let side = if k % 2 == 0 { 1.0 } else { -1.0 };
                 let size = [1.0, 0.55, 0.33][k / 2];

@@ -1,6 +1,5 @@
-//! Parameters of the craft and its tanks, initial conditions, and the checks of both.
-//!
-//! Messages use the names of the FMU's parameters, whose indices count from 1.
+//! Parameters and initial conditions of the craft and its tanks, and the checks of their values. Messages use the names of
+//! the FMU's parameters, whose indices count from 1.
 
 use alloc::format;
 use alloc::string::String;
@@ -19,8 +18,8 @@ use crate::sizes::{APPENDAGES, MODES, POINTS, TANKS};
 use crate::surface::{self, Higher, Surface};
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
-/// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm, so that `xy` is
-/// -integral of x y dm.
+/// Symmetric inertia tensor J = integral of (|s|^2 1 - s s^T) dm, kg m2. The products of inertia are elements of this
+/// matrix, so that `xy` is minus the integral of x y dm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Inertia {
@@ -39,8 +38,8 @@ impl Inertia {
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     }
 
-    /// Returns the principal moments in ascending order, kg m2: eigenvalues of a symmetric matrix by the
-    /// roots of its cubic (Smith, Communications of the ACM 4 (1961)).
+    /// Returns the principal moments of inertia in ascending order, kg m2: the eigenvalues of the symmetric matrix, from the
+    /// roots of its characteristic cubic (Smith, Communications of the ACM 4 (1961)).
     fn principal_moments(&self) -> [f64; 3] {
         let Inertia { xx, yy, zz, xy, xz, yz } = *self;
         let mean = (xx + yy + zz) / 3.0;
@@ -60,8 +59,8 @@ impl Inertia {
     }
 }
 
-/// The craft without its liquids, its wheels not rotating: `mass`, kg, centre of mass `r` from O, m, and
-/// inertia `j` about the centre of mass, body axes.
+/// The craft without liquid and with its wheels at rest: `mass`, kg, centre of mass `r` from O, m, and inertia `j` about the
+/// centre of mass, body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Craft {
@@ -88,13 +87,14 @@ pub enum Mount {
 }
 
 impl Mount {
-    /// All mounts in the order of their numbers.
+    /// All values in the order of their numbers.
     pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
-/// Dependence of a mode's drag coefficient c on its natural frequency w, and thus on the acceleration along the tank. `Laminar`,
-/// c ~ w^(1/2), describes a laminar layer at the wall, for bare tanks. `ConstantRatio`, c ~ w, keeps the damping ratio, for a
-/// measured or specified ratio. `Constant` is for dissipation outside a laminar layer, for example in a diaphragm.
+/// Dependence of a mode's drag coefficient c on the natural frequency w, which grows with the acceleration along the tank.
+/// `Laminar`, c ~ w^(1/2), describes a laminar layer at the wall and is for tanks without baffles. `ConstantRatio`, c ~ w,
+/// keeps the damping ratio constant and is for a measured or specified ratio. `Constant` is for dissipation outside a
+/// laminar layer, for example in a diaphragm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -110,10 +110,10 @@ impl DampingLaw {
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::Constant];
 }
 
-/// Model of detached liquid, one body that crosses the tank (`lump.rs`); its parameters are those of the
-/// FMUs, `tank[].ball.…`. Without `travel` there is no such model. If `radius` is 0 it follows from the
-/// pendulums: the surface that bounds the liquid's centre then has, at the bottom, the curvature of the path
-/// of their common centre.
+/// Parameters of the model of detached liquid, in which the liquid is one body that crosses the tank (`lump.rs`). They are
+/// the FMUs' parameters `tank[].ball.…`. If `travel` is 0 the tank has no model of detached liquid. If `radius` is 0, it is
+/// computed so that at the bottom of the tank the surface that bounds the liquid's centre has the curvature of the path of
+/// the pendulums' common centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Ball {
@@ -130,9 +130,9 @@ impl Default for Ball {
     }
 }
 
-/// Surface that the centre of detached liquid can reach: its centre at `height` on the tank's axis and its
-/// semi-axes a (`half`) along the axis and b (`across`), m. `gyration` is R_p, m, and `mass` the liquid's
-/// mass, kg.
+/// Surface that the centre of detached liquid can reach, with its own centre at `height` on the tank's axis and the
+/// semi-axes `half` (a) along the axis and `radius` (b) across it, m. `gyration` is R_p, m, of `lump.rs`, and `mass` is the
+/// mass of the liquid, kg.
 pub(crate) struct BallSurface {
     pub mass: f64,
     pub gyration: f64,
@@ -141,9 +141,9 @@ pub(crate) struct BallSurface {
     pub radius: f64,
 }
 
-/// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's axis; liquid at
-/// rest hangs towards -z. The fields are the FMUs' parameters `tank[].…`, whose variable tables give
-/// meanings, units and ranges; quaternions and directions are normalised on reading.
+/// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's axis; liquid at rest hangs towards
+/// -z. The fields are the FMUs' parameters `tank[].…`; meanings, units and ranges are in the FMUs' variable tables.
+/// Quaternions and directions need not have unit length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Tank {
@@ -200,8 +200,8 @@ pub struct Tank {
 }
 
 impl Tank {
-    /// Returns the tank with modes and rigid liquid computed from its diameter, and with lengths from its
-    /// frequencies, if these are given.
+    /// Returns the tank with all parameters computed that other parameters determine: modes and rigid liquid from the
+    /// diameter, and pendulum lengths from frequencies, if these are given.
     pub(crate) fn resolve(&self) -> Tank {
         let mut tank = *self;
         let modes = self.modes.min(MODES);
@@ -237,8 +237,8 @@ impl Tank {
         for n in 0..modes {
             if self.frequency[n] > 0.0 {
                 let w = core::f64::consts::TAU * self.frequency[n];
-                // These bounds are below the allowed ranges. Values below them give lengths that are refused, without a
-                // division by 0.
+                // These lower bounds avoid a division by 0. They are below the allowed ranges, and values below the ranges
+                // give lengths that are refused.
                 let squared = w * w - self.k[n] / tank.mass[n].max(LIGHTEST);
                 tank.length[n] = self.g_ref / squared.max(1e-30);
             }
@@ -288,8 +288,8 @@ impl Tank {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
-    /// Returns the surface of mode `n`, which counts from 0; `None` for a pendulum. A mode that is a pendulum
-    /// at only some fills of its table has a surface at every fill.
+    /// Returns the surface on which the bob of mode `n` moves (`n` counts from 0); `None` for a pendulum. If the fill table
+    /// makes the mode a pendulum at only some masses of liquid, it has a surface at every mass.
     pub(crate) fn surface(&self, n: usize) -> Option<Surface> {
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let surface = match self.fill.has_surface(n) {
@@ -312,7 +312,8 @@ impl Tank {
         }
     }
 
-    /// Returns the coefficients of mode `n`, which counts from 0, if the liquid's spin acts on it.
+    /// Returns the coefficients of mode `n`, which counts from 0, if the spin of the liquid changes this mode; otherwise
+    /// `None`.
     pub(crate) fn gyroscopic(&self, n: usize) -> Option<Higher> {
         Some(self.higher(n)).filter(|higher| higher.gyroscopic != [0.0; 2])
     }
@@ -321,8 +322,8 @@ impl Tank {
         (0..MODES).any(|n| self.surface(n).is_some())
     }
 
-    /// Returns the message for a bob of mode `n`, which counts from 0, at a slosh angle beyond the
-    /// validity of the mode's coefficients. `name` is the tank's name in the FMU.
+    /// Returns the error message for a slosh angle of mode `n` (which counts from 0) at which the coefficients of the mode
+    /// are no longer valid. `name` is the tank's name in the FMU.
     pub(crate) fn bound_message(&self, n: usize, name: &str) -> String {
         let pair = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let text = surface::bound_message(pair, self.higher(n), n, name);
@@ -335,14 +336,14 @@ impl Tank {
         }
     }
 
-    /// Returns true if mode `n`, which counts from 0, is planar, or its bob moves on another
-    /// surface than a pendulum's sphere.
+    /// Returns true if mode `n`, which counts from 0, is not a pendulum that swings in every direction: it is planar, or its
+    /// bob moves on another surface than a sphere.
     pub(crate) fn is_constrained(&self, n: usize) -> bool {
         self.surface(n).is_some() || self.plane_normal(n).is_some()
     }
 
-    /// Returns true if outputs and derivatives are computed by `contents.rs`, because the tank can drain, or has planar modes,
-    /// other coefficients of the third order than pendulums, or liquid that spins.
+    /// Returns true if `contents.rs` computes outputs and derivatives of the tank, because the tank can drain, has planar
+    /// modes, has coefficients of the third order that differ from those of pendulums, or has liquid that spins.
     pub(crate) fn has_contents(&self) -> bool {
         self.fill.points > 0 || self.is_planar() || self.has_surface() || self.spin_inertia > 0.0
     }
@@ -368,13 +369,13 @@ impl Tank {
         self.mass[..self.modes].iter().fold(self.m_0, |sum, m| sum + m)
     }
 
-    /// Returns the unit vector b (tank axes) that is perpendicular to the plane in which the bob of mode `n` swings;
-    /// modes count from 0. With the tank's axis e, e x b is minus the mode's direction. Returns `None` if the mode
-    /// swings in every direction.
+    /// Returns the unit vector b (tank axes) that is perpendicular to the plane in which the bob of mode `n` swings; `n`
+    /// counts from 0. Its sign is such that e x b is minus the mode's direction, where e is the tank's axis. Returns `None`
+    /// if the mode swings in every direction.
     pub(crate) fn plane_normal(&self, n: usize) -> Option<Vec3> {
         let [x, y] = self.direction[n];
-        // Only directions longer than 1e-6 are accepted. The bound avoids a division by 0 that a
-        // compiler may hoist above the check.
+        // Only directions longer than 1e-6 are accepted. The lower bound avoids a division by 0 if the compiler moves the
+        // division in front of this check.
         let size = libm::hypot(x, y).max(1e-9);
         (self.direction[n] != [0.0; 2]).then(|| [-y / size, x / size, 0.0])
     }
@@ -397,8 +398,8 @@ impl Tank {
         [self.hinge_and_across(n).0, e]
     }
 
-    /// Returns the body that represents the bob of mode `n`, which counts from 0, for hosts that solve with a
-    /// constant matrix (`slosh_tank.rs`).
+    /// Returns the rigid body that represents the bob of mode `n`, which counts from 0, in the constant added mass for hosts
+    /// that solve with a constant matrix (`slosh_tank.rs`).
     pub(crate) fn lumped(&self, n: usize) -> Rigid {
         let (m, l) = (self.mass[n], self.length[n]);
         let (hinge, across) = self.hinge_and_across(n);
@@ -415,9 +416,8 @@ impl Tank {
         Rigid::new(2.0 * m, hinge, &own)
     }
 
-    /// Adds the inertia of planar modes' bobs to the craft's mass matrix. A planar bob has inertia
-    /// perpendicular to its plane and along its rod. The rods are at `angles`, rad, from their
-    /// positions at rest.
+    /// Adds the bobs of planar modes to the craft's mass matrix, if the rods are at `angles`, rad, from their positions at
+    /// rest. Such a bob has inertia perpendicular to its plane and along its rod.
     fn add_planar_bobs(&self, matrix: &mut Mat6, angles: &[f64; MODES]) {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         for n in 0..self.modes {
@@ -431,8 +431,8 @@ impl Tank {
         }
     }
 
-    /// Returns the smallest contribution of the rigid liquid: for detached liquid the inertia that rotates
-    /// with the tank, for a draining tank the rigid liquid of the emptiest state.
+    /// Returns the rigid liquid in the state in which it adds least to the mass matrix: with detached liquid only the
+    /// inertia that rotates with the tank, and in a draining tank the rigid liquid at the first point of the fill table.
     fn least_rigid(&self) -> Rigid {
         if self.ball.travel > 0.0 {
             return Rigid { mass: 0.0, moment: [0.0; 3], inertia: self.own_inertia() };
@@ -440,8 +440,8 @@ impl Tank {
         self.at_point(0).rigid()
     }
 
-    /// Returns the tank at a point of its table, which counts from 0, or the tank itself if the table has no
-    /// such point.
+    /// Returns the tank with the contents of a point of its fill table, which counts from 0. If the table has no such point,
+    /// returns the tank unchanged.
     fn at_point(&self, point: usize) -> Tank {
         match self.fill.masses().get(point) {
             Some(&liquid_0) => Tank { liquid_0, ..*self }.resolve(),
@@ -449,8 +449,9 @@ impl Tank {
         }
     }
 
-    /// Returns the inertia by which bobs with s < 1 reduce the inertia of the craft within 45 degrees of the tank's axis (`surface.rs`), as
-    /// a body of negative mass. Craft and rigid liquid together must have more than this inertia.
+    /// Returns a body of negative mass: the inertia by which bobs with s < 1 reduce the inertia of the craft within
+    /// 45 degrees of the tank's axis (`surface.rs`). Craft and rigid liquid together must have more inertia than
+    /// this body takes away.
     fn lent_inertia(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {
@@ -463,8 +464,7 @@ impl Tank {
         })
     }
 
-    /// Returns direction and rate of the bob of mode `n`, which counts from 0, at the start of the
-    /// simulation, in tank axes.
+    /// Returns direction and rate of the bob of mode `n`, which counts from 0, at the start of the simulation, tank axes.
     pub(crate) fn at_start(&self, n: usize) -> [Vec3; 2] {
         let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.plane_normal(n) {
             Some(b) => sub(x, scale(dot(b, x), b)),
@@ -473,14 +473,14 @@ impl Tank {
         on_sphere(p, p_d)
     }
 
-    /// Returns the specific force along the axis below which mode `n`, which counts from 0, does not represent liquid, m/s2. It
-    /// is slightly below 0 so that thrust that is off does not count as reversed thrust.
+    /// Returns the specific force along the axis, m/s2, below which mode `n`, which counts from 0, does not represent
+    /// liquid. It is slightly negative, so that a craft without thrust does not count as one with reversed thrust.
     pub(crate) fn lowest(&self, n: usize) -> f64 {
         -self.smallest_acceleration() - self.k[n] * self.length[n] / self.mass[n]
     }
 
-    /// Returns the surface that the detached liquid's centre can reach, for a tank with derived parameters
-    /// resolved; `None` without a model of detached liquid.
+    /// Returns the surface that the detached liquid's centre can reach; `None` if the tank has no model of detached liquid.
+    /// The tank must be the result of [`Tank::resolve`].
     pub(crate) fn ball_surface(&self) -> Option<BallSurface> {
         if self.ball.travel <= 0.0 || self.modes == 0 {
             return None;
@@ -507,8 +507,8 @@ impl Tank {
         by_acceleration || self.zeta_amplitude[n] > 0.0 || self.zeta_breaking[n] > 0.0
     }
 
-    /// Returns the drag coefficient of mode `n` at the specific force g_ref, N s/m: c = 2 zeta m sqrt(g_ref/l + k/m).
-    /// Modes count from 0.
+    /// Returns the drag coefficient of mode `n`, which counts from 0, at the specific force g_ref, N s/m: c = 2 zeta
+    /// m sqrt(g_ref/l + k/m).
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
         2.0 * self.zeta[n] * m * libm::sqrt(self.g_ref / l + self.k[n] / m)
@@ -526,8 +526,8 @@ impl Appendage {
     }
 }
 
-/// Initial motion: attitude from body to inertial axes, scalar first, normalised on reading; angular velocity
-/// relative to the inertial frame, rad/s, body axes; position, m, and velocity, m/s, of O in inertial axes.
+/// Initial motion: attitude quaternion from body to inertial axes, scalar first, of any length; angular velocity relative to
+/// the inertial frame, rad/s, body axes; position, m, and velocity, m/s, of O in inertial axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Init {
@@ -537,10 +537,10 @@ pub struct Init {
     pub velocity: Vec3,
 }
 
-/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial axes, and
-/// `pivot` have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to [`TANKS`], `appendages`
-/// the number of modes of flexible appendages, 0 to [`APPENDAGES`] (a mode without participation has no effect), and
-/// `max_steps` the largest number of internal steps in one step, at least 1.
+/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial axes, and `pivot`
+/// have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to [`TANKS`], and `appendages` the number of
+/// modes of flexible appendages, 0 to [`APPENDAGES`]; a mode without participation has no effect. `max_steps` is the largest
+/// number of internal steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Parameters {
@@ -556,10 +556,9 @@ pub struct Parameters {
     pub max_steps: usize,
 }
 
-// The 1180 kg craft of the reference record `axial_pulse` (../tests/six.json), with a tank on its
-// axis. The tank is an upright cylinder of radius 0.45 m, filled 0.6 m deep with liquid of 1000
-// kg/m3. Its modes come from potential flow (Abramson, NASA SP-106); m_0, H_0 and I_0 are those for
-// one mode.
+// The values are those of the 1180 kg craft of the record `axial_pulse` (../tests/six.json), with a tank on its axis. The
+// tank is an upright cylinder of radius 0.45 m, filled 0.6 m deep with a liquid of 1000 kg/m3. Its modes are computed from
+// potential flow (Abramson, NASA SP-106). m_0, H_0 and I_0 belong to a model with one mode.
 impl Default for Craft {
     fn default() -> Self {
         let j = Inertia { xx: 910.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
@@ -567,8 +566,8 @@ impl Default for Craft {
     }
 }
 
-/// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water 0.1, 0.2,
-/// ... 1.2 m deep, with one mode: values from `formulas::cylinder`.
+/// Fill table of the default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m and one mode, filled with
+/// water 0.1, 0.2, ... 1.2 m deep. The values are computed by `formulas::cylinder`.
 #[rustfmt::skip]
 const CYLINDER: FillTable = FillTable {
     points: POINTS,
@@ -683,16 +682,15 @@ impl Default for Parameters {
 const HEAVIEST: f64 = 1e12;
 const FARTHEST: f64 = 1e9;
 
-/// Smallest moment of inertia of spinning liquid, kg m2, that is accepted. The equations divide by
-/// it.
+/// Smallest accepted moment of inertia of spinning liquid, kg m2, by which the equations divide.
 const LEAST_SPIN: f64 = 1e-9;
 
-/// Largest allowed ratio of a principal moment of inertia to the sum of the other two moments. A plate has the ratio 1;
-/// the margin is for moments that are given to four digits.
+/// Largest allowed ratio of a principal moment of inertia to the sum of the other two moments. The ratio of a flat plate is
+/// 1; the margin allows for moments that are rounded to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
-/// Relative tolerances of the integration that are accepted: from the rounding error to the value
-/// above which error control has no meaning.
+/// Accepted relative tolerances of the integration. Below them is the rounding error, and above them error
+/// control has no meaning.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
 pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
@@ -712,7 +710,7 @@ pub(crate) struct Limits {
 impl Limits {
     pub fn steps(&self) -> Steps {
         let advice = ", or check for a very short pendulum (length) or a very stiff one (k)";
-        // Under a fuzzer's sanitizer each step of twelve modes is slow.
+        // A step of twelve modes is slow under a fuzzer's sanitizer.
         let max_steps = if cfg!(fuzzing) { self.max_steps.min(200) } else { self.max_steps };
         Steps::new(max_steps, advice)
     }
@@ -845,8 +843,8 @@ impl Tank {
         let before_all = problems.0.len();
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.direction(&format!("{name}.q"), &self.q);
-        // Perpendicular to their planes the bobs of planar modes count as rigid liquid, so their mass may exceed the
-        // liquid's mass.
+        // Perpendicular to its plane the bob of a planar mode counts as rigid liquid. The sum of the bobs' masses may
+        // therefore exceed the mass of the liquid, so that m_0 is negative.
         let least = if self.is_planar() { -HEAVIEST } else { 0.0 };
         problems.number(&format!("{name}.m_0"), self.m_0, least, HEAVIEST, "kg");
         problems.number(&format!("{name}.H_0"), self.h_0, -FARTHEST, FARTHEST, "m");
@@ -1113,7 +1111,7 @@ impl Craft {
         if problems.0.len() > before {
             return;
         }
-        // If two moments and their product of inertia are inconsistent, a principal minor is
+        // If two moments of inertia and their product of inertia are inconsistent, this principal minor of the matrix is
         // negative.
         let minors = [
             ("Jxx", "Jyy", "Jxy", xx * yy, xy * xy),
@@ -1139,12 +1137,11 @@ impl Craft {
                  {determinant:?} kg3.m6 (allowed: 0 and above)"
             ));
         }
-        // None of the integrals of y^2 + z^2, x^2 + z^2 and x^2 + y^2 exceeds the sum of the other
-        // two.
+        // Each of the integrals of y^2 + z^2, x^2 + z^2 and x^2 + y^2 is at most the sum of the other two.
         let [small, middle, large] = self.j.principal_moments();
         let sum = small + middle;
         if !indefinite && !negative && large > PLATE * sum {
-            // Six digits of each value.
+            // The message contains six digits of each value.
             let [small, middle, large, sum] = [small, middle, large, sum]
                 .map(|moment| format!("{moment:.5e}").parse().unwrap_or(moment));
             problems.0.push(format!(
@@ -1167,10 +1164,10 @@ impl Craft {
     }
 }
 
-/// Returns the reason why the mass matrix of a body with the liquid of `tanks` is singular, as words that
-/// follow "is singular". Returns `None` if it is regular with planar modes at rest and with detached liquid.
-/// Other angles of planar modes are not searched, because realistic craft are singular only far outside the
-/// range of their modes.
+/// Returns where the mass matrix of `body` with the liquid of `tanks` is singular, as the end of a sentence that ends
+/// with "is singular". Returns `None` if the matrix is regular at rest, also with detached liquid. Other angles of planar
+/// modes are not checked, because the mass matrices of realistic craft become singular only at angles far beyond the
+/// range of the modes.
 pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let matrix = |rigid: fn(&Tank) -> Rigid| {
         tanks.iter().fold(body, |sum, tank| sum.combined_with(&rigid(tank))).mass_matrix()
@@ -1180,7 +1177,7 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     if smallest_pivot(&at_rest) < SINGULAR {
         return Some(String::new());
     }
-    // At the start, and at the points of tables.
+    // The matrix is checked at the start, and at the points of fill tables.
     let lends = |point: usize| {
         let lent = tanks.iter().fold(body, |sum, tank| {
             let tank = tank.at_point(point);
@@ -1199,8 +1196,7 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
 }
 
 impl Parameters {
-    /// Returns one message for each reason why the parameters are not acceptable; the list is empty
-    /// if they are.
+    /// Returns a message for each invalid parameter or combination of parameters; empty if all are valid.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.craft.find_problems("craft", &mut problems);

@@ -1,5 +1,5 @@
-//! A free spacecraft with sloshing tanks: its steps, and its equations for hosts that integrate
-//! themselves.
+//! A spacecraft with sloshing tanks, in free flight or on a pivot: its steps, and its equations for hosts that
+//! integrate the states themselves.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -28,10 +28,10 @@ pub struct Spacecraft {
 }
 
 impl Spacecraft {
-    /// Creates a craft at the start of its motion, at `start_time` (s), with the inputs that act then.
+    /// Creates a craft at the start of its motion, at `start_time` (s), with the values that the inputs have then.
     /// `tolerance` is the allowed relative error of rates, directions and attitude, 1e-14 to 0.1.
     ///
-    /// Returns all problems of refused parameters.
+    /// If parameters are invalid, returns the messages of all problems.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,
@@ -86,8 +86,8 @@ impl Spacecraft {
         Ok(craft)
     }
 
-    /// Creates a craft that continues from a saved state of a craft with the same parameters, which
-    /// [`Spacecraft::new`] has accepted.
+    /// Creates a craft that continues from the saved state `state`. [`Spacecraft::new`] must have accepted the parameters,
+    /// and the state must belong to a craft with the same parameters.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
         let draining = Draining::new(p).map(Box::new);
         let limits = Limits { tolerance, max_steps: p.max_steps };
@@ -101,12 +101,12 @@ impl Spacecraft {
         self.motion.state.time
     }
 
-    /// Sets the time from the host, s.
+    /// Sets the simulation time, s, in a host that integrates the states itself.
     pub fn set_time(&mut self, time: f64) {
         self.motion.state.time = time;
     }
 
-    /// Returns the state, for saving.
+    /// Returns the complete state, for saving.
     pub fn state(&self) -> &State {
         &self.motion.state
     }
@@ -116,9 +116,9 @@ impl Spacecraft {
         self.motion.set_state(state);
     }
 
-    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. A jump of `h_wheels` or
-    /// `mass_flow` since the last step acts as an impulse at the beginning. After an error the craft is
-    /// unchanged.
+    /// Advances by exactly `h` > 0 seconds, during which the inputs follow their ramps. If `h_wheels` or
+    /// `mass_flow` has jumped since the last step, the jump acts as an impulse at the beginning. If an error is
+    /// returned, the craft is unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
@@ -147,10 +147,10 @@ impl Spacecraft {
         done
     }
 
-    /// Returns the outputs under the inputs' current values, after the effect of a jump of `h_wheels` or
-    /// `mass_flow` since the last step.
+    /// Returns the outputs for the present values of the inputs. If `h_wheels` or `mass_flow` has jumped since the last
+    /// step, the outputs include the effect of this jump.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
-        // The state is large, and most calls find no jump.
+        // The copy is avoided in most calls, because the state is large and most calls find no jump.
         let may_jump = self.may_jump(inputs);
         let before = may_jump.then_some(self.motion.state);
         if may_jump {
@@ -164,20 +164,20 @@ impl Spacecraft {
         outputs
     }
 
-    /// Returns for each tank the ranges of validity in which its present motion is.
+    /// Returns for each tank in which ranges of validity its present motion is.
     pub fn ranges(&mut self, inputs: &Inputs) -> [Ranges; TANKS] {
         let mut outputs = self.outputs_held(inputs);
         self.update_ranges(&mut outputs);
         outputs.tank.map(|tank| tank.ranges)
     }
 
-    /// Returns for each tank the ranges of validity in which its motion was after the last event.
+    /// Returns for each tank the ranges of validity as they were determined at the last event.
     pub fn ranges_held(&self) -> [Ranges; TANKS] {
         self.motion.state.ranges
     }
 
-    /// Returns true if in any tank without a model of detached liquid the motion cannot be that of
-    /// liquid: the thrust no longer holds it, or a bob is more than 45 degrees from the axis.
+    /// Returns true if in any tank without a model of detached liquid pendulums cannot represent the liquid: thrust does not
+    /// hold it at the bottom, or a bob is more than 45 degrees from the axis.
     pub fn leaves_range(&self, ranges: &[Ranges; TANKS]) -> bool {
         (0..TANKS).any(|i| !ranges[i].is_physical && !self.has_ball(i))
     }
@@ -186,13 +186,13 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Returns true if the motion of every tank without a model of detached liquid is physical after a step.
-    /// The liquid's directions at the end and the accelerations during the step decide.
+    /// Returns true if the pendulums represent the liquid after a step, in every tank without a model of detached liquid.
+    /// This depends on the bobs' directions at the end of the step and on the accelerations during the step.
     pub fn is_physical(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
             let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
-            // The accelerations of a draining craft come from its equations.
+            // The equations of a draining craft give its accelerations.
             let axial = first
                 .next()
                 .filter(|_| self.draining.is_none())
@@ -208,8 +208,8 @@ impl Spacecraft {
         }
     }
 
-    /// Returns the same outputs as [`Spacecraft::outputs`], but without the effect of a jump of `h_wheels`
-    /// or `mass_flow` since the last step, and with the ranges of validity of the last event.
+    /// Returns the outputs as [`Spacecraft::outputs`] does, but without the effect of a jump of `h_wheels` or `mass_flow`
+    /// since the last step, and with the ranges of validity as they were at the last event.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
@@ -228,7 +228,7 @@ impl Spacecraft {
         outputs
     }
 
-    /// Returns the continuous states x by the indices in [`index`].
+    /// Returns the continuous states x, in the order of [`index`].
     pub fn continuous_states(&self) -> [f64; STATES] {
         self.motion.state.x
     }
@@ -238,18 +238,17 @@ impl Spacecraft {
         &self.motion.state.x
     }
 
-    /// Sets the continuous states `x` from the host's integrator. The quaternion and the directions
-    /// need not be of unit length.
+    /// Sets the continuous states `x`, in the order of [`index`]. Quaternion and directions need not have unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.motion.state.x = *x;
         self.motion.state.kept.end();
     }
 
-    /// Returns x', the derivatives of the continuous states x. Before they are computed, copies of the quaternion, the
-    /// directions and their rates are normalised; x itself does not change.
+    /// Returns the derivatives x' of the continuous states x by time. They are computed from copies of quaternion,
+    /// directions and rates that are normalised; x itself does not change.
     ///
-    /// The angular momentum h_w of the wheels (`h_wheels`) acts on the craft by w x h_w and by its slope h_w'. A host
-    /// that does not give the slope must add the reaction -h_w' to `torque`.
+    /// The angular momentum h_w of the wheels (`h_wheels`) and its slope h_w' act on the craft by the torque -w x h_w -
+    /// h_w'. A host that does not set the slope must add -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
             return draining.rates(&self.motion.state.x, &Acting::from_inputs(inputs, 0.0));
@@ -258,9 +257,8 @@ impl Spacecraft {
         self.motion.state_rates::<0>(&self.motion.state.x)
     }
 
-    /// Returns the exact directional derivative of x', the derivatives of the states, if the states change along dx and
-    /// the inputs (force, torque and h_wheels) along du. It is coefficient 1 of the power series of x' along x + dx s
-    /// and u + du s. The slopes of the inputs are kept constant.
+    /// Returns the exact derivative of x' if the states change by dx and the inputs (force, torque and h_wheels) by du. It
+    /// is coefficient 1 of the power series in s of x' at x + dx s and u + du s. The slopes of the inputs do not change.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -274,8 +272,8 @@ impl Spacecraft {
         self.motion.state_rates::<1>(dx)
     }
 
-    /// Returns the exact derivative of the outputs in the direction (dx, du). At slosh angles of 90 degrees,
-    /// which have no derivative, it is 0.
+    /// Returns the exact derivative of the outputs for a change of the states by dx and of the inputs by du. The derivative
+    /// of an output slosh angle at 90 degrees does not exist; it is returned as 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
@@ -328,9 +326,10 @@ impl Spacecraft {
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
     }
 
-    /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state, one at the end of
-    /// its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the thrust no longer
-    /// holds the liquid at the bottom, at which the tank leaves its range. Indicators without an event are 1.
+    /// Writes the event indicators, two for each tank: the first crosses zero at the end of the liquid's current state, and
+    /// the second where the liquid stops sliding on the wall. In a tank without a model of detached liquid the first crosses
+    /// zero where the thrust no longer holds the liquid at the bottom, so that the tank leaves its range of validity. An
+    /// indicator of an event that cannot occur is 1.
     pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         self.motion.indicators(inputs, indicators);
         if (0..self.bounds.len()).all(|i| self.has_ball(i)) {
@@ -344,8 +343,8 @@ impl Spacecraft {
         }
     }
 
-    /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators
-    /// of its last steps were. The liquid is then outside its wall and moves outwards, must leave bottom or
+    /// Returns true if a host that integrates the states itself has passed an event of a liquid, even if the indicators of
+    /// its last steps did not show the event. The liquid is then outside its wall and moves outwards, has to leave bottom or
     /// wall, or may settle.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let mut now = [1.0; 2 * TANKS];
@@ -354,9 +353,9 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.is_overdue(at(lump.tank)))
     }
 
-    /// Performs all events that are due: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid
-    /// leaves the bottom, meets the wall or settles. Returns true if continuous states have changed. After an
-    /// error nothing has changed.
+    /// Performs all events that are due: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid leaves
+    /// the bottom, hits the wall or settles. Returns true if continuous states have changed. If an error is returned,
+    /// the craft is unchanged.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let mut changed = self.take_jumps(inputs);
@@ -377,16 +376,16 @@ impl Spacecraft {
         Ok(changed)
     }
 
-    /// Refuses states, as integrated by the host, beyond the model: masses of liquid outside the tanks' tables,
-    /// bobs beyond the bounds of their surfaces, and excessive deflections of the appendages.
+    /// Returns an error if states that a host has integrated are beyond the model: masses of liquid outside the tanks' fill
+    /// tables, bobs beyond the largest angle of their surfaces, or excessive deflections of the appendages.
     pub fn check_states(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
         self.motion.check_appendages()?;
         self.draining.as_ref().map_or(Ok(()), |it| it.check(x))
     }
 
-    /// Records that `h_wheels` and `mass_flow` have changed continuously, without an impulse. Hosts that
-    /// integrate themselves call it after each of their steps.
+    /// Takes the present values of `h_wheels` and `mass_flow` as a continuous change, which gives no impulse. A host that
+    /// integrates the states itself calls this method after each of its steps.
     pub fn follow_inputs(&mut self, inputs: &Inputs) {
         self.motion.state.h_wheels = inputs.h_wheels.value;
         self.motion.state.flow = inputs.mass_flow.map(|flow| flow.value);

@@ -1,4 +1,4 @@
-//! The craft's continuous states x in their order, its inputs, and its saved state.
+//! The craft's continuous states x in their order, its inputs, and the state that is saved.
 
 use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
@@ -7,14 +7,13 @@ use taylor::vector::Vec3;
 
 use crate::sizes::{APPENDAGES, MODES, TANKS};
 
-/// Indices of the states in x: attitude `Q` from body to inertial axes, four numbers, scalar first; angular
-/// velocity `OMEGA`, rad/s, body axes; `POSITION`, m, and `VELOCITY`, m/s, of O in inertial axes; `WORK` of
-/// force and torque and energy `DISSIPATED` by the liquids since the start, J; from `BOBS` on direction p and
-/// rate p', 1/s, of each of the [`MODES`] modes of each tank, tank axes; from `LIQUID` on the mass of liquid
-/// in each tank, kg; energy `DRAINED` with the outflow, J; from `BALLS` on position, m, and rate, m/s, of
-/// each tank's detached liquid from the tank's origin, tank axes; from `SPINS` on the angular momentum of spin, kg
-/// m2/s, of each tank's liquid, tank axes; from `ETA` on the modal displacement, kg^0.5 m, of each mode of the
-/// appendages, and from `ETA_DOT` on their rates. States that are not in use stay at rest.
+/// Indices of the continuous states in x. `Q`: attitude quaternion from body to inertial axes, scalar first. `OMEGA`:
+/// angular velocity, rad/s, body axes. `POSITION`, m, and `VELOCITY`, m/s, of O in inertial axes. `WORK` of force and torque
+/// and energy `DISSIPATED` by the liquids since the start, J. `BOBS`: direction p and rate p', 1/s, of each of the [`MODES`]
+/// modes of each tank, tank axes. `LIQUID`: mass of liquid in each tank, kg. `DRAINED`: energy that the outflow has taken,
+/// J. `BALLS`: position, m, and rate, m/s, of each tank's detached liquid from the tank's origin, tank axes. `SPINS`:
+/// angular momentum of spin, kg m2/s, of each tank's liquid, tank axes. `ETA` and `ETA_DOT`: modal displacement, kg^0.5 m,
+/// of each mode of the appendages and its rate. States that are not in use are constant.
 #[allow(missing_docs)]
 pub mod index {
     use crate::sizes::{APPENDAGES, MODES, TANKS};
@@ -59,7 +58,7 @@ pub mod index {
 /// Number of continuous states.
 pub const STATES: usize = index::ETA_DOT + APPENDAGES;
 
-/// Number of inputs: force, torque, h_wheels, mass flows.
+/// Number of scalar inputs: force, torque, h_wheels and the mass flow of each tank.
 pub const INPUTS: usize = 9 + TANKS;
 
 /// A vector that is linear in time: `value + slope t`.
@@ -68,12 +67,11 @@ pub type Ramp = taylor::ramp::Ramp<Vec3>;
 /// A number that is linear in time: `value + slope t`.
 pub type Line = taylor::ramp::Ramp;
 
-/// Inputs of the craft over one step, body axes. `force`, N, acts at O, where the bearing of a pivot takes it
-/// up; `torque`, N m, is about O. `h_wheels` is the angular momentum of the wheels relative to the body, N m
-/// s. Its slope turns the craft by -h_w', and a jump from one step to the next turns it by an impulse; both
-/// conserve the total angular momentum. `mass_flow` out of each tank, kg/s, is negative for inflow and has no
-/// effect in a tank without a fill table. A jump from one step to the next starts the flow within the tank by
-/// an impulse.
+/// Inputs of the craft over one step, body axes. `force`, N, acts at O (on a pivot, the bearing takes it up), and `torque`,
+/// N m, is about O. `h_wheels` is the angular momentum of the wheels relative to the body, N m s: its slope exerts the
+/// torque -h_w' on the craft, and a jump between two steps exerts an impulse. Both conserve the total angular momentum.
+/// `mass_flow` is the flow out of each tank, kg/s; it is negative for inflow and has no effect in a tank without a fill
+/// table. If it jumps between two steps, the flow within the tank starts with an impulse.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Inputs {
@@ -83,8 +81,8 @@ pub struct Inputs {
     pub mass_flow: [Line; TANKS],
 }
 
-/// Ranges of validity in which a tank's motion is. The motion `is_physical` if the liquid is held
-/// at the tank's bottom and every bob is within 45 degrees of the axis.
+/// Ranges of validity of the model in which a tank's motion is. The motion `is_physical` if thrust holds the liquid at the
+/// tank's bottom and every bob is within 45 degrees of the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct Ranges {
@@ -123,18 +121,18 @@ impl Ranges {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum BallState {
-    /// Liquid at the bottom: rigid liquid and pendulums.
+    /// Liquid at the bottom of the tank, modelled as rigid liquid and pendulums.
     #[default]
     Settled = 1,
     /// Detached liquid in free flight through the tank.
     Flying = 2,
     /// Detached liquid that slides on the wall with drag.
     Sliding = 3,
-    /// The `Sliding` state without drag, because the wall force is so small that the drag's reaction would
-    /// move the wall away from the liquid.
+    /// Detached liquid that slides on the wall without drag, because the wall force is so small that the reaction of the
+    /// drag would push the wall away from the liquid.
     Light = 4,
-    /// The `Light` state after a hand-over to the pendulums that would have raised the energy. The pendulums
-    /// try again when the liquid is nearest to the tank's axis.
+    /// As `Light`, after the pendulums could not take over the liquid because the energy would have increased. They try
+    /// again when the liquid is nearest to the tank's axis.
     Held = 5,
 }
 
@@ -149,8 +147,8 @@ impl BallState {
     ];
 }
 
-/// Everything that a saved state of the craft needs besides parameters and inputs. It includes the wheels'
-/// momentum and the outflows that the motion already contains.
+/// Complete state of a craft: with its parameters and inputs, a craft continues from it bit-identically. It includes the
+/// wheels' momentum and the outflows whose jumps have already acted on the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
@@ -162,10 +160,10 @@ pub struct State {
     pub(crate) kept: Kept,
 }
 
-/// Start of the expansion that the next step continues while the inputs are held: the states `x` at this start, and the inputs
-/// (force, torque, h_wheels, mass flows). `clock` is the time of the last step's end and `start` the time of the expansion's
-/// start, both since the inputs are held and each with its rounding error. If `clock` is 0, the next step starts an expansion, and
-/// the other fields have no meaning.
+/// Start of the expansion (power series) that the next step continues if the inputs have not changed: the states `x` and the
+/// inputs (force, torque, h_wheels, mass flows) at this start. `clock` is the time at the end of the last step and `start`
+/// the time at the start of the expansion; both count from the last change of the inputs, and the second number of each is
+/// its rounding error. If `clock` is 0, the next step starts a new expansion, and the other fields have no meaning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Kept {
     pub x: [f64; STATES],
@@ -177,8 +175,7 @@ pub(crate) struct Kept {
 impl Kept {
     const REALS: usize = STATES + 4 + INPUTS;
 
-    /// Value of `Kept` if there is no expansion that the next step could continue; the step then
-    /// starts one.
+    /// Value that makes the next step start a new expansion.
     pub const NONE: Kept =
         Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
 
@@ -187,10 +184,11 @@ impl Kept {
         self.clock[0] > 0.0
     }
 
-    /// Returns true if a step with the held `inputs` continues the expansion.
+    /// Returns true if the next step continues the expansion, because `inputs` are constant over the step and have not
+    /// changed.
     #[inline(always)]
     pub fn is_continued(&self, inputs: &Inputs) -> bool {
-        // Without branches, which saves a hundred instructions.
+        // The comparison has no branches, which saves a hundred instructions.
         let same = |all, (a, b): (&f64, &f64)| all & (a == b);
         self.is_used() && self.inputs.iter().zip(&inputs.values()).fold(true, same)
     }
@@ -202,7 +200,7 @@ impl Kept {
         self.inputs = inputs.values();
     }
 
-    /// Discards the kept expansion, so that the next step starts another one.
+    /// Discards the expansion, so that the next step starts a new one.
     pub fn end(&mut self) {
         (self.clock, self.start) = ([0.0; 2], [0.0; 2]);
     }
@@ -249,17 +247,17 @@ impl Inputs {
 }
 
 impl State {
-    /// Number of words of a saved state.
+    /// Number of 64-bit words of a saved state.
     pub const WORDS: usize = Self::REALS + 2 * TANKS;
 
     const REALS: usize = 4 + TANKS + STATES + Kept::REALS;
 
-    /// Returns the wheels' momentum that the motion already includes, N m s.
+    /// Returns the wheels' angular momentum, N m s, whose jumps have already acted on the motion.
     pub fn h_wheels(&self) -> Vec3 {
         self.h_wheels
     }
 
-    /// Returns the state as words, for saving.
+    /// Returns the state as 64-bit words, from which [`State::from_words`] restores it.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let held = self.h_wheels.iter().chain(&self.flow);
@@ -277,7 +275,7 @@ impl State {
         words
     }
 
-    /// Reads a state from words; `None` if they are not a valid state.
+    /// Restores a state from the words of [`State::to_words`]; `None` if they are not a valid state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let numbers: [f64; Self::REALS] = core::array::from_fn(|i| f64::from_bits(words[i]));
         let mut ranges = [Ranges::default(); TANKS];
@@ -326,7 +324,7 @@ mod tests {
         };
         for place in 0..State::REALS {
             assert_eq!(with(place, f64::NAN), None);
-            // Only the time has no squares.
+            // The time may be large, because it is never squared.
             assert_eq!(with(place, 1e30).is_none(), place > 0, "{place}");
         }
         // q = (1, 0, 0, 0), p = (0, 0, -1)

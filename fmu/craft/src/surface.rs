@@ -1,6 +1,6 @@
-//! Slosh of finite amplitude: a bob on a surface of revolution about the tank's axis. Two coefficients, s and kappa, describe waves
-//! to third order, and four further coefficients the next order. The Lagrangian of the bob in a tank at rest, and the
-//! frequencies that follow from it at the amplitude A, are:
+//! Slosh of finite amplitude: a bob (slosh mass) on a surface of revolution about the tank's axis. Two coefficients, s and
+//! kappa, describe waves to the third order, and four further coefficients the next order. The Lagrangian of the bob in a
+//! tank at rest, and the frequencies that follow from the Lagrangian at the amplitude A, are:
 //!
 //! ```text
 //! L = m |q'|^2/2 + m s (q.q')^2/(2 l^2) - m w^2 (|q|^2/2 + kappa |q|^4/(8 l^2)),   q = l p_perp,  A = |q|/l
@@ -17,8 +17,9 @@
 //! E_i = m (s - 1) l^2 sigma^2/2,   sigma = p_perp.p' = u'/2
 //! ```
 //!
-//! The specific force, and not a potential, acts on the bob. The position of the bob determines momentum, moments and weight for
-//! any motion of the tank. If p changes by dp, which is perpendicular to p (and in a planar mode to b), the bob moves by
+//! On the bob acts the specific force, and not a potential. Momentum, moments and weight for any motion of the tank
+//! follow from the position of the bob. If p changes by dp, which is perpendicular to p (and in a planar mode to b),
+//! the bob moves by
 //!
 //! ```text
 //! drho = l D dp,   D = 1 + beta e p_perp^T,   beta = (kappa - 1) u/2
@@ -33,8 +34,8 @@
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + (rho'' without y) + phi/m
 //! ```
 //!
-//! p_perp and e have the projections -eta e_t and e_t = e - eta p, eta = p.e, so that the slosh mass moves as a
-//! pendulum except along the meridian:
+//! p_perp and e have the projections -eta e_t and e_t = e - eta p, eta = p.e. The slosh mass therefore moves as a pendulum
+//! except along the meridian:
 //!
 //! ```text
 //! M = Pi (D^T D + (s - 1) p_perp p_perp^T) Pi = Pi + gamma e_t e_t^T,   gamma = (1 - beta eta)^2 - 1 + (s - 1) eta^2
@@ -42,15 +43,16 @@
 //! force on the craft at rho   F = phi - m (G + l D y) = phi - m (N G - D M^-1 Pi i),   N = 1 - D M^-1 Pi D^T
 //! ```
 //!
-//! In the craft's mass matrix N replaces the projection p p^T of a pendulum. The eigenvalues of N are at most 1. For s < 1 one of
-//! them is negative: the bob then reduces the inertia of the craft, which must be large enough. 1 + gamma u is the bob's inertia along the meridian relative to a pendulum's. A negative
-//! s, as in shallow tanks, bounds the angle up to which this inertia is positive. The model ends at [`LEAST_INERTIA`].
+//! In the craft's mass matrix N replaces the projection p p^T of a pendulum. The eigenvalues of N are at most 1. For s < 1
+//! one of them is negative: the bob then reduces the inertia of the craft, which must be large enough. 1 + gamma u is the
+//! inertia of the bob along the meridian, divided by the inertia of a pendulum. If s is negative, as in shallow tanks, this
+//! inertia is positive only up to some angle. The model ends where it falls to [`LEAST_INERTIA`].
 //!
-//! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the mass that leaves
-//! takes its share of E_i with it. The coefficients s and kappa of the fill table then depend on time, so that the height z gains
-//! the rate kappa' l u^2/8.
+//! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. If the tank drains, the outflowing mass
+//! takes its share of E_i with it. The coefficients s and kappa of the fill table then depend on time, so that the height z
+//! gains the rate kappa' l u^2/8.
 //!
-//! **Beyond the third order** ([`Higher`]) a tank that does not drain may have the height z and the energy E_i
+//! **Beyond the third order** ([`Higher`]) the height z and the energy E_i of a tank that does not drain may be
 //!
 //! ```text
 //! z   = l [(kappa - 1) u^2/8 + kappa_2 u^3/16],   beta = (kappa - 1) u/2 + 3 kappa_2 u^2/8
@@ -58,9 +60,9 @@
 //! tau = e.(p_perp x p_perp') + w_e u,   w_e = e.w
 //! ```
 //!
-//! tau is the rate of rotary motion against inertial axes: a wave does not feel a tank that turns about its axis. E_i
-//! therefore has an angular momentum about the axis, m l^2 u T tau, but no momentum. With n = e x p_perp the force per mass
-//! and length is
+//! tau is the rate of rotary motion relative to inertial axes, because the rotation of a tank about its axis does not move a
+//! wave. E_i therefore has an angular momentum about the axis, m l^2 u T tau, but no momentum. With n = e x p_perp the force
+//! per mass and length is
 //!
 //! ```text
 //! (S sigma)' p_perp - (s_2 sigma^2 + t_2 tau^2 + 2 T tau w_e) p_perp + (T tau)' n + 2 T tau e x p_perp'
@@ -68,11 +70,11 @@
 //! torque on the craft   rho x F - m l^2 [(u T tau)' e + u T tau w x e]
 //! ```
 //!
-//! Drag acts on E_i as on the bob, so that a wave decays as its energy does: phi gains nothing, i gains (c l/m) [S sigma p_perp +
-//! T (n.p') n] and the power c l^2 [S sigma^2 + T (n.p')^2].
+//! Drag acts on E_i as on the bob, so that a wave decays as its energy does: phi does not change, but i gains (c l/m) [S
+//! sigma p_perp + T (n.p') n] and the power c l^2 [S sigma^2 + T (n.p')^2].
 //!
-//! The two parts of the torque that E_i causes cancel about the axis. [a; w'] acts on tau' by v = [n; rho x n - l u e], which
-//! adds m T/(1 + T u) v v^T to the mass matrix.
+//! The two parts of the torque that E_i causes cancel about the axis. tau' contains the accelerations [a; w'] through the
+//! vector v = [n; rho x n - l u e], which adds m T/(1 + T u) v v^T to the mass matrix.
 //!
 //! **In liquid that spins** at the rate W (`spin.rs`) a mode may have a gyroscopic coefficient C and a stiffness epsilon, in the
 //! Routhian -m l^2 [(1 - C) W tau + epsilon W^2 u/2]:
@@ -82,13 +84,13 @@
 //! E_i gains m l^2 epsilon W^2 u/2
 //! ```
 //!
-//! Small motions in a tank that turns with its liquid have the frequencies l = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C)
-//! W^2), seen from the tank, against the spin and with it. A pendulum, which does not take part in the spin, has C = 1 and
+//! In a tank that turns with its liquid, small motions with and against the spin have, seen from the tank, the frequencies l
+//! = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C) W^2). A pendulum, which does not take part in the spin, has C = 1 and
 //! epsilon = 0. The FMUs' parameters are C (`gyroscopic`) and epsilon + 1 - 2 C (`gyroscopic_stiffness`).
 //!
 //! Source: the coefficients come from `formulas::third_order` and `formulas::energy_terms`; the equations follow from these
-//! energies by Lagrange's method. tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
-//! those of a draining tank against differences of the Lagrangian.
+//! energies by Lagrange's method. tests/craft/surface.rs checks the equations against Newton's law in Cartesian coordinates
+//! with the surface as a constraint, and the equations of a draining tank against differences of the Lagrangian.
 
 use alloc::format;
 use alloc::string::String;
@@ -98,13 +100,13 @@ use taylor::vector::{Vec3, add, cross, dot, scale, sub};
 
 use crate::table::Jet;
 
-/// Smallest inertia along the meridian, relative to a pendulum's, at which the model is used.
+/// Smallest inertia of a bob along its meridian, divided by a pendulum's, at which the model is valid.
 pub(crate) const LEAST_INERTIA: f64 = 0.5;
 
 const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
-/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order, and 1 - C and epsilon of a mode in liquid that spins
-/// (`gyroscopic`); a mode without such terms has only zeros.
+/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order, and, for a mode in liquid that spins, `gyroscopic`
+/// with 1 - C and epsilon. A mode without such terms has only zeros.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Higher {
     pub inertia: f64,
@@ -119,9 +121,8 @@ impl Higher {
         Higher { gyroscopic: [0.0; 2], ..*self } != Higher::default()
     }
 
-    /// Returns the reaction of this mode on the spinning liquid, (1 - C) tau + epsilon W u. Multiplied by m l^2 it is
-    /// the mode's contribution to I_zz s_z, the moment of inertia of the liquid about the tank's axis times its slip
-    /// (`spin.rs`).
+    /// Returns the reaction of this mode on the spinning liquid, (1 - C) tau + epsilon W u. The mode contributes m l^2 times
+    /// this value to I_zz s_z, the moment of inertia of the liquid about the tank's axis times its slip (`spin.rs`).
     pub fn reaction<T: Number>(&self, tau: T, turned: T) -> T {
         tau * self.gyroscopic[0] + turned * self.gyroscopic[1]
     }
@@ -131,8 +132,8 @@ impl Higher {
     }
 }
 
-/// The coefficients s - 1 and kappa - 1 of a mode, which are 0 for a pendulum, and the coefficients beyond the third order;
-/// `None` if all of the latter are 0, so that their terms are not computed.
+/// The coefficients s - 1 and kappa - 1 of a mode, which are 0 for a pendulum, and the coefficients beyond the third order.
+/// The latter are `None` if all are 0, so that their terms are not computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Surface<T = f64> {
     inertia: T,
@@ -141,8 +142,7 @@ pub(crate) struct Surface<T = f64> {
 }
 
 impl<T: Number> Surface<T> {
-    /// Returns the surface of a mode with the coefficients s and kappa, even if it is the sphere of
-    /// a pendulum.
+    /// Returns the surface of a mode with the coefficients s and kappa, also for s = kappa = 1, the sphere of a pendulum.
     pub fn from_coefficients([s, kappa]: [T; 2]) -> Surface<T> {
         let one = T::constant(1.0);
         Surface { inertia: s - one, stiffness: kappa - one, higher: None }
@@ -172,7 +172,7 @@ impl<T: Number> Surface<T> {
             Some(_) => one - self.slope_factor(u) * eta,
             None => one - u * eta * (self.stiffness * 0.5),
         };
-        // eta^2 + u = 1
+        // This is the inertia because eta^2 + u = 1.
         eta * eta * (one + u * self.meridian_factor(u)) + u * tilt * tilt
     }
 }
@@ -196,8 +196,8 @@ impl Surface {
         self.stiffness == 0.0 && self.higher.is_none()
     }
 
-    /// Returns (kappa - 1)/8, the part of the bob's lift z/(l u^2) along the tank's axis that comes from the
-    /// coefficient kappa.
+    /// Returns (kappa - 1)/8, the part of z/(l u^2) that comes from the coefficient kappa; z is the lift of the bob
+    /// along the tank's axis.
     pub fn lift_of_square(&self) -> f64 {
         0.125 * self.stiffness
     }
@@ -210,13 +210,12 @@ impl Surface {
         }
     }
 
-    /// Returns the part of beta/u that is due to kappa, (kappa - 1)/2.
+    /// Returns (kappa - 1)/2, the part of beta/u that comes from the coefficient kappa.
     pub fn bend(&self) -> f64 {
         0.5 * self.stiffness
     }
 
-    /// Returns the slope beta of the bob's surface: the bob rises along the tank's axis at the rate z' = l beta
-    /// p_perp.p'.
+    /// Returns beta, the slope of the bob's surface: the bob rises along the tank's axis at the rate z' = l beta p_perp.p'.
     pub fn rise(&self, u: f64) -> f64 {
         self.slope_factor(u)
     }
@@ -232,7 +231,7 @@ impl Surface {
         Surface { inertia, stiffness, higher: self.higher }
     }
 
-    /// Returns an upper bound of the distance of the bob from its hinge within 45 degrees, over l.
+    /// Returns an upper bound of the distance of the bob from its hinge, divided by l, at slosh angles up to 45 degrees.
     pub fn reach(&self) -> f64 {
         let reach = 1.0 + self.stiffness.abs() / 32.0;
         match &self.higher {
@@ -241,9 +240,8 @@ impl Surface {
         }
     }
 
-    /// Returns the largest inertia by which the bob can reduce the craft's inertia, relative to its
-    /// mass: minus the smallest eigenvalue of N up to 45 degrees and the end of the model, or 0. It
-    /// is at most 1.
+    /// Returns the largest mass by which the bob can reduce the craft's inertia in one direction, divided by the bob's mass:
+    /// minus the smallest eigenvalue of N up to 45 degrees or the end of the model, but at least 0. It is at most 1.
     pub fn lent_inertia(&self) -> f64 {
         let at = |k: u32| {
             let u = 0.5 * f64::from(k) / 64.0;
@@ -256,8 +254,8 @@ impl Surface {
         (0..=64).map_while(at).fold(0.0, f64::max)
     }
 
-    /// Returns the inertia of the bob across the meridian, relative to a pendulum's, and minus the
-    /// eigenvalue of N in this direction.
+    /// Returns the inertia of the bob across its meridian, divided by a pendulum's, and minus the eigenvalue of
+    /// N in this direction.
     fn around(&self, u: f64) -> [f64; 2] {
         let Some(higher) = &self.higher else { return [1.0, 0.0] };
         let more = higher.rotary_inertia(u) * u;
@@ -273,8 +271,7 @@ impl Surface {
         self.least_inertia(-cos, sin * sin) >= LEAST_INERTIA
     }
 
-    /// Returns the slosh angle, rad, at which the coefficients s and kappa cease to be valid,
-    /// rounded down to tenths of a degree.
+    /// Returns the slosh angle, rad, up to which the coefficients s and kappa are valid, rounded down to tenths of a degree.
     pub fn largest_angle(&self) -> f64 {
         let angle = |k: u32| ANGLE_STEP * f64::from(k);
         (0..=1800).map(angle).take_while(|angle| self.holds(*angle)).fold(0.0, f64::max)
@@ -288,7 +285,7 @@ impl Surface {
         if high > core::f64::consts::PI {
             return None;
         }
-        // Bisection to rounding.
+        // The bisection ends at rounding accuracy.
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
             (low, high) = if self.holds(middle) { (middle, high) } else { (low, middle) };
@@ -297,8 +294,8 @@ impl Surface {
     }
 }
 
-/// Returns the message for a bob at a slosh angle beyond the validity of its coefficients s and
-/// kappa. `n` is the mode, which counts from 0, and `name` is the tank's name.
+/// Returns the error message for a slosh angle at which the coefficients s and kappa of mode `n` are no longer valid; `n`
+/// counts from 0. `name` is the tank's name in the FMU.
 pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
     let surface = Surface::new(s, kappa, higher);
     let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
@@ -325,8 +322,8 @@ pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name
     )
 }
 
-/// The surface at the bob, with the symbols above: `eased` is gamma/(1 + gamma u), `across` is b of a planar
-/// mode, and `around` holds n and T/(1 + T u).
+/// The surface at the present position of the bob, with the symbols of the module's head. `eased` is gamma/(1 + gamma u),
+/// `across` is b of a planar mode, and `around` contains n and T/(1 + T u).
 pub(crate) struct Meridian<T> {
     surface: Surface<T>,
     p: Vec3<T>,
@@ -340,9 +337,9 @@ pub(crate) struct Meridian<T> {
     around: Option<(Vec3<T>, T)>,
 }
 
-/// The height z with its derivatives, the last one without y, and the terms of E_i: i and E_i/m (`inner`),
-/// the power -[(s - 1) l l' + s' l^2/2] sigma^2 that E_i/m gains beyond the work of the bob (`energy_d`), and
-/// the rate [(kappa - 1) l]' u^2/8 of z of a bob at rest.
+/// The height z of the bob with its derivatives by time (the second derivative without the terms in y), and the terms of
+/// E_i: i and E_i/m (`inner`), and `energy_d`, the power -[(s - 1) l l' + s' l^2/2] sigma^2 that E_i/m gains in addition to
+/// the work of the bob. The last field is the rate [(kappa - 1) l]' u^2/8 of z while the bob is at rest.
 pub(crate) struct Lift<T> {
     pub z: T,
     pub z_d: T,
@@ -354,9 +351,9 @@ pub(crate) struct Lift<T> {
     pub rotary: Option<Rotary<T>>,
 }
 
-/// Rotary motion with an inertia in addition to the bob's: `lever` is l u T; `inertia` is l T, with the known terms 2 w_e sigma
-/// and 2 t_2 l sigma tau of l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma tau; `spin` is l^2 u T tau, with 2 l^2
-/// T tau sigma.
+/// Rotary motion of a mode that has more rotary inertia than a pendulum. `lever` is l u T. `inertia` is l T, with the known
+/// terms 2 w_e sigma and 2 t_2 l sigma tau of l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma tau. `spin` is
+/// l^2 u T tau, with 2 l^2 T tau sigma.
 pub(crate) struct Rotary<T> {
     lever: T,
     inertia: T,
@@ -370,7 +367,7 @@ pub(crate) struct Rotary<T> {
 }
 
 impl<T: Number> Meridian<T> {
-    /// Creates the surface at the bob's direction, the unit vector `p`. For a planar mode `across` is the unit vector b
+    /// Creates the surface at the bob's direction `p`, a unit vector. For a planar mode `across` is the unit vector b
     /// perpendicular to its plane.
     pub fn new(
         surface: Surface<T>,
@@ -419,8 +416,8 @@ impl<T: Number> Meridian<T> {
         sub(x, self.apply_shear(self.free(self.apply_shear_transposed(x))))
     }
 
-    /// Returns the contribution of the bob to the craft's mass matrix, m J^T N J, where J maps the accelerations [a;
-    /// w'] to the acceleration a + w' x rho of the bob's place and N is defined in the module's head.
+    /// Returns the contribution m J^T N J of the bob to the craft's mass matrix. J maps the accelerations [a; w'] to the
+    /// acceleration a + w' x rho of the bob's position, and N is defined in the module's head.
     pub fn mass_matrix(&self, m: T, rho: Vec3<T>) -> [[T; 6]; 6] {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let mut columns = [[zero; 6]; 6];
@@ -436,8 +433,8 @@ impl<T: Number> Meridian<T> {
         columns
     }
 
-    /// Adds the terms of rotary motion to the mass matrix of the bob. They arise because the rate tau is measured
-    /// against inertial axes, so that the direction in the mass matrix is [n; rho x n - l u e] instead of [n; rho x n].
+    /// Adds the terms of rotary motion to the bob's contribution `matrix` to the mass matrix. Their direction is [n; rho x n
+    /// - l u e] instead of [n; rho x n], because the rate tau is relative to inertial axes.
     pub fn add_rotary(&self, [m, l]: [T; 2], rho: Vec3<T>, matrix: &mut [[T; 6]; 6]) {
         let Some((n, share)) = self.around else { return };
         let arm = cross(rho, n);
@@ -453,8 +450,8 @@ impl<T: Number> Meridian<T> {
         }
     }
 
-    /// Returns the rate of the bob that determines the drag on the energy E_i, and the square of
-    /// this rate; `None` without coefficients beyond the third order.
+    /// Returns the bob's rate that enters the drag on the energy E_i, and the square of this rate; `None` without
+    /// coefficients beyond the third order.
     pub fn inner_rate(&self, p_d: Vec3<T>) -> Option<(Vec3<T>, T)> {
         self.surface.higher?;
         let sigma = dot(self.p_perp, p_d);
@@ -472,9 +469,8 @@ impl<T: Number> Meridian<T> {
         self.around.map(|(n, _)| n)
     }
 
-    /// Returns the height of the bob and the terms of the internal kinetic energy E_i, for the rate p' of the bob's
-    /// direction. They follow from the length l with its derivatives and, if s and kappa change, from these
-    /// coefficients with their derivatives.
+    /// Returns the height of the bob and the terms of the internal kinetic energy E_i, from the rate p' of the bob's
+    /// direction, the length l with its derivatives and, if the tank drains, s and kappa with their derivatives.
     pub fn lift(
         &self,
         [l, l_d, l_dd]: Jet<T>,
@@ -516,8 +512,8 @@ impl<T: Number> Meridian<T> {
         }
         lift
     }
-    /// Adds the terms of the coefficients beyond the third order to a bob's height and internal
-    /// energy. Only tanks that do not drain have such coefficients.
+    /// Adds the terms of the coefficients beyond the third order to a bob's height and internal energy. Only tanks that do
+    /// not drain have these coefficients.
     #[inline(never)]
     fn lift_higher(
         &self,
@@ -532,7 +528,7 @@ impl<T: Number> Meridian<T> {
         lift.z = lift.z + l * u2 * u * (0.0625 * higher.stiffness);
         lift.z_d = lift.z_d + l * u2 * sigma * (0.375 * higher.stiffness);
         lift.z_dd = lift.z_dd + l * (u * squared * 1.5 + u2 * psi * 0.375) * higher.stiffness;
-        // (S sigma)' - s_2 sigma^2 = S sigma' + s_2 sigma^2
+        // (S sigma)' - s_2 sigma^2 = S sigma' + s_2 sigma^2 without the terms in y.
         let mut inwards = (u * psi + squared) * higher.inertia;
         lift.energy = lift.energy + l * l * u * squared * (0.5 * higher.inertia);
         if let Some((n, _)) = self.around {
@@ -570,14 +566,14 @@ impl<T: Number> Meridian<T> {
 }
 
 impl<T: Number> Rotary<T> {
-    /// Returns the term l T u w_e' of the force, which acts along the normal n, for the angular acceleration `rate_d` =
-    /// e.w' about the tank's axis.
+    /// Returns the term l T u w_e' of the force, which acts along the normal n. `rate_d` is w_e' = e.w', the angular
+    /// acceleration about the tank's axis.
     pub fn pull(&self, rate_d: T) -> T {
         self.lever * rate_d
     }
 
-    /// Returns the torque on the craft, divided by the bob's mass, that the terms of rotary motion exert in addition to the
-    /// moment of the bob's force. `slid` is n.(-l y), and `rate_d` is the angular acceleration e.w' about the tank's axis.
+    /// Returns the torque of rotary motion on the craft, divided by the bob's mass, in addition to the moment of the bob's
+    /// force. `slid` is n.(-l y), and `rate_d` is the angular acceleration e.w' about the tank's axis.
     pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
         let tau_d = self.l * self.u * rate_d + self.turning - slid;
         let along = self.l * self.u * (self.inertia * tau_d + self.growing) + self.swept;

@@ -1,14 +1,14 @@
-//! Table of a tank's modes and rigid liquid over the mass of its liquid. The monotone interpolation has two continuous
-//! derivatives, so that the forces of flowing liquid have no steps.
+//! Fill table of a tank: slosh modes and rigid liquid as functions of the mass of liquid. They are interpolated
+//! monotonically with two continuous derivatives, so that the forces of flowing liquid have no steps.
 //!
 //! ```text
 //! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   zeta_n,   s_n, kappa_n,   H_0, I_0, I_z
 //! ```
 //!
-//! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it; length and height of the hinge are
-//! proportional to 1/depth. Its frequency, the height of its bob and its share of the liquid change little with the depth, so
-//! that a few points represent them. Each curve stays between the values at the two points around it, so that lengths and masses
-//! stay above 0.
+//! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it; the length and the height of the hinge
+//! are proportional to 1/depth. The frequency, the height of the bob and the bob's share of the liquid change little with
+//! the depth, so that a few points represent them well. Each curve stays between the values of the two neighbouring points,
+//! so that lengths and masses stay above 0.
 //!
 //! Source: `formulas::interpolation`.
 
@@ -17,16 +17,15 @@ use taylor::number::Number;
 
 use crate::sizes::{MODES, POINTS};
 
-/// Shortest pendulum length, m, that a table may have. Shorter pendulums would make the equations
-/// too stiff.
+/// Shortest pendulum length, m, that a table may contain. Shorter pendulums would make the equations too stiff.
 pub(crate) const SHORTEST: f64 = 1e-6;
-/// Smallest mass of a bob, kg, that a table may have. Lighter bobs would have no effect.
+/// Smallest mass of a bob, kg, that a table may contain. Lighter bobs would have no effect.
 pub(crate) const LIGHTEST: f64 = 1e-9;
 
-/// Modes and rigid liquid at some masses of the liquid: the FMUs' parameters `tank[].fill.…`, whose variable tables give meanings
-/// and units. `points` is 0 for a tank whose liquid stays, otherwise 2 to [`POINTS`]; `liquid` increases. If a mode's damping
-/// ratio `zeta` is 0 at all points, its s and kappa are 1 at all points, or its limits are 0 at all points, the value of the tank
-/// is used at every fill.
+/// Modes and rigid liquid for several masses of liquid: the FMUs' parameters `tank[].fill.…`, whose meanings and units are
+/// in the FMUs' variable tables. `points` is 0 for a tank that does not drain, otherwise 2 to [`POINTS`]; `liquid` increases
+/// from point to point. The tank's own value is used at every fill if the table contains no value for a mode: `zeta` is 0 at
+/// all points, s and kappa are 1 at all points, or the limits are 0 at all points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct FillTable {
@@ -60,15 +59,14 @@ impl FillTable {
         columns.iter().any(|column| column.iter().take(self.points).any(|x| *x != 1.0))
     }
 
-    /// Returns true if the table gives the limit `field`, `angle_limit` or `swirl_limit`, of mode `n`, which
-    /// counts from 0, at every fill.
+    /// Returns true if the table contains the limit `field` (`angle_limit` or `swirl_limit`) of mode `n`, which counts from
+    /// 0, at every point.
     pub(crate) fn limits_everywhere(&self, field: &str, n: usize) -> bool {
         let column = if field == "angle_limit" { self.angle_limit[n] } else { self.swirl_limit[n] };
         self.points > 0 && column[..self.points].iter().all(|limit| *limit > 0.0)
     }
 
-    /// Returns mass, kg, length and hinge height, m, of mode `n`, which counts from 0, at this mass of
-    /// liquid, kg.
+    /// Returns mass, kg, length, m, and hinge height, m, of mode `n`, which counts from 0, for `liquid` kg of liquid.
     pub fn mode(&self, n: usize, liquid: f64) -> [f64; 3] {
         let curves = self.curves(n + 1);
         curves.mode(n, curves.place(liquid)).map(|jet| jet[0])
@@ -78,8 +76,8 @@ impl FillTable {
         let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
         let of_mode = |n: usize| {
             let (mass, l, h) = (&self.mass[n], &self.length[n], &self.hinge[n]);
-            // Only points and modes in use count; the other values can be anything within their ranges. The compiler
-            // may divide for all points before it selects, so divisors have a lower bound below any value in use.
+            // Values of points and modes that are not in use may be anything within their ranges. Since the compiler may
+            // divide for all points before it selects one, divisors get a lower bound, which is below any value in use.
             let used = |f: &dyn Fn(usize) -> f64| {
                 core::array::from_fn(|i| if i < self.points && n < modes { f(i) } else { 0.0 })
             };
@@ -104,8 +102,8 @@ impl FillTable {
 /// A quantity and its first two derivatives, by the mass of liquid or by time.
 pub(crate) type Jet<T> = [T; 3];
 
-/// Interpolated curve of a quantity: for each interval the coefficients of its quintic, in powers
-/// of the position from 0 to 1 in the interval.
+/// Interpolated curve of a quantity: for each interval between two points the coefficients of a quintic polynomial of the
+/// position in the interval, 0 to 1.
 #[derive(Clone, Copy, Debug)]
 struct Curve([[f64; 6]; POINTS - 1]);
 
@@ -152,8 +150,8 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Position of a mass of liquid, kg, in a fill table: the interval, the position from 0 to 1 in it,
-/// and 1 over the width of the interval, 1/kg.
+/// Place of a mass of liquid in a fill table: the interval, the position in it from 0 to 1, and the inverse of
+/// the interval's width, 1/kg.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,
@@ -162,7 +160,7 @@ pub(crate) struct Place<T> {
     inv_h: f64,
 }
 
-/// Contents of a tank with a given mass of liquid: mass, length and hinge height of each mode, and
+/// Contents of a tank with a given mass of liquid: mass, length and hinge height of each mode with their derivatives, and
 /// H_0, I_0 and I_z of the rigid liquid.
 #[derive(Clone, Copy)]
 pub(crate) struct Filling<T> {
@@ -172,7 +170,7 @@ pub(crate) struct Filling<T> {
 }
 
 impl FillCurves {
-    /// Locates a mass of liquid, kg. A mass beyond an end of the table counts as the mass at this end.
+    /// Finds the place of `liquid`, kg, in the table. A mass beyond an end of the table is replaced by the mass at this end.
     pub fn place<T: Number>(&self, liquid: T) -> Place<T> {
         let masses = &self.liquid[..self.points];
         let (low, high) = (masses[0], masses[self.points - 1]);
@@ -187,8 +185,7 @@ impl FillCurves {
         Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * inv_h, inv_h }
     }
 
-    /// Returns the contents of a tank at a mass of liquid, kg: the first `modes` modes and the
-    /// rigid liquid.
+    /// Returns the contents of a tank with `liquid` kg of liquid: the first `modes` modes and the rigid liquid.
     pub fn filling<T: Number>(&self, modes: usize, liquid: T) -> Filling<T> {
         let place = self.place(liquid);
         let mut each = [[[T::constant(0.0); 3]; 3]; MODES];
@@ -202,13 +199,13 @@ impl FillCurves {
         [0, 1, 2].map(|k| self.rigid[k].evaluate(at))
     }
 
-    /// Returns the damping ratio at the specific force `g_ref` of mode `n`, if the table gives it.
+    /// Returns the damping ratio of mode `n` at the specific force `g_ref`; `None` if the table does not contain it.
     pub fn zeta<T: Number>(&self, n: usize, at: Place<T>) -> Option<T> {
         self.modes[n].zeta.as_ref().map(|curve| curve.evaluate(at)[0])
     }
 
-    /// Returns the coefficients s and kappa of mode `n`, each with its first two derivatives, if
-    /// the table gives them.
+    /// Returns the coefficients s and kappa of mode `n`, each with its first two derivatives; `None` if the table
+    /// does not contain them.
     pub fn surface<T: Number>(&self, n: usize, at: Place<T>) -> Option<[Jet<T>; 2]> {
         self.modes[n]
             .surface
@@ -221,7 +218,7 @@ impl FillCurves {
         let [k, k_d, k_dd] = stiffness.evaluate(at);
         let l = k.recip();
         let l_d = -(k_d * l * l);
-        // from l k = 1: l'' k + 2 l' k' + l k'' = 0
+        // This follows from l k = 1: l'' k + 2 l' k' + l k'' = 0.
         let length = [l, l_d, -((l_d * k_d * 2.0 + l * k_dd) * l)];
         let b = bob.evaluate(at);
         let [r, r_d, r_dd] = share.evaluate(at);
@@ -240,8 +237,8 @@ mod tests {
     use alloc::vec::Vec;
     use taylor::number::Dual;
 
-    /// Interpolation of random monotone data, some with constant stretches: no slope has the wrong
-    /// sign, and the values and both derivatives agree on both sides of a point.
+    /// Random monotone data, some with constant stretches, are interpolated. No slope has the wrong sign, and the values and
+    /// both derivatives agree on both sides of each point.
     #[test]
     fn interpolation_is_monotone_and_has_two_continuous_derivatives() {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -256,7 +253,7 @@ mod tests {
             let at = |m: f64| curves.rigid(curves.place(m))[0];
             for k in 0..=1000 {
                 let [value, slope, _] = at(x[POINTS - 1] * k as f64 / 1000.0);
-                // rounding of terms as large as the steepest secant, 300
+                // The tolerance is the rounding of terms as large as the steepest secant, 300.
                 assert!(slope > -1e-10, "{slope}");
                 assert!(value > -1e-12 && value < y[POINTS - 1] + 1e-12);
             }
@@ -264,14 +261,14 @@ mod tests {
                 let [left, right] = [-1e-9, 1e-9].map(|e| at(x[i] + e));
                 assert!((left[0] - y[i]).abs() < 1e-6 && (right[0] - y[i]).abs() < 1e-6);
                 assert!((left[1] - right[1]).abs() < 1e-4, "{left:?} {right:?}");
-                // the third derivative is up to 60 times the secant over h^2, 2e6, over 2e-9
+                // Over 2e-9 the second derivative may change by the third, which is up to 60 times the secant over h^2, 2e6.
                 assert!((left[2] - right[2]).abs() < 1e-2, "{left:?} {right:?}");
             }
         }
     }
 
-    /// The derivatives of modal masses, lengths, hinges and inertias by the mass of liquid, as the
-    /// fill table computes them, are compared with finite differences.
+    /// The derivatives of modal masses, lengths, hinges and inertias with respect to the mass of liquid agree with finite
+    /// differences.
     #[test]
     fn derivatives_equal_finite_differences() {
         let default = crate::Tank::default().fill;
@@ -286,7 +283,7 @@ mod tests {
             let (low, now, high) = (all(m - e), all(m), all(m + e));
             for ((low, now), high) in low.iter().zip(&now).zip(&high) {
                 for i in 0..2 {
-                    // e^2 times a third derivative, and rounding over e
+                    // The error is e^2 times a third derivative, plus rounding over e.
                     let slope = (high[i] - low[i]) / (2.0 * e);
                     assert!(
                         (slope - now[i + 1]).abs() < 1e-8 * (1.0 + now[0].abs()),
@@ -297,8 +294,8 @@ mod tests {
         }
     }
 
-    /// The points of the table are computed from the formulas of an upright cylinder; between the points the table
-    /// interpolates.
+    /// A table whose points are computed from the formulas of an upright cylinder agrees with these formulas between its
+    /// points.
     #[test]
     fn a_fill_table_reproduces_a_cylinder_between_its_points() {
         let (d, r) = (0.9, 0.45);
@@ -327,7 +324,7 @@ mod tests {
         let table = FillTable { points: 3, ..crate::Tank::default().fill };
         let curves = table.curves(MODES);
         let all = |m: f64| {
-            // derivative of the liquid's mass by itself
+            // `m` is the independent variable, so that its derivative is 1.
             let at = curves.place(Dual::with_slope(m, 1.0));
             let modes = (0..MODES).flat_map(|n| curves.mode(n, at));
             let jets: Vec<_> = modes.chain(curves.rigid(at)).collect();
