@@ -1,6 +1,6 @@
-//! Flexible appendages: Lagrange's equations of each mode, a hub with beams in closed form, and a hinged panel. Random craft with
-//! appendages are compared with Newton's law in independent.rs; balances.rs tests their momentum and energy, equations.rs their
-//! derivatives.
+//! Tests of flexible appendages: Lagrange's equations of each mode, a hub with beams whose frequencies are known in closed
+//! form, and a hinged panel. Other files test random craft with appendages: independent.rs against Newton's law, balances.rs
+//! for momentum and energy, and equations.rs for derivatives.
 
 use craft::{APPENDAGES, Appendage, Craft, Inertia, Inputs, Parameters, Ramp, STATES, index};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -20,8 +20,8 @@ fn motion(x: &[f64; STATES]) -> [V; 2] {
     [axes.inverse() * v(&x[index::VELOCITY..]), v(&x[index::OMEGA..])]
 }
 
-/// Returns the Lagrangian of a dry craft with appendages: the kinetic energy of the dry craft as a rigid body, the part that is
-/// due to each mode's motion y = p eta from its interface point, and the modes' own energies.
+/// Returns the Lagrangian of a dry craft with appendages: the kinetic energy of the dry craft as a rigid body, the energy
+/// from each mode's motion y = p eta relative to its interface point, and the modes' own energies.
 fn lagrangian(p: &Parameters, x: &[f64; STATES]) -> f64 {
     let [velocity, w] = motion(x);
     let center = velocity + w.cross(&v(&p.craft.r));
@@ -44,8 +44,8 @@ fn difference(f: impl Fn(f64) -> f64, step: f64) -> f64 {
     (8.0 * (p1 - m1) - (p2 - m2)) / (12.0 * step)
 }
 
-/// Random craft with appendages: eta'' + 2 zeta omega eta' + omega^2 eta equals minus the participation vector times the
-/// acceleration of the craft.
+/// In random craft with appendages, eta'' + 2 zeta omega eta' + omega^2 eta equals minus the product of the participation
+/// vector and the acceleration of the craft.
 #[test]
 fn each_appendage_mode_follows_lagranges_equation() {
     for seed in 0..50 {
@@ -64,7 +64,7 @@ fn each_appendage_mode_follows_lagranges_equation() {
                 };
                 difference(moved, 1e-2)
             };
-            // d/dt of dL/d(eta') along the motion.
+            // This is d/dt of dL/d(eta') along the motion.
             let momentum = |t: f64| {
                 let moved = std::array::from_fn(|i| x[i] + t * rate[i]);
                 along(&moved, index::ETA_DOT + k)
@@ -86,17 +86,18 @@ fn each_appendage_mode_follows_lagranges_equation() {
     }
 }
 
-/// Returns eigenvalue n of a clamped beam: the root of cos l cosh l = -1 near (n - 1/2) pi.
+/// Returns eigenvalue n of a clamped-free beam: the root of cos l cosh l = -1 near (n - 1/2) pi.
 fn eigenvalue(n: usize) -> f64 {
     let near = (n as f64 + 0.5) * std::f64::consts::PI;
     (0..50).fold(if n == 0 { 1.8751 } else { near }, |l, _| {
-        // f = cos l + 1/cosh l
+        // Newton's method for f = cos l + 1/cosh l.
         l - (l.cos() + 1.0 / l.cosh()) / (-l.sin() - l.tanh() / l.cosh())
     })
 }
 
-/// Returns mode n of a clamped beam of mass m, length L and first frequency f, which lies along x from `root` and bends along y.
-/// With its eigenvalue l, the integrals of phi dm and x phi dm are 2 sigma/l sqrt(m) and 2/l^2 L sqrt(m).
+/// Returns mode n of a beam that is clamped at `root`, lies along x and bends along y, with mass m, length L and
+/// first frequency f. With the eigenvalue l of the mode, the integrals of phi dm and x phi dm are 2 sigma/l sqrt(m)
+/// and 2/l^2 L sqrt(m).
 fn beam(n: usize, m: f64, length: f64, f: f64, root: f64) -> Appendage {
     let l = eigenvalue(n);
     let sigma = (l.sinh() - l.sin()) / (l.cosh() + l.cos());
@@ -110,8 +111,8 @@ fn beam(n: usize, m: f64, length: f64, f: f64, root: f64) -> Appendage {
     }
 }
 
-/// Returns the frequencies, rad/s, of a free planar craft in y and about z below the highest mode's frequency, as roots of det(M + sum
-/// of u u^T w^2/(w_n^2 - w^2)), and the modes' amplitudes there.
+/// Returns the free-free frequencies, rad/s, of a craft that moves along y and rotates about z, up to the frequency of the
+/// highest mode, and the amplitudes of the modes. The frequencies are the roots of det(M + sum of u u^T w^2/(w_n^2 - w^2)).
 fn free_free(p: &Parameters) -> Vec<(f64, Vec<f64>)> {
     let (m, [x, ..]) = (p.craft.mass, p.craft.r);
     let modes: Vec<([f64; 2], f64)> = p.appendage[..p.appendages]
@@ -134,7 +135,7 @@ fn free_free(p: &Parameters) -> Vec<(f64, Vec<f64>)> {
     };
     let determinant = |w: f64| {
         let [a, b, c] = matrix(w);
-        // Without the poles.
+        // The product removes the poles of the determinant.
         modes.iter().fold(a * c - b * b, |d, (_, w_n)| d * (1.0 - (w / w_n).powi(2)))
     };
     let top = modes.iter().fold(0.0_f64, |top, (_, w)| top.max(*w));
@@ -154,7 +155,7 @@ fn free_free(p: &Parameters) -> Vec<(f64, Vec<f64>)> {
             }
         }
         let w = (low + high) / 2.0;
-        // Not at a clamped frequency, at which the determinant has no pole if the craft does not move.
+        // A root at a clamped frequency is left out: there the craft does not move, and the determinant has no pole.
         if modes.iter().all(|(_, w_n)| (w / w_n - 1.0).abs() > 1e-6) {
             let [a, b, c] = matrix(w);
             let moves = if a.abs() > c.abs() { [-b, a] } else { [c, -b] };
@@ -167,8 +168,8 @@ fn free_free(p: &Parameters) -> Vec<(f64, Vec<f64>)> {
     found
 }
 
-/// Checks a hub with two beams of three modes each, and a hub with one beam of six modes. Each free-free mode is released at rest
-/// and has to swing with the frequency of the characteristic equation for ten periods.
+/// The craft is a hub with two beams of three modes each, or with one beam of six modes. Each of its free-free modes is
+/// released at rest and has to oscillate for ten periods with a frequency that is a root of the characteristic equation.
 #[test]
 fn a_hub_with_beams_swings_at_the_roots_of_its_characteristic_equation() {
     for sides in [2, 1] {
@@ -181,7 +182,7 @@ fn a_hub_with_beams_swings_at_the_roots_of_its_characteristic_equation() {
             *mode = beam(k / sides, 30.0, 4.0, 0.15, root);
         }
         let roots = free_free(&p);
-        // Of two beams half the modes turn the hub, half move it.
+        // With two beams, half of the modes rotate the hub, and the other half translate it.
         assert_eq!(roots.len(), if sides == 2 { 4 } else { 5 }, "{roots:?}");
         for (w, amplitude) in roots {
             let largest = amplitude.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -207,8 +208,9 @@ fn a_hub_with_beams_swings_at_the_roots_of_its_characteristic_equation() {
     }
 }
 
-/// A hub with a rigid panel on a hinge with a spring, in a plane: mass, distance of the panel's centre from the hinge, inertia about it,
-/// place of the hinge on the hub's x axis, and the spring.
+/// A hub and a rigid panel on a hinge with a spring, in plane motion: mass and inertia of the hub, mass `m` of the panel,
+/// distance `d` of the panel's centre from the hinge, inertia of the panel about its centre, position of the hinge on the
+/// hub's x axis, stiffness and damping of the spring.
 struct Panel {
     hub: [f64; 2],
     m: f64,
@@ -220,15 +222,17 @@ struct Panel {
 }
 
 impl Panel {
-    /// Returns the rates of x, y and angle of the hub and of the panel's angle, and their second derivatives: two rigid bodies,
-    /// without small angles. Force along the hub's y axis and torque act on the hub.
+    /// Returns the derivatives of the eight states: rates of x, y and angle of the hub and of the panel's angle, and their
+    /// second derivatives. The equations are those of two rigid bodies at any angle. `force` along the hub's y axis and
+    /// `torque` act on the hub.
     fn rates(&self, z: &[f64; 8], force: f64, torque: f64) -> [f64; 8] {
         let Panel { hub: [mass, j], m, d, inertia, hinge, k, c } = *self;
         let [_, _, angle, bend, _, _, turn, swing] = *z;
         let (sin, cos) = angle.sin_cos();
         let (sin_p, cos_p) = (angle + bend).sin_cos();
         let both = turn + swing;
-        // Velocity of the panel's centre: columns for turn and swing, and what is left of its acceleration.
+        // Velocity of the panel's centre per rate of hub and panel, and the part of its acceleration without second
+        // derivatives.
         let swung = [-d * sin_p, d * cos_p];
         let turned = [-hinge * sin + swung[0], hinge * cos + swung[1]];
         let left = [
@@ -253,8 +257,8 @@ impl Panel {
     }
 }
 
-/// Compares a hinged rigid body, as in Basilisk, with its mode, eta = sqrt(I) times the angle with the inertia I about the hinge.
-/// At angles of 1e-5 rad the terms of the third order are 1e-10 of the angle.
+/// A rigid body on a hinge, as in Basilisk, moves as its appendage mode with eta = sqrt(I) times the hinge angle, where I is
+/// the inertia about the hinge. At angles of 1e-5 rad the terms of the third order are only 1e-10 of the angle.
 #[test]
 fn a_hinged_panel_is_one_mode_at_small_angles() {
     let panel =
@@ -262,7 +266,7 @@ fn a_hinged_panel_is_one_mode_at_small_angles() {
     let about = panel.inertia + panel.m * panel.d * panel.d;
     let root = about.sqrt();
     let omega = (panel.k / about).sqrt();
-    // The undeformed panel belongs to the dry craft, whose O is the hub's centre.
+    // The undeformed panel belongs to the dry craft. The origin O of the dry craft is the centre of the hub.
     let mass = panel.hub[0] + panel.m;
     let center = panel.m * (panel.hinge + panel.d) / mass;
     let far = panel.hinge + panel.d - center;
@@ -309,8 +313,7 @@ fn a_hinged_panel_is_one_mode_at_small_angles() {
     }
 }
 
-/// Appendage modes without participation swing by themselves; a craft with such modes moves as a
-/// craft without them.
+/// Appendage modes without participation oscillate by themselves. A craft with such modes moves as a craft without them.
 #[test]
 fn appendage_modes_without_participation_do_not_change_the_motion_of_the_craft() {
     let mut random = Random::new(3);
@@ -342,7 +345,7 @@ fn errors_stay_within_the_solver_tolerance_with_appendages() {
         let mut p = random.parameters();
         random.flex(&mut p);
         if seed % 2 == 1 {
-            // At rest, and a mode faster than the craft.
+            // Two cases are added: a craft at rest, and a mode that is faster than the craft.
             p.appendage.iter_mut().for_each(|mode| (mode.eta, mode.eta_dot) = (0.0, 0.0));
             p.appendage[0].frequency = 20.0;
         }
@@ -363,7 +366,7 @@ fn errors_stay_within_the_solver_tolerance_with_appendages() {
     }
 }
 
-/// A participation whose square exceeds the craft's mass would leave a negative mass in the reduced mass matrix.
+/// If the sum of the squared participations exceeds the mass of the craft, the reduced mass matrix has a negative mass.
 #[test]
 fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     let mut p = Parameters { appendages: 1, ..Parameters::default() };
@@ -379,7 +382,7 @@ fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     bent.appendage[0].eta = 1e3;
     let problems = new(&bent).err().unwrap();
     assert!(problems[0].contains("appendage[].eta_0 = [1000.0]"), "{problems:?}");
-    // A host may set the state; a step away from it is refused and changes nothing.
+    // A host may set the deflection. The next step is then refused and changes no state.
     bent.appendage[0].eta = 0.0;
     let mut craft = new(&bent).unwrap();
     let mut x = craft.continuous_states();

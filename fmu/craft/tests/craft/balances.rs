@@ -1,12 +1,13 @@
-//! Momentum, angular momentum and energy equal their initial values plus what acts on the craft.
+//! Momentum and angular momentum change only by the forces and torques on the craft, and the energy only by their
+//! work and the dissipation:
 //!
 //! ```text
 //! P' = C f,   H' = C (tau - r_c x f),   E = work - dissipated + const
 //! ```
 //!
-//! The inputs are integrated over a step by Lobatto's rule of five points, whose order is 8. In a step the craft turns by less
-//! than 0.03 rad and the liquid swings by less than 0.3 rad, so that the error is 1e-13 of a step's contribution. On a pivot
-//! gravity also turns the craft, and H is about O.
+//! The test integrates the inputs over a step by Lobatto's rule with five points, whose order is 8. In a step the craft
+//! rotates by less than 0.03 rad and the liquid swings by less than 0.3 rad, so that the error is 1e-13 of a step's
+//! contribution. On a pivot gravity also exerts a torque on the craft, and H is about O.
 
 use craft::{APPENDAGES, Inputs, Mount, Outputs, Parameters, Ramp};
 use serde_json::Value;
@@ -17,7 +18,8 @@ use super::records::{STEP, inputs, parameters, records, steps};
 
 const END: usize = if cfg!(debug_assertions) { 5_000 } else { 50_000 };
 
-/// Iterates over the nodes in a step of length 1 and their weights, with the step divided into `panels` parts.
+/// Iterates over the nodes of Lobatto's rule in a step of length 1 and their weights, with the step divided into `panels`
+/// parts.
 fn lobatto(panels: usize) -> impl Iterator<Item = (f64, f64)> {
     let far = f64::sqrt(3.0 / 7.0) / 2.0;
     let (end, inner, middle) = (1.0 / 20.0, 49.0 / 180.0, 16.0 / 45.0);
@@ -34,8 +36,8 @@ fn norm(a: [f64; 3]) -> f64 {
     f64::sqrt(a.iter().map(|x| x * x).sum())
 }
 
-/// Returns the vector v, given in body axes, in inertial axes: v + 2 u x (u x v + q0 v), where q =
-/// (q0, u) is the craft's attitude.
+/// Returns the vector v, which is given in body axes, in inertial axes: v + 2 u x (u x v + q0 v), where q = (q0, u)
+/// is the craft's attitude.
 fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let [q0, x, y, z] = q;
     let inner = cross([x, y, z], v);
@@ -83,8 +85,8 @@ impl Balance {
     }
 }
 
-/// Simulates the craft with the inputs, then without force and torque to `end`. Returns the
-/// residuals of momentum P, angular momentum H and energy E, relative to their sizes.
+/// Simulates the craft with the inputs, and then without force and torque until `end`. Returns the residuals of the balances
+/// of momentum P, angular momentum H and energy E, divided by the sizes of these quantities.
 fn residuals(
     p: &Parameters,
     input: impl Fn(usize) -> Inputs,
@@ -152,14 +154,14 @@ fn residuals(
 fn check(name: &str, relative: [f64; 3], excess: &mut Vec<String>) {
     let [momentum, angular, energy] = relative;
     println!("{name:20} P {momentum:.1e}  H {angular:.1e}  E {energy:.1e}");
-    // NaN is not a balance either.
+    // Written so that NaN fails.
     if !(momentum < 1e-12 && angular < 1e-12 && energy < 1e-10) {
         excess.push(format!("{name}: P {momentum:e}, H {angular:e}, E {energy:e}"));
     }
 }
 
-/// Runs each of the reference motions for 1,000 s. Momentum and angular momentum must change only by the forces and torques on the craft,
-/// and the energy only by their work and by damping. The tests that follow do the same with random craft.
+/// Each of the reference motions is simulated for 1,000 s. Momentum and angular momentum must change only by the forces and
+/// torques on the craft, and the energy only by their work and by damping.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_every_record() {
@@ -176,14 +178,14 @@ fn name(record: &Value) -> &str {
     record["name"].as_str().unwrap()
 }
 
-/// Runs random craft for 10 s. Momentum and angular momentum must change only by the forces and torques on the
+/// Random craft are simulated for 10 s. Momentum and angular momentum must change only by the forces and torques on the
 /// craft, and the energy only by their work and by damping.
 #[test]
 fn momentum_angular_momentum_and_energy_balance_over_10_s_of_random_craft() {
     random_craft(END / 100);
 }
 
-/// Runs random craft for 100 s.
+/// As the test over 10 s, but over 100 s.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn momentum_angular_momentum_and_energy_balance_over_100_s_of_random_craft() {
@@ -196,8 +198,8 @@ fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
     random_craft(END);
 }
 
-/// Simulates random craft for `most` steps, and checks the balances. The craft whose torque changes the momentum
-/// about every axis is simulated for at most 1,000 steps.
+/// Simulates random craft for at most `most` steps, and checks the balances. One craft, whose pivot exerts a torque, is
+/// simulated for at most 1,000 steps.
 fn random_craft(most: usize) {
     let mut excess = Vec::new();
     for seed in 0..32 {
@@ -207,7 +209,7 @@ fn random_craft(most: usize) {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         }
         if (19..26).contains(&seed) || seed == 31 {
-            // From seed 25 on six modes at four tanks, in free flight.
+            // From seed 25 on, the craft have four tanks, six appendage modes and are in free flight.
             (p.mount, p.tanks) = (if seed == 20 { Mount::Pivot } else { Mount::Free }, 4);
             random.flex(&mut p);
             while seed == 25 && p.appendages < APPENDAGES {
@@ -216,7 +218,7 @@ fn random_craft(most: usize) {
         }
         let mut end = most;
         if seed == 10 {
-            // Its torque changes the momentum about every axis.
+            // The torque of the pivot changes the angular momentum about every axis.
             (p.pivot, end) = (random.pivot(), most.min(1000));
         }
         if (11..19).contains(&seed) || (26..31).contains(&seed) {
@@ -231,8 +233,8 @@ fn random_craft(most: usize) {
         if seed >= 26 {
             random.spin_all(&mut p);
         }
-        // Bobs on surfaces other than spheres move faster than the rule's nodes in one panel resolve, those in spinning liquid
-        // faster still.
+        // Bobs on surfaces other than spheres move too fast for the nodes of one panel, and bobs in spinning
+        // liquid move even faster.
         let panels = match seed {
             0..14 => 1,
             14..26 => 2,
@@ -241,7 +243,7 @@ fn random_craft(most: usize) {
         if seed.is_multiple_of(3) {
             p.tank.iter_mut().for_each(|tank| random.follow(tank));
         }
-        // Force, torque and wheels run linearly for half a second and jump then; thrust stays.
+        // Force, torque and wheel momentum change linearly for half a second and then jump; the thrust is constant.
         let pieces: Vec<Inputs> = (0..40).map(|_| random.inputs()).collect();
         let thrust = p.craft.mass;
         let input = |k: usize| {

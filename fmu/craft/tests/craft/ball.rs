@@ -1,4 +1,4 @@
-//! Liquid that leaves the bottom of its tank as one lump, is thrown back by the wall, and settles.
+//! Tests of liquid that leaves the bottom of its tank as one body (the lump), bounces off the wall, and settles.
 
 use craft::{
     BallState, INPUTS, Inputs, LimitedBy, Mount, Outputs, Parameters, Ramp, STATES, Spacecraft,
@@ -19,8 +19,8 @@ pub(super) fn thrust(force: f64) -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, force]), ..Inputs::default() }
 }
 
-/// Returns the default craft at rest. Its tank, 1.2 m high, is half full, and the liquid's centre rests 0.3 m
-/// above the bottom, so the liquid can move by 0.6 m.
+/// Returns the default craft at rest. Its tank, 1.2 m high, is half full. The liquid's centre rests 0.3 m above the bottom,
+/// so that it can move by 0.6 m.
 fn craft() -> Parameters {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
@@ -63,8 +63,7 @@ pub(super) fn with_states(
     State::from_words(&words).unwrap()
 }
 
-/// At 0.01 m/s2 the detached liquid takes 11 s for 0.6 m, after which its 382 kg have a momentum of
-/// 42 N s.
+/// At 0.01 m/s2 the detached liquid needs 11 s for 0.6 m. Its 382 kg then have a momentum of 42 N s.
 #[test]
 fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     let p = craft();
@@ -82,7 +81,7 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!((m * speed - 41.8).abs() < 0.05, "{}", m * speed);
     craft.step(&reversed, 2e-9).unwrap();
     let after = craft.outputs(&reversed);
-    // The craft takes (1 + e) mu v.
+    // The impact transfers the momentum (1 + e) mu v to the craft.
     let mu = m * m_b / (m + m_b);
     let jump = after.velocity[2] - before.velocity[2];
     assert!((jump - (1.0 + e) * mu * speed / m_b).abs() < 1e-9);
@@ -94,9 +93,9 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!(height.abs() < 1e-8);
 }
 
-/// The indicator of settled liquid is the smaller of two margins: axial acceleration minus its limit, and the bobs' mean cosine,
-/// by modal mass, minus cos 45 degrees. In a tank without a model of detached liquid it is positive while thrust holds the
-/// liquid.
+/// The event indicator of settled liquid is the smaller of two margins: the acceleration along the axis minus its lower
+/// limit, and the mean cosine of the bobs' angles, by modal mass, minus cos 45 degrees. In a tank without a model of
+/// detached liquid it is positive as long as thrust holds the liquid at the bottom.
 #[test]
 fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -117,7 +116,7 @@ fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
             assert!((seen[2] - expected).abs() < 1e-15, "{tank} {mode} {angle}: {seen:?}");
             assert_eq!([seen[1], seen[3]], [1.0; 2]);
             assert!(seen[0] > 0.0, "{seen:?}");
-            // A host's directions need not be of unit length.
+            // A host may set directions that do not have unit length.
             let mut x = craft.continuous_states();
             x[index::bob(1, 0)..index::bob(2, 0)].iter_mut().for_each(|x| *x *= 1.5);
             craft.set_continuous_states(&x);
@@ -128,8 +127,9 @@ fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
     }
 }
 
-/// Without a model of detached liquid the first indicator of a tank changes its sign exactly where the liquid's contact
-/// limits the tank, so that a host finds the time at which the tank leaves its range. A spring holds the second tank's bob.
+/// In a tank without a model of detached liquid the first event indicator changes its sign exactly where thrust no longer
+/// holds the liquid, so that a host finds the time at which the tank leaves its range of validity. A spring holds the bob
+/// of the second tank.
 #[test]
 fn an_indicator_crosses_zero_where_thrust_no_longer_holds_the_liquid() {
     let mut p = Parameters { tanks: 2, ..Parameters::default() };
@@ -147,8 +147,8 @@ fn an_indicator_crosses_zero_where_thrust_no_longer_holds_the_liquid() {
     }
 }
 
-/// With the coefficient of restitution e, bounce k takes the time 2 e^k v/g. All bounces together take 2 v e/(g (1 - e)) and
-/// dissipate m v^2/2.
+/// With the coefficient of restitution e, bounce k takes the time 2 e^k v/g. All bounces together take 2 v e/(g (1 - e))
+/// and dissipate m v^2/2.
 #[test]
 fn bounces_are_a_geometric_series_that_ends_at_rest() {
     let (g, e) = (0.01, 0.6);
@@ -163,7 +163,7 @@ fn bounces_are_a_geometric_series_that_ends_at_rest() {
     let mut from = crossing;
     let mut t = 0.0;
     for k in 1..8 {
-        // The top of bounce k.
+        // Time from impact k to the highest point of the bounce.
         let up = speed * f64::powi(e, k) / g;
         craft.step(&reversed, from + up - t).unwrap();
         t = from + up;
@@ -173,7 +173,7 @@ fn bounces_are_a_geometric_series_that_ends_at_rest() {
         assert!(out.ball_velocity[2].abs() < 1e-9, "{k}");
     }
     let end = crossing + 2.0 * speed * e / (g * (1.0 - e));
-    // What is left when the speed after an impact is 1 um/s: 2e-6/(0.4 g).
+    // When the speed after an impact is 1 um/s, the remaining bounces take 2e-6/(0.4 g).
     craft.step(&reversed, end - 6e-4 - t).unwrap();
     assert_eq!(craft.outputs(&reversed).tank[0].ball_state, BallState::Flying);
     craft.step(&reversed, 6e-4).unwrap();
@@ -182,14 +182,14 @@ fn bounces_are_a_geometric_series_that_ends_at_rest() {
     assert!((out.tank[0].ball_position[2] - top).abs() < 1e-9);
     let mu = m * m_b / (m + m_b);
     assert!((out.dissipated - mu * speed * speed / 2.0).abs() < 1e-9, "{}", out.dissipated);
-    // At rest at the top the thrust pushes the whole.
+    // Now the liquid rests at the top, and the thrust accelerates craft and liquid as one body.
     let a = out.specific_force[2];
     assert!((a + g * m_b / (m + m_b)).abs() < 1e-12);
     assert!((out.tank[0].force[2] - m * -a).abs() < 1e-9);
 }
 
-/// Thrust is reversed for 3 s, so that the liquid leaves the bottom; after the thrust has its first direction again, the
-/// liquid settles and energy was dissipated.
+/// The thrust is reversed for 3 s, so that the liquid leaves the bottom. When the thrust acts forwards again, the liquid
+/// settles, and energy has been dissipated.
 #[test]
 fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     let p = craft();
@@ -213,8 +213,7 @@ fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     assert!((out.momentum[2] - 600.0 * 25.0 + 180.0).abs() < 1e-8);
 }
 
-/// Simulates a craft with stretches of thrust forwards and backwards, then without thrust, and
-/// calls `check` every 0.5 s.
+/// Simulates a craft with periods of thrust forwards and backwards, and then without thrust. Calls `check` every 0.5 s.
 fn drive(
     p: &Parameters,
     seed: u64,
@@ -263,7 +262,7 @@ fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
         let mut start = None;
         let (mut dissipated, mut worst) = (0.0, [0.0_f64; 3]);
         let states = drive(&p, seed, 1e-12, 660, |_, now, coasting| {
-            // Rounding of a difference of energies of 1e3 J.
+            // The tolerance is the rounding error of a difference of energies of 1e3 J.
             assert!(now.dissipated >= dissipated - 1e-10, "{seed} {} {dissipated}", now.dissipated);
             dissipated = now.dissipated;
             if !coasting {
@@ -320,7 +319,7 @@ fn results_do_not_depend_on_the_communication_step() {
         assert!(lost > 0.0, "{seed}: nothing has happened");
         for steps in [2, 3, 50] {
             let (x, _) = run(steps);
-            // Impacts and hand-overs multiply what errors of 1e-14 have made.
+            // The tolerance allows for impacts and hand-overs, which amplify errors of 1e-14.
             for i in 0..STATES {
                 let off = (x[i] - whole[i]).abs();
                 assert!(
@@ -334,8 +333,8 @@ fn results_do_not_depend_on_the_communication_step() {
     }
 }
 
-/// Simulates 20 s of thrust in any direction and 20 s of reversed thrust, with liquid that bounces and
-/// slides. Returns attitude, rate and liquid every 2 s.
+/// Simulates 20 s of thrust in any direction and 20 s of the opposite thrust, with liquid that bounces and slides. Returns
+/// attitude, angular velocity and the liquid's position and velocity every 2 s.
 fn detached(seed: u64, tolerance: f64, step: f64, shift: f64) -> Vec<f64> {
     let (mut r, mut p) = (Random::new(seed), craft());
     let (m, ball) = (p.craft.mass, &mut p.tank[0].ball);
@@ -367,8 +366,8 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Compares communication steps of 0.5, 1 and 2 s with steps of 10 ms. Bounces multiply errors: a start that is 1e-9 rad off ends
-/// up to 50,000 times as far away. The difference is a tenth of the tolerance times this growth.
+/// Compares communication steps of 0.5, 1 and 2 s with steps of 10 ms. Bounces amplify errors: runs that start 1e-9 rad
+/// apart end up to 50,000 times as far apart. The allowed difference is a tenth of the tolerance times this amplification.
 fn move_alike(seeds: impl Iterator<Item = u64>) {
     let mut worst: (f64, u64, f64) = (0.0, 0, 0.0);
     for seed in seeds {
@@ -378,7 +377,7 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
             let short = run(tolerance, 1e-2, 0.0);
             for step in [0.5, 1.0, 2.0] {
                 let off = largest_difference(&run(tolerance, step, 0.0), &short);
-                // Rounding.
+                // The term 1e-12 allows for rounding errors.
                 let allowed = (0.1 * tolerance + 1e-12) * near.max(1.0);
                 assert!(off < allowed, "{seed} {tolerance:e} {step} s: {off:e} of {allowed:e}");
                 if off / allowed > worst.0 {
@@ -387,18 +386,21 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
             }
         }
     }
-    println!("worst {:.3} of what is allowed: case {} at {:e}", worst.0, worst.1, worst.2);
+    println!(
+        "worst: {:.3} of the allowed difference, seed {} at tolerance {:e}",
+        worst.0, worst.1, worst.2
+    );
 }
 
-/// Impact times used to come from a product of two series that was cut at their order, and did not include the distance from the
-/// wall at which the liquid starts. Runs with these seeds were then off by up to 2e-2 m.
+/// In an earlier version impact times came from a product of two power series of which only the terms up to their order
+/// were used, and the distance from the wall at which the liquid starts was left out. Runs with these seeds then had errors
+/// of up to 2e-2 m.
 #[test]
 fn the_motion_of_detached_liquid_does_not_depend_on_the_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
 }
 
-/// Simulates detached liquid under 200 random histories of thrust with different communication steps, which must give
-/// the same motion.
+/// Detached liquid under 200 random histories of thrust moves alike with different communication steps.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_communication_step() {
@@ -422,7 +424,7 @@ fn a_craft_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_de
     );
 }
 
-/// Accelerations and forces that solve Newton's laws with the wall's force as an unknown.
+/// Accelerations and forces that solve Newton's laws in which the wall's force is an unknown.
 struct Rates {
     a: V,
     w_d: V,
@@ -433,8 +435,8 @@ pub(super) fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 
-/// Returns the wall that a tank's lump meets: its centre on the tank's axis and its semi-axes b, b, a, from
-/// the liquid's centre at rest and the pendulums' m l.
+/// Returns the wall that the detached liquid of a tank meets: height of the wall's centre on the tank's axis and semi-axes
+/// b, b, a, from the liquid's centre at rest and the pendulums' m l.
 pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     let tank = &p.tank[i];
     let modes = || 0..tank.modes;
@@ -446,7 +448,8 @@ pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     ((tank.m_0 * tank.h_0 + bobs) / mass + a, V::new(b, b, a), mass)
 }
 
-/// Returns J_a, the inertia of the parts of the liquid about their centre, with rods along `p`, body axes.
+/// Returns J_a, the inertia of all parts of the liquid about their common centre, for the directions `p` of the rods, body
+/// axes.
 pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     let tank = &p.tank[i];
     let axes = *rotation(&tank.q).matrix();
@@ -465,8 +468,8 @@ pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     axes * j * axes.transpose()
 }
 
-/// Solves Newton's laws if all tanks' liquids are lumps, those of `slides` on the wall. Unknowns are a, w',
-/// each lump's x'' (body axes) and the force N with which it presses along the outward normal.
+/// Solves Newton's laws for a craft whose liquids are all detached; `slides` states which of them are on the wall. Unknowns
+/// are a, w', each liquid's x'' (body axes) and the force N with which it presses on the wall.
 fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rates {
     let n = slides.len();
     let (lump, force) = (|i: usize| 6 + 4 * i, |i: usize| 9 + 4 * i);
@@ -532,8 +535,8 @@ fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rat
     Rates { a: part(0), w_d: part(3), x_dd }
 }
 
-/// Returns a craft with two lumps (detached liquids) anywhere within their walls. The second one,
-/// or both, are on the wall.
+/// Returns a craft with two detached liquids at random places within their walls. `slides` states which of them
+/// are on the wall.
 fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
     let p = off_axis_craft(random);
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-12).unwrap();
@@ -570,7 +573,7 @@ fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
         let (rates, want) = (craft.derivatives(&u), newton(&p, &x, &u, &slides));
         let out = craft.outputs(&u);
         let near = |a: &[f64], b: V, what: &str| {
-            // Two ways to solve systems whose condition is 1e4.
+            // The tolerance is for two ways to solve linear systems whose condition number is 1e4.
             assert!((v(a) - b).norm() < 1e-11 * (1.0 + b.norm()), "{seed} {what}: {a:?} {b}");
         };
         near(&rates[index::OMEGA..], want.w_d, "w'");
@@ -582,7 +585,8 @@ fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
     }
 }
 
-/// The directions leave the wall, because position and rate are brought to the wall before rates are computed.
+/// Also directions that point away from the wall have a derivative, because position and rate are projected onto the wall
+/// before rates are computed.
 #[test]
 fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..12 {
@@ -590,7 +594,8 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
         let (_, mut craft) = loose(&mut random, CASES[seed as usize % 3]);
         let u = random.inputs();
         let x = craft.continuous_states();
-        // The directions with which the liquid has left belong to it: they make the inertia of its shape.
+        // The bobs' directions belong to the direction of the derivative, because they determine the inertia of
+        // the detached liquid's shape.
         let dx: [f64; STATES] = random.vector(0.1);
         let du: [f64; INPUTS] = random.vector(1.0);
         let list = |rates: &[f64; STATES], out: &Outputs| {
@@ -621,15 +626,15 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
         let have = list(&rates, &craft.output_derivatives(&u, &dx, &du));
         for i in 0..have.len() {
             let want = (8.0 * (p1[i] - m1[i]) - (p2[i] - m2[i])) / (12.0 * step);
-            // (step^4, 1e-16/step) of the size of the quantity and of what it curves by.
+            // The errors are step^4 and 1e-16/step times the size of the quantity and of its curvature.
             let size = 1.0 + want.abs() + p1[i].abs();
             assert!((have[i] - want).abs() < 1e-8 * size, "{seed} {i}: {} {want}", have[i]);
         }
     }
 }
 
-/// The two bodies of the independent simulator, in inertial axes: the dry craft with J_a about its
-/// centre of mass, and the detached liquid as a free particle.
+/// The two bodies of the independent simulator, in inertial axes: the dry craft, which includes J_a, and the detached liquid
+/// as a free particle.
 #[derive(Clone, Copy)]
 struct Pair {
     place: V,
@@ -654,7 +659,7 @@ impl Simulator {
     fn state_after(&self, s: &Pair, h: f64) -> Pair {
         let inverse = self.inertia.try_inverse().unwrap();
         let arm = v(&self.p.craft.r);
-        // [velocity, acceleration, q', w'] at an instant.
+        // Velocity, acceleration, q' and w' at an instant.
         let rates = |s: &Pair| {
             let torque = self.torque - arm.cross(&self.force) - s.w.cross(&(self.inertia * s.w));
             let q_d = s.q.into_inner() * Quaternion::from_parts(0.0, s.w) * 0.5;
@@ -690,7 +695,7 @@ impl Simulator {
         1.0 - (self.in_tank(s) - V::z() * self.height).component_div(&self.semi).norm_squared()
     }
 
-    /// Applies the impulse of two bodies at their contact point; `e` is the coefficient of restitution.
+    /// Applies the impulse of the two bodies on each other at their contact point; `e` is the coefficient of restitution.
     fn impact(&self, s: &mut Pair, e: f64) {
         let local = (self.in_tank(s) - V::z() * self.height)
             .component_div(&self.semi.component_mul(&self.semi));
@@ -711,15 +716,15 @@ impl Simulator {
     }
 }
 
-/// A second program, with its own equations and its own search for impacts, simulates random craft with detached liquid;
-/// motions and times of impacts agree.
+/// A second simulator, with its own equations and its own search for impacts, simulates random craft with detached liquid.
+/// It finds the same motions and times of impacts.
 #[test]
 fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
     for seed in 0..5 {
         let mut random = Random::new(seed);
         let mut p = off_axis_craft(&mut random);
         p.tanks = 1;
-        // A sphere: impacts on narrower walls multiply what rounding has made some hundred times each.
+        // The wall is a sphere, because each impact on a narrower wall amplifies rounding errors some hundred times.
         (p.tank[0].ball.travel, p.tank[0].ball.radius) = (1.0, 0.5);
         (p.tank[0].ball.restitution, p.tank[0].ball.contact_speed) = (0.9, 1e-9);
         p.tank[0].k = [0.0; craft::MODES];
@@ -759,7 +764,7 @@ fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
             let end = k as f64 * step;
             while t < end {
                 let next = simulator.state_after(&s, end - t);
-                // The liquid starts at the wall.
+                // At first the liquid is at the wall, which is no impact.
                 if k < 10 || simulator.inside(&next) > 0.0 {
                     (s, t) = (next, end);
                     continue;
@@ -784,7 +789,7 @@ fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
         assert_eq!(out.tank[0].ball_state, BallState::Flying, "{seed}");
         assert!(impacts >= 2, "{seed}: {impacts}");
         let near = |a: [f64; 3], b: V, what: &str| {
-            // Runge-Kutta leaves (w h)^4 of what turns, and each impact multiplies what is there some ten times.
+            // The error is (w h)^4 from the Runge-Kutta method, and each impact amplifies errors about ten times.
             assert!((v(&a) - b).norm() < 1e-8 * (1.0 + b.norm()), "{seed} {what}: {a:?} {b}");
         };
         near(out.tank[0].ball_position, simulator.in_tank(&s), "lump");
@@ -805,7 +810,7 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
             (tank.k, tank.ball.travel) = ([0.0; craft::MODES], 1.0);
             (tank.q, tank.ball.drag) = ([1.0, 0.02, -0.03, 0.2], 0.3);
         }
-        // Towards the settled state after 6 s.
+        // After 6 s of reversed thrust, thrust forwards lets the liquid settle.
         let (back, forward) = (thrust(-0.2 * p.craft.mass), thrust(0.5 * p.craft.mass));
         let mut craft = Spacecraft::new(&p, &back, 0.0, 1e-12).unwrap();
         let mut changes = [0; 2];
@@ -825,7 +830,7 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
                 changes[usize::from(is == settled)] += 1;
                 let place =
                     |out: &Outputs| v(&out.position) + rotation(&out.q) * v(&out.center_of_mass);
-                // What thrust does in 2 ms, by the momentum's mean.
+                // Change of the momentum by the thrust in 2 ms, with the mean of the momentum for the position.
                 let thrust = v(&u.force.value).norm() * 2e-3;
                 let gained = v(&after.momentum) - v(&before.momentum);
                 let along = rotation(&before.q) * v(&u.force.value) * 2e-3;
@@ -860,7 +865,7 @@ fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
         craft.step(&u, 0.37).unwrap();
         other.step(&u, 0.37).unwrap();
         assert_eq!(craft.state(), other.state(), "{k}");
-        // One that has gone on goes back.
+        // A craft that has advanced further returns to the saved state.
         let saved = *craft.state();
         other.step(&u, 5.0).unwrap();
         other.set_state(&saved);
@@ -876,8 +881,8 @@ fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
     }
 }
 
-/// A Model Exchange host with Runge-Kutta steps of 1 ms, which bisects where an indicator changes
-/// its sign, finds the impacts and settling times of Co-Simulation.
+/// A Model Exchange host with Runge-Kutta steps of 1 ms, which locates sign changes of an indicator by bisection, finds the
+/// same impacts and settling times as Co-Simulation.
 #[test]
 fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation() {
     let mut p = craft();
@@ -942,10 +947,10 @@ fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation()
         own.step(u, steps as f64 * step).unwrap();
     }
     let states = [BallState::Flying, BallState::Sliding, BallState::Settled];
-    assert!(states.iter().all(|state| seen.contains(state)), "not all states");
+    assert!(states.iter().all(|state| seen.contains(state)), "not all states were reached");
     let out = own.outputs(&forward);
     assert_eq!(out.tank[0].ball_state, BallState::Settled);
-    // Settled liquid's ball stands on the axis, at the height of the centre of the tank's liquid at rest, in tank axes.
+    // The output `ball_position` of settled liquid is on the tank's axis, at the height of the liquid's centre at rest.
     let (middle, half, _) = wall(&p, 0);
     assert!((v(&out.tank[0].ball_position) - V::z() * (middle - half.z)).norm() < 1e-14);
     assert_eq!(out.tank[0].ball_velocity, [0.0; 3]);
@@ -953,7 +958,7 @@ fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation()
     let want = own.continuous_states();
     for i in 0..STATES {
         let off = (x[i] - want[i]).abs();
-        // The host's steps of 1 ms, and events to 1e-15 s.
+        // The error comes from the host's steps of 1 ms; events are located to 1e-15 s.
         assert!(off < 1e-7 * (1.0 + want[i].abs()), "x[{i}] {} {}", x[i], want[i]);
     }
 }
@@ -999,7 +1004,7 @@ fn options_that_do_not_go_with_detached_liquid_are_refused() {
         let has_remedy = said.contains("allowed") || said.contains(": set ");
         assert!(said.contains(word) && has_remedy, "{word}: {said}");
     }
-    // What a message allows is allowed, and no less.
+    // A parameter may be equal to the limit in the message, but not smaller.
     for set in [
         |p: &mut Parameters, x| p.tank[0].ball.travel = x,
         |p: &mut Parameters, x| {
@@ -1021,7 +1026,7 @@ fn options_that_do_not_go_with_detached_liquid_are_refused() {
 
 #[test]
 fn random_craft_and_steps_of_any_length_give_finite_results() {
-    // 1335 grazes a wall where forces of 1 kN cancel. Without losses (e = 1) bounces need not end.
+    // With seed 1335 the liquid grazes a wall where forces of 1 kN cancel. Without losses (e = 1) the bounces need not end.
     for seed in every_or(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1335], (0..40).chain([1335])) {
         let mut random = Random::new(seed + 1000);
         let mut p = Parameters { tanks: 1 + random.below(TANKS), ..random.parameters() };

@@ -1,7 +1,7 @@
-//! Liquid that leaves the bottom of a tank on a host, compared with the same tank of a Spacecraft.
+//! Tests of liquid that leaves the bottom of a tank on a host, compared with the same tank in a Spacecraft.
 //!
-//! The host is a rigid body that solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 of the tank's impulses to its
-//! velocity and rate. Momenta and energy are read from the outputs of a Spacecraft in the same state.
+//! The host is a rigid body that solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 times the impulses of the
+//! tank to its velocity and angular velocity. Momenta and energy are computed by a Spacecraft in the same state.
 
 use craft::{
     BallState, Coupling, Inputs, Outputs, Parameters, Ramp, SloshTank, SloshTankOutputs,
@@ -93,8 +93,8 @@ impl Craft {
         }
     }
 
-    /// Returns the present inputs of the tank, which are the motion of the host. The drag of the
-    /// bobs does not depend on the host's acceleration here.
+    /// Returns the present inputs of the tank, which are the motion of the host. The slope of the acceleration is 0: the
+    /// drag of the bobs does not depend on the acceleration here.
     fn inputs(&mut self, u: &Inputs) -> TankInputs {
         let w = self.host.w;
         let still = self.held(w, &Six::zeros());
@@ -142,7 +142,8 @@ impl Craft {
         BallState::ALL[words[TankState::WORDS - 1] as usize - 1]
     }
 
-    // A host that integrates itself: Runge-Kutta of all, bisections where an indicator changes its sign.
+    // The following methods are those of a host that integrates all states by Runge-Kutta, and locates sign changes of
+    // an indicator by bisection.
 
     pub(super) fn pack(&self) -> Vec<f64> {
         let Host { q, w, r, velocity, work } = self.host;
@@ -205,7 +206,7 @@ impl Craft {
                 return;
             }
         }
-        panic!("events do not end");
+        panic!("a tank has more than the allowed number of events at one instant");
     }
 
     fn integrate(&mut self, u: &Inputs, h: f64) {
@@ -231,7 +232,8 @@ impl Craft {
         }
     }
 
-    // A host that steps first, with bias and added mass along their slopes, and then the tank.
+    // The following methods are those of a host that steps first, with bias and added mass extrapolated by their slopes, and
+    // then steps the tank.
 
     fn exchange(&mut self, u: &Inputs, h: f64) {
         let given = self.inputs(u);
@@ -302,7 +304,7 @@ fn runge_kutta(x: &[f64], h: f64, mut rates: impl FnMut(f64, &[f64]) -> Vec<f64>
     (0..x.len()).map(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])).collect()
 }
 
-/// Returns a craft with one tank that stands off the craft's axis and inclined to it. The drag of its bobs does not depend on the
+/// Returns a craft with one tank, off the craft's axis and inclined to it. The drag of its bobs does not depend on the
 /// acceleration.
 fn one(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1, ..off_axis_craft(random) };
@@ -318,9 +320,9 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
     (v(&a) - v(&b)).norm()
 }
 
-/// Reversed thrust, no thrust, and thrust forwards. The host uses Runge-Kutta at 1 ms, locates events to 1e-16 s, and
-/// exchanges the liquid's states as in Model Exchange. Without thrust the Spacecraft's outputs show the initial
-/// momentum.
+/// Thrust acts backwards, then not at all, and then forwards. The host uses Runge-Kutta steps of 1 ms, locates
+/// events to 1e-16 s, and integrates the liquid's states as in Model Exchange. Without thrust, momentum and angular
+/// momentum keep their values.
 #[test]
 fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_energy() {
     let (mut seen, mut impulses) = ([0; 6], 0);
@@ -343,10 +345,10 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
                     continue;
                 }
                 let now = craft.spacecraft_outputs(u);
-                // Rounding of a difference of energies of 1e3 J.
+                // The tolerance is the rounding error of a difference of energies of 1e3 J.
                 assert!(now.dissipated >= dissipated - 1e-10, "{seed} {}", now.dissipated);
                 dissipated = now.dissipated;
-                // Runge-Kutta leaves 1e-12.
+                // The Runge-Kutta method has an error of 1e-12.
                 let balance = now.energy - now.work + now.dissipated
                     - (start.energy - start.work + start.dissipated);
                 assert!(balance.abs() < 1e-10 * (1.0 + now.energy), "{seed} E {balance}");
@@ -369,9 +371,9 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
             off(want.position, got.position),
         ];
         println!("{seed}: w, V, E, r {errors:?}");
-        // Each impact multiplies what is there some ten times.
+        // Each impact amplifies errors about ten times.
         assert!(errors[..3].iter().all(|error| error.abs() < 1e-8), "{seed} {errors:?}");
-        // At a settling the Spacecraft moves aside, which this host does not.
+        // When liquid settles, a Spacecraft shifts its position to conserve the centre of mass, which this host does not.
         assert!(errors[3] < if has_settled { 1e-2 } else { 1e-8 }, "{seed} {errors:?}");
         impulses += craft.impulses;
     }
@@ -379,8 +381,8 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
     assert!(seen[1..4].iter().all(|count| *count > 3_000), "{seen:?}");
 }
 
-/// Motion along the axis does not rotate the host, so the lag of the host within a step is known. Two steps a second
-/// give the host the same velocity as a Spacecraft, through a reversal, bounces and settling at both ends.
+/// Motion along the axis does not rotate the host, so that the host's delay within a step is known exactly. With two steps a
+/// second the host has the same velocity as a Spacecraft, through a reversal of thrust, bounces and settling at both ends.
 #[test]
 fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
@@ -419,10 +421,10 @@ fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     }
 }
 
-/// Six tanks off the craft's axis fly with thrust backwards, then forwards. The host takes each step first, and host and tank exchange
-/// values that are linear over the step. The errors of rates, lump and dissipated energy are of second order in the communication step. The
-/// errors of attitude and position, and of the momentum's direction, which depends on the attitude, are of first order, because they lag
-/// behind the impulses within a step.
+/// Six tanks off the craft's axis fly with thrust backwards, then forwards. In each step the host advances first; host and
+/// tank exchange values that are linear over the step. The errors of rates, detached liquid and dissipated energy are of
+/// second order in the communication step. The errors of velocity and of the momentum's direction are of first order,
+/// because they depend on the attitude, which lags behind the impulses within a step.
 #[test]
 fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_motion() {
     let errors = |steps: usize| {
@@ -452,7 +454,7 @@ fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_m
     };
     let [coarse, fine] = [50, 400].map(errors);
     println!("20 ms: w, ball, E, V, P {coarse:?}\n2.5 ms: {fine:?}");
-    // In an eighth of the step first order leaves an eighth, second a 64th.
+    // With an eighth of the step an error of first order falls to an eighth, and an error of second order to a 64th.
     for i in 0..3 {
         assert!(fine[i] < coarse[i] / 12.0, "{i}: {coarse:?} {fine:?}");
     }
@@ -462,8 +464,8 @@ fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_m
     assert!(coarse.iter().all(|error| *error < 1e-2), "{coarse:?}");
 }
 
-/// Returns the tank of [`one`] in the state `ball`, and an acceleration that presses the liquid to the wall
-/// if it slides.
+/// Returns the tank of [`one`] in the state `ball`, and an acceleration of the host that presses the liquid to the
+/// wall if it slides.
 fn placed(seed: u64, ball: BallState) -> (SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let p = one(&mut random);
@@ -472,7 +474,7 @@ fn placed(seed: u64, ball: BallState) -> (SloshTank, TankInputs) {
     words[TankState::WORDS - 1] = ball as u64;
     tank.set_state(&TankState::from_words(&words).unwrap());
     let mut x = tank.continuous_states();
-    // On the sphere of 0.5 m that it reaches.
+    // The liquid is put on the sphere of 0.5 m radius that its centre can reach.
     let center = V::new(0.0, 0.0, x[BALL + 2] + 0.5);
     let (n, rate) = (v(&random.vector::<3>(1.0)).normalize(), v(&random.vector::<3>(0.3)));
     let along = rate - n * n.dot(&rate);
@@ -553,7 +555,7 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
             let differences = rates_1.iter().zip(&rates_2).chain(out_1.iter().zip(&out_2));
             for (i, (d, (a, b))) in rates.iter().chain(&out).zip(differences).enumerate() {
                 let want = (a - b) / (2.0 * h);
-                // Differences of second order, and their rounding.
+                // The tolerance includes the error of the differences, which is of second order, and rounding errors.
                 let size = 1.0 + want.abs() + a.abs();
                 assert!((d - want).abs() < 1e-7 * size, "{seed} {ball:?} {i}: {d} {want}");
             }

@@ -1,5 +1,5 @@
-//! Steps over rounded corners of the physics, where power series converge over short times only: their errors are within the
-//! tolerance.
+//! Steps over rounded corners in the force laws, where power series converge only over short times: the errors must
+//! be within the tolerance.
 
 use craft::{
     DampingLaw, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, TANKS, Tank,
@@ -10,8 +10,8 @@ use super::independent::newton_rates;
 use super::random::{Random, draining_tank};
 use super::seeds::every_or;
 
-/// One row of a table of thrust: its length, s, the specific force along the tank at both ends and across the tank, the angular
-/// acceleration, and the flows out of the tanks at both ends, kg/s.
+/// One row of a table of thrust: its duration, s, the specific force along the tank at both ends and across the tank, the
+/// angular acceleration, and the mass flows out of the tanks at both ends, kg/s.
 struct Row {
     h: f64,
     along: [f64; 2],
@@ -39,7 +39,7 @@ impl Row {
     }
 }
 
-/// Returns eight rows of 0.05 to 3 s with ramps, jumps, zeros and short reversals of the thrust.
+/// Returns eight rows of 0.05 to 3 s in which the thrust has ramps, jumps, zeros and short reversals.
 fn table(r: &mut Random) -> Vec<Row> {
     let value = |r: &mut Random| match r.below(4) {
         0 => 0.0,
@@ -57,7 +57,7 @@ fn table(r: &mut Random) -> Vec<Row> {
     (0..8).map(row).collect()
 }
 
-/// Returns a table of thrust during which valves open, close, stay as they are and reverse their flow.
+/// Returns a table of thrust with mass flows: valves open and close, and flows are constant, zero or reversed.
 fn table_with_flows(r: &mut Random) -> Vec<Row> {
     let mut rows = table(r);
     let value = |r: &mut Random| [0.0, r.between(-3.0, 6.0)][r.below(2)];
@@ -72,9 +72,9 @@ fn table_with_flows(r: &mut Random) -> Vec<Row> {
     rows
 }
 
-/// One or two tanks with drag of every law that follows the specific force, half of
-/// them with the default a_f. A third of the modes has drag that grows, a third waves that break.
-/// A sixth of the tanks has bobs on other surfaces.
+/// Returns a craft with one or two tanks whose drag follows the specific force by every damping law, half of them with the
+/// default a_f. A third of the modes has drag that grows with the amplitude, and a third has breaking waves. In a sixth of
+/// the tanks the bobs move on surfaces other than spheres.
 fn parameters(r: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1 + r.below(2), mount: Mount::Free, ..r.parameters() };
     p.max_steps = 1_000_000;
@@ -106,8 +106,8 @@ fn drag(r: &mut Random, tank: &mut Tank) {
     }
 }
 
-/// Gives a craft draining tanks with all kinds of drag. In half of the tanks the surface of the bob changes with the
-/// fill.
+/// Replaces the tanks of a craft by draining tanks with all kinds of drag. In half of the tanks the surface of the bob
+/// changes with the fill.
 fn drain(r: &mut Random, p: &mut Parameters) {
     for tank in &mut p.tank {
         let modes = r.below(4);
@@ -126,7 +126,7 @@ fn put_on_pivot(r: &mut Random, p: &mut Parameters) {
         (r.magnitude(0.01, 1.0), r.magnitude(1e-3, 0.3));
 }
 
-/// Conditions of a run: its tolerance, its longest communication step, and a displacement of the first bob at the start.
+/// Settings of a run: tolerance, longest communication step, and a displacement of the first bob at the start.
 #[derive(Clone, Copy)]
 struct Way {
     tolerance: f64,
@@ -134,8 +134,8 @@ struct Way {
     shift: f64,
 }
 
-/// Calls `step` for each communication step, with the row of the table, the time in this row and
-/// the length of the step, s. Calls `look` after each row.
+/// Calls `step` for each communication step, with the row of the table, the time since the start of the row and the length
+/// of the step, s. Calls `look` after each row.
 fn drive(rows: &[Row], longest: f64, mut step: impl FnMut(&Row, f64, f64), mut look: impl FnMut()) {
     for row in rows {
         let pieces = (row.h / longest).ceil().max(1.0);
@@ -206,16 +206,16 @@ fn craft_states(p: &Parameters, rows: &[Row], way: Way) -> Vec<f64> {
     all
 }
 
-/// Returns the largest difference between two states, relative to 1 rad or 1 rad/s, or to the
-/// largest rate if that is larger.
+/// Returns the largest difference between two states, divided by 1 rad or 1 rad/s, or by the largest rate if it
+/// is above 1 rad/s.
 fn off(a: &[f64], b: &[f64]) -> f64 {
     let size = b.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
 }
 
-/// Compares communication steps of whole rows with the exact motion, which is computed in steps of 2 ms at a tolerance of 1e-13.
-/// The error of a run may be 30 times the tolerance. A pendulum that falls over multiplies errors; the error may then be larger
-/// by the factor by which a small displacement at the start grows.
+/// Compares runs with communication steps of whole rows with the exact motion, which is computed in steps of 2 ms at a
+/// tolerance of 1e-13. The allowed error is 30 times the tolerance. Since a pendulum that falls over amplifies errors, it is
+/// multiplied by the factor by which a small displacement at the start grows.
 fn keep_the_tolerance(seeds: impl IntoIterator<Item = u64>, run: impl Fn(u64, Way) -> Vec<f64>) {
     let mut worst = (0.0, 0, 0.0);
     for seed in seeds {
@@ -225,13 +225,13 @@ fn keep_the_tolerance(seeds: impl IntoIterator<Item = u64>, run: impl Fn(u64, Wa
         for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
             let error =
                 off(&run(tolerance, f64::INFINITY, 0.0), &exact) / tolerance / growth.max(1.0);
-            assert!(error < 30.0, "{seed}: {error} times the tolerance {tolerance:e}");
+            assert!(error < 30.0, "{seed}: error is {error} times the tolerance {tolerance:e}");
             if error > worst.0 {
                 worst = (error, seed, tolerance);
             }
         }
     }
-    println!("worst error {:.2} tolerances: case {} at {:e}", worst.0, worst.1, worst.2);
+    println!("worst error: {:.2} tolerances, seed {} at {:e}", worst.0, worst.1, worst.2);
 }
 
 fn tank_of(seed: u64, way: Way) -> Vec<f64> {
@@ -304,8 +304,8 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_craft() {
     keep_the_tolerance(0..10, draining_craft_of);
 }
 
-/// The smoothed acceleration a_+ of the drag has singularities at +-i a_f/x' from the instant at which the specific force x
-/// crosses zero. Steps that ignored them were off by up to 400 tolerances.
+/// The smoothed acceleration a_+ of the drag has singularities at the complex times +-i a_f/x' from the instant at which the
+/// specific force x crosses zero. Without attention to them, steps had errors of up to 400 tolerances.
 #[test]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_tank() {
     keep_the_tolerance(0..10, tank_of);
@@ -316,8 +316,8 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_craft() {
     keep_the_tolerance(0..8, craft_of);
 }
 
-/// A tank is simulated under 1,000 random histories of thrust, and compared with runs in much shorter steps. The
-/// errors must stay near the tolerance of the solver.
+/// A tank under 1,000 random histories of thrust moves as in runs with much shorter steps, up to a few
+/// tolerances of the solver.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
@@ -329,8 +329,8 @@ fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
     keep_the_tolerance(0..200, draining_craft_of);
 }
 
-/// The reference uses Runge-Kutta steps of 0.2 ms with Newton's law (independent.rs), so that it has neither the series nor the
-/// formulas of the craft. In a step, the slope of a_+ may change by as much as itself, so that the rates are exact to 1e-7.
+/// The reference uses Newton's law (independent.rs) and Runge-Kutta steps of 0.2 ms, so that it has neither the power series
+/// nor the formulas of the craft. Its rates are exact to 1e-7, because the slope of a_+ may double within a step.
 #[test]
 fn thrust_that_crosses_zero_moves_a_craft_as_newtons_law_with_another_integrator() {
     for seed in every_or(&[1, 30], [1, 6, 9, 30]) {

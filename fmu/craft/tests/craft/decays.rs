@@ -1,5 +1,5 @@
-//! Damping as it is measured: the decay of free oscillations in a tank that is held, and in a tank of a craft that is too heavy
-//! to move.
+//! Damping as it is measured, by the decay of free oscillations: in a tank that is held, and in a tank of a craft that is
+//! too heavy to move.
 
 use std::f64::consts::TAU;
 
@@ -20,8 +20,8 @@ fn tank(angle: f64) -> Tank {
     tank
 }
 
-/// Returns p_x and its rate after each `period`, in the tank alone and in a craft of 1e9 kg, under `g` along
-/// the tank.
+/// Returns p_x and its rate after each `period`, for the single tank and for the tank in a craft of 1e9 kg, under the
+/// acceleration `g` along the tank.
 fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2] {
     let p = TankParameters { tank: *tank, ..TankParameters::default() };
     let motion = TankInputs { a: Ramp::held([0.0, 0.0, g]), ..TankInputs::default() };
@@ -44,8 +44,8 @@ fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2]
     [of_alone, of_craft]
 }
 
-/// From 9.81 m/s2 to a millionth of a m/s2, without and with a centring stiffness, the damping ratio zeta is proportional to
-/// omega^(-1/2), constant, or proportional to omega^-1, depending on the law.
+/// The acceleration is 9.81 m/s2 to a millionth of a m/s2, without and with centring stiffness. Depending on the damping
+/// law, the damping ratio zeta is proportional to omega^(-1/2), constant, or proportional to omega^-1.
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for law in DampingLaw::ALL {
@@ -53,7 +53,7 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
             for g in [G, G / 10.0, G / 100.0, G / 1000.0, 1e-4, 1e-6] {
                 let mut tank = tank(1e-3);
                 (tank.damping_law, tank.k[0], tank.zeta[0]) = (law, k, 1e-4);
-                // 1e-4 of 9.81 by default: above the smallest here.
+                // The default g_floor, 1e-4 of 9.81 m/s2, is above the smallest accelerations of this test.
                 tank.g_floor = if g < G / 1000.0 { 1e-9 } else { 0.0 };
                 let omega = |g: f64| (g / tank.length[0] + k / tank.mass[0]).sqrt();
                 let ratio = omega(G) / omega(g);
@@ -67,8 +67,8 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
                 for x in moments(&tank, g, TAU / w, 3) {
                     let a2 = |[angle, rate]: [f64; 2]| angle * angle + (rate / w).powi(2);
                     let zeta = -(a2(x[3]) / a2(x[0])).ln() / (2.0 * TAU * 3.0);
-                    // The floor adds 0.25 % to a at g_ref/1000, 0.13 % to c; large ratios add their squares, of the
-                    // angle there is 2.5e-7.
+                    // At g_ref/1000 the smoothing by a_f adds 0.25 % to a_+ and thereby 0.13 % to c. Large damping ratios
+                    // add their squares; the square of the angle adds 2.5e-7.
                     let allowed = 1.5e-3 + expected * expected;
                     assert!(
                         (zeta / expected - 1.0).abs() < allowed,
@@ -80,15 +80,15 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
     }
 }
 
-/// Steepness of the first mode in a cylinder per slosh angle: k = xi/R, elevation 2 R/(xi^2 - 1).
+/// Steepness of the first mode in a cylinder divided by the slosh angle, with k = xi/R and the elevation 2 R/(xi^2 - 1).
 const STEEPNESS: f64 = 2.0 * 1.841183781340659 / (1.841183781340659 * 1.841183781340659 - 1.0);
 
 fn rounded(x: f64) -> f64 {
     (x + x.hypot(0.02)) / 2.0
 }
 
-/// The amplitude A of a free oscillation decays by A'/A = -omega (zeta + zeta_A A + zeta_b max(0, k a - s_b)), tested up to 0.3 rad. The
-/// tolerance of 1 % includes the pendulum's own nonlinearity.
+/// The amplitude A of a free oscillation decays by A'/A = -omega (zeta + zeta_A A + zeta_b max(0, k a - s_b)), up to 0.3
+/// rad. The tolerance of 1 % includes the nonlinearity of the pendulum.
 #[test]
 fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breaking() {
     for (zeta_a, zeta_b, begins) in
@@ -119,8 +119,8 @@ fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breakin
     }
 }
 
-/// Returns the ranges of validity of a tank in a craft with this thrust, after checking that the
-/// tank alone has the same ranges under the craft's motion.
+/// Returns the ranges of validity of a tank in a craft with this thrust, after asserting that the single tank has the same
+/// ranges under the craft's motion.
 fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     let mut p = Parameters::default();
     p.tank[0] = tank;
@@ -143,7 +143,7 @@ fn ranges(k: f64, thrust: f64, angle: f64) -> Ranges {
     ranges_of(Tank { k: [k; MODES], ..tank(angle) }, thrust)
 }
 
-/// The wave's height over the radius is 0.837 times the slosh angle: 0.15 at 0.179 rad, and 0.25 at 0.299 rad.
+/// The wave height divided by the radius is 0.837 times the slosh angle: 0.15 at 0.179 rad, and 0.25 at 0.299 rad.
 #[test]
 fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_reversed_thrust_is_out_of_range() {
     let seen = [0.0, 0.178, 0.181, 0.297, 0.301, 0.8, 3.0].map(|angle| ranges(0.0, 2000.0, angle));
@@ -158,16 +158,17 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_reversed_thrust_is_out_of_ran
         (Nonlinear, false),
     ];
     assert_eq!(seen.map(|ranges| (ranges.regime, ranges.is_in_range())), expected);
-    // Without thrust the liquid stays where it is; against it, where centring holds it: k l/m > 1.3 m/s2.
+    // Without thrust the liquid stays at the bottom. Against reversed thrust it stays if the centring stiffness holds it: k
+    // l/m > 1.3 m/s2.
     assert!(ranges(0.0, 0.0, 0.1).is_in_range());
     assert!(!ranges(0.0, -2000.0, 0.1).is_in_range());
     assert!(!ranges(500.0, -2000.0, 0.1).is_in_range());
     assert!(ranges(800.0, -2000.0, 0.1).is_in_range());
 }
 
-/// The output `regime` follows from the sum of the waves of all modes. 0.1 rad of the first mode are 0.084 R, in the linear
-/// range. 0.1 rad of both, with half as high a wave of the second, are 0.126 R, and 0.15 rad of both 0.188 R. If a tank's
-/// waves are not given, the first angle uses that of a cylinder.
+/// The output `regime` depends on the sum of the waves of all modes. 0.1 rad of the first mode are 0.084 R, in the linear
+/// range. If the wave of the second mode is half as high, 0.1 rad of both modes are 0.126 R, and 0.15 rad of both are 0.188
+/// R. If a tank has no wave height per angle, the value of a cylinder is used for the first mode.
 #[test]
 fn the_regime_follows_from_the_waves_of_all_modes_together() {
     let with = |wave: [f64; MODES], angle: f64| {
@@ -184,7 +185,7 @@ fn the_regime_follows_from_the_waves_of_all_modes_together() {
     assert_eq!(seen, [Linear, Linear, Transitional, Transitional, Nonlinear]);
 }
 
-/// Bobs of every tank are within 45 degrees of the tank's axis or beyond; the check at the end of a step has to agree with the
+/// Bobs of every tank are within 45 degrees of the tank's axis or beyond. The check at the end of a step must agree with the
 /// ranges in the outputs.
 #[test]
 fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
@@ -208,7 +209,7 @@ fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
             assert_eq!(in_range, expected);
             assert_eq!(craft.is_physical(), angle < 0.7, "{tank} {mode} {angle}");
             found[usize::from(craft.is_physical())] += 1;
-            // Liquid that may leave its tank's bottom is never out of range.
+            // Liquid that may detach is never out of range.
             p.tank[tank].ball.travel = 0.6;
             let craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
             assert!(!craft.leaves_range(&craft.ranges_held()) && craft.is_physical());
@@ -217,8 +218,8 @@ fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     assert_eq!(found, [6, 6]);
 }
 
-/// The thrust is along the axis of the first tank and against the axis of the second. In the second tank the liquid is held only
-/// if k l/m is more than 1.3 m/s2.
+/// The thrust is along the axis of the first tank and against the axis of the second tank, where the liquid is held only if
+/// k l/m is above 1.3 m/s2.
 #[test]
 fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
     for (k, holds) in [(500.0, false), (800.0, true)] {
@@ -234,8 +235,8 @@ fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
     }
 }
 
-/// The drag does not depend on how a, w' or w produce the acceleration at the hinge. The test reads the contribution of
-/// zeta to p'' at 2 m/s2 along the tank.
+/// The drag depends on the acceleration at the hinge, whether it comes from a, w' or w. The test compares the contribution
+/// of zeta to p'' at 2 m/s2 along the tank.
 #[test]
 fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     let position = [0.7, -0.4, 0.2];
@@ -243,7 +244,7 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     let hinge = V::new(0.7, -0.4, 0.2 + tank.hinge[0]);
     let drag = |w: V, w_d: V| {
         let made = w_d.cross(&hinge) + w.cross(&w.cross(&hinge));
-        assert!(made[2].abs() > 0.5 || made == V::zeros(), "no small part of 2 m/s2: {made:?}");
+        assert!(made[2].abs() > 0.5 || made == V::zeros(), "too small a part of 2 m/s2: {made:?}");
         let u = TankInputs {
             a: Ramp::held((V::z() * 2.0 - made).into()),
             omega: w.into(),
@@ -259,19 +260,19 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
         V::from_row_slice(&with[3..6]) - V::from_row_slice(&without[3..6])
     };
     let still = drag(V::zeros(), V::zeros());
-    // c/m p'_x of the laminar layer; p' is made tangential, 0.1 rad from the axis.
+    // Expected c/m p'_x of the laminar law; p' is tangential to the sphere, 0.1 rad from the axis.
     let w_ref = (G / tank.length[0]).sqrt();
     let expected = -2.0 * 0.05 * w_ref * (2.0 / G).powf(0.25) * 0.5;
     assert!((still.x / expected - 1.0).abs() < 0.02, "{still} {expected}");
     for (w, w_d) in [(V::zeros(), V::new(1.5, 2.0, 0.0)), (V::new(1.0, -0.5, 1.2), V::zeros())] {
-        // Differences of numbers of some 10 1/s2.
+        // The tolerance is for differences of numbers of about 10 1/s2.
         assert!((drag(w, w_d) - still).norm() < 1e-13, "{} {still}", drag(w, w_d));
     }
 }
 
-/// A point of the table has the values of the default tank. A tank that could drain but does not must have the same drag as a
-/// tank that cannot drain, although their equations are written separately. Checked on a pivot and in free flight, under every
-/// damping law, with thrust in both directions.
+/// The fill table has the values of the default tank at one point. A tank that could drain but does not must have the same
+/// drag as a tank that cannot drain, although their equations are written separately. This is tested on a pivot and in free
+/// flight, under every damping law, with thrust in both directions.
 #[test]
 fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
     for (seed, law) in DampingLaw::ALL.into_iter().cycle().take(12).enumerate() {
@@ -301,9 +302,9 @@ fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
     }
 }
 
-/// The expected value is zeta_A A + zeta_b f(k a) with A^2 = angle^2 + (rate/w)^2 + A_0^2, from the dissipated power 2 zeta_A A m w l^2
-/// rate^2. The sine of the angle would give 8 % less at 0.7 rad at rest. Draining tanks and planar modes have their own
-/// equations.
+/// The damping ratio is computed from the dissipated power, 2 zeta m w l^2 rate^2. It must be zeta_A A + zeta_b f(k a) with
+/// A^2 = angle^2 + (rate/w)^2 + A_0^2; with the sine of the angle it would be 8 % smaller at 0.7 rad. Draining tanks and
+/// planar modes are tested as well, because they have their own equations.
 #[test]
 fn amplitude_damping_grows_with_the_slosh_angle_not_with_its_sine() {
     let (zeta_a, zeta_b, begins) = (0.05, 0.04, 0.6);
@@ -327,15 +328,15 @@ fn amplitude_damping_grows_with_the_slosh_angle_not_with_its_sine() {
                 let breaking = rounded(STEEPNESS * amplitude - begins) - rounded(-begins);
                 let zeta = zeta_a * amplitude + zeta_b * breaking;
                 let want = 2.0 * zeta * m * w * (l * rate).powi(2);
-                // The series of the angle is 3e-7 off at 0.785 rad; the table has six digits of m and l.
+                // The series of the angle has an error of 3e-7 at 0.785 rad, and the table has six digits of m and l.
                 assert!((power / want - 1.0).abs() < 3e-6, "{what} {angle} {rate}: {power} {want}");
             }
         }
     }
 }
 
-/// Waves below the steepness lose next to nothing by breaking. At every angle and rate the power is positive or 0, alone and
-/// in a tank that could drain.
+/// Waves below the steepness s_b lose almost no energy by breaking. The dissipated power is never negative, at any angle and
+/// rate, in tanks that cannot and that could drain.
 #[test]
 fn breaking_only_dissipates_and_only_above_its_steepness() {
     for begins in [0.0, 0.3, 0.66, 10.0] {
@@ -358,7 +359,7 @@ fn breaking_only_dissipates_and_only_above_its_steepness() {
                     assert!(power >= 0.0, "{begins} {angle} {rate}: {power:e}");
                     let steepness = STEEPNESS * (angle.powi(2) + (rate / w).powi(2)).sqrt();
                     if steepness < begins - 0.1 {
-                        // delta^2/(4 d)
+                        // Below s_b the rounded corner leaves delta^2/(4 d).
                         assert!(zeta < 0.04 * 1.1e-3, "{begins} {angle} {rate}: {zeta:e}");
                     }
                 }

@@ -1,6 +1,6 @@
-//! Tanks that drain.
+//! Tests of tanks that drain.
 //!
-//! With the outflow f at r_out = d + z_out e, which leaves with the tank's velocity there,
+//! The outflow f leaves at r_out = d + z_out e with the velocity of the tank at this point, so that
 //!
 //! ```text
 //! P' = C (force - f (V + w x r_out))
@@ -8,7 +8,7 @@
 //! P  = C (m V + w x S + S' + f r_out),   m' = -f
 //! ```
 //!
-//! r: O from the inertial origin, S: first moment of everything about O.
+//! r is the position of O from the inertial origin, and S the first moment of craft and liquid about O.
 
 use craft::{
     Coupling, DampingLaw, INPUTS, Inputs, Line, MODES, Mount, Outputs, POINTS, Parameters, Ramp,
@@ -60,8 +60,8 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
     [momentum, v(&out.angular_momentum) + center.cross(&momentum)]
 }
 
-/// Checks the momentum balances, whose rates are integrated over two seconds by Lobatto's rule of
-/// five points, for draining tanks with and without modes.
+/// The rates of momentum and angular momentum, integrated over two seconds by Lobatto's rule with five points, equal the
+/// changes of both, for draining tanks with and without modes.
 #[test]
 fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     let modes =
@@ -103,7 +103,7 @@ fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     }
 }
 
-/// The momentum in the outputs equals m V + w x S + S' + f r_out by Newton and Euler, with S' from differences of the centre of
+/// By Newton and Euler the momentum is m V + w x S + S' + f r_out. S' is computed from differences of the centre of
 /// mass in the outputs.
 #[test]
 fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
@@ -133,12 +133,13 @@ fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
         }
         let want = v(&out.velocity) * out.mass + turn * inner;
         let off = (v(&out.momentum) - want).norm() / want.norm();
-        // e^4/30 of the fifth derivative, 1e-16/e.
+        // The errors are e^4/30 of the fifth derivative and 1e-16/e.
         assert!(off < 1e-10, "{seed} {off:e}");
     }
 }
 
-/// For steps of any length, the mass that is left is the initial mass less the integral of the flow, and the motion is the same.
+/// The remaining mass is the initial mass minus the integral of the flow, and the motion is the same for steps of any
+/// length.
 #[test]
 fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     let (p, mut u) = draining_craft(7, 2);
@@ -165,8 +166,8 @@ fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     }
 }
 
-/// Position and velocity begin at 0 and end at some 100 m and 30 m/s. The scale of a step's errors grows with them, so that the
-/// steps need not stay as short as at the start.
+/// Position and velocity are 0 at the start and about 100 m and 30 m/s at the end. The scale of a step's allowed error grows
+/// with them, so that the steps need not stay as short as at the start.
 #[test]
 fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     for seed in every_or(&[1, 3], 0..6) {
@@ -182,7 +183,7 @@ fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
             });
             for x in ends {
                 for i in 0..index::WORK {
-                    // Five seconds of tumbling; rounding of 250 steps.
+                    // The tolerance is for five seconds of tumbling motion and the rounding errors of 250 steps.
                     let off = (x[i] - short[i]).abs() / (1.0 + short[i].abs());
                     assert!(off < tolerance.max(1e-11), "{seed} {tolerance}: x[{i}] {off:e}");
                 }
@@ -191,8 +192,8 @@ fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     }
 }
 
-/// A tank with thrust along its axis drains while its liquid is at rest. In the rates large terms cancel and leave
-/// only rounding errors, which must not make the steps of the integrator short.
+/// A tank with thrust along its axis drains while its liquid is at rest. In the derivatives large terms cancel and leave
+/// rounding errors, which must not make the steps of the solver short.
 #[test]
 fn a_tank_that_drains_at_rest_takes_long_steps() {
     for modes in [0, 3] {
@@ -223,8 +224,8 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
     }
 }
 
-/// Without flow the equations of a draining tank give the same motion as the equations of a tank with constant mass, for
-/// every law of drag.
+/// Without flow the equations of a draining tank give the same motion as the equations of a tank with constant mass,
+/// for every damping law.
 #[test]
 fn a_fill_table_without_outflow_changes_nothing() {
     for seed in 0..4 {
@@ -240,7 +241,7 @@ fn a_fill_table_without_outflow_changes_nothing() {
             if table.points == 0 {
                 continue;
             }
-            // 400 kg lie between two points; take one of them.
+            // Between two points of the table is 400 kg; the test needs the mass of a point.
             let i = 3;
             tank.fill.points = 0;
             (tank.h_0, tank.i_0, tank.i_z) = (table.h_0[i], table.i_0[i], table.i_z[i]);
@@ -258,7 +259,7 @@ fn a_fill_table_without_outflow_changes_nothing() {
         let mut b = Spacecraft::new(&without, &u, 0.0, 1e-12).unwrap();
         for k in 0..250 {
             let u = after(&u, k as f64 * STEP);
-            // A jump of the wheels, too.
+            // The motion is also the same after a jump of the wheels' momentum.
             a.step(&u, STEP).unwrap();
             b.step(&u, STEP).unwrap();
         }
@@ -270,13 +271,13 @@ fn a_fill_table_without_outflow_changes_nothing() {
     }
 }
 
-/// Derivatives are compared with differences of the rates, along a direction in which all states and inputs change at once,
-/// including flows and masses of liquid.
+/// Directional derivatives are compared with differences of the rates, along a direction in which all states and inputs
+/// change at once, including flows and masses of liquid.
 #[test]
 fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     for seed in (0..8).chain(20..24).chain(40..44) {
         let (mut p, u) = draining_craft(seed, 1 + seed as usize % 3);
-        // As a host gives them that integrates itself: without slopes.
+        // The inputs have no slopes, as a host that integrates the states itself sets them.
         let mut u = after(&u, 0.0);
         for ramp in [&mut u.force, &mut u.torque, &mut u.h_wheels] {
             ramp.slope = [0.0; 3];
@@ -319,8 +320,8 @@ fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     }
 }
 
-/// At each point of the table, under every damping law, the rates equal the rates of a tank with this point's damping ratio at
-/// every fill.
+/// At each point of the table and under every damping law, the rates equal those of a tank in which this point's damping
+/// ratio holds at every fill.
 #[test]
 fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     for (i, law) in DampingLaw::ALL.into_iter().enumerate() {
@@ -340,7 +341,7 @@ fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     }
 }
 
-/// Returns the energy of the craft plus the dissipated and the drained energy, minus the work. It is constant.
+/// Returns energy + dissipated + drained - work of the craft, which must be constant.
 pub fn energy(out: &Outputs) -> f64 {
     out.energy + out.dissipated + out.drained - out.work
 }
@@ -398,7 +399,7 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
             let jumped = craft.outputs(&now);
             let [p_0, h_0] = momenta(&before);
             let [p_1, h_1] = momenta(&jumped);
-            // A few roundings of numbers of this size.
+            // The tolerance is for a few rounding errors of numbers of this size.
             assert!((p_1 - p_0).norm() < 1e-14 * p_0.norm(), "{seed} {p_0} {p_1}");
             assert!((h_1 - h_0).norm() < 1e-13 * h_0.norm(), "{seed} {h_0} {h_1}");
             assert!(jumped.energy != before.energy, "{seed}");
@@ -410,7 +411,7 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
     }
 }
 
-/// Returns a tank that drains and a host's motion; from seed 12 on the tank has surfaces for the fill.
+/// Returns a tank that drains and a motion of the host. From seed 12 on the bobs move on surfaces that depend on the fill.
 fn tank_alone(seed: u64, coupling: Coupling) -> (TankParameters, TankInputs) {
     let mut random = Random::new(seed);
     let mut tank = draining_tank(&mut random, seed as usize % 4);
@@ -432,19 +433,19 @@ fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     TankInputs { a: at(&u.a), omega: turned, omega_dot: at(&u.omega_dot), mass_flow }
 }
 
-/// Newton's law for the liquid in a tank that is rotated and away from the host's O. With the liquid's first moment S about O,
+/// Newton's law for the liquid in a tank that is rotated and away from the host's O. S is the liquid's first moment about O:
 ///
 /// ```text
 /// -F = m a + w' x S + w x (w x S) + 2 w x S' + S'' + 2 f w x r_out + f' r_out
 /// ```
 ///
-/// S' and S'' come from differences of the mass and centre of mass in the tank's outputs; the liquid that leaves takes the
-/// momentum f (V + w x r_out) with it.
+/// S' and S'' are computed from differences of the mass and centre of mass in the tank's outputs. The outflowing liquid
+/// takes the momentum f (V + w x r_out) with it.
 #[test]
 fn the_force_of_a_draining_tank_follows_newtons_law() {
     for seed in 0..16 {
         let (p, u) = tank_alone(seed, Coupling::Split);
-        // Error e^6 S^(8) against 1e-16 S/e^2, swings of up to 20 rad/s.
+        // The errors are e^6 S^(8) and 1e-16 S/e^2, for oscillations of up to 20 rad/s.
         let e = 2e-3;
         let mut tank = SloshTank::new(&p, &u, 0.0, 1e-13).unwrap();
         let mut shown = Vec::new();
@@ -476,16 +477,15 @@ fn the_force_of_a_draining_tank_follows_newtons_law() {
     }
 }
 
-/// While all tanks drain, a host that solves with added mass and bias has the accelerations of the whole craft, and the
-/// slosh masses of the tanks have the accelerations of the slosh masses in Spacecraft. Force and torque match Newton's and
-/// Euler's laws.
+/// While all tanks drain, a host that solves with added mass and bias has the accelerations of the whole craft, and the bobs
+/// of the tanks have the accelerations of the bobs in a Spacecraft. Forces and torques match Newton's and Euler's laws.
 #[test]
 fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
     for seed in (0..12).chain(20..26).chain(40..44) {
         let (p, u) = draining_craft(seed, seed as usize % 4);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
         craft.step(&u, 0.5).unwrap();
-        // As a host that integrates itself gives them: without slopes.
+        // The inputs have no slopes, as a host that integrates the states itself sets them.
         let mut u = after(&u, 0.5);
         for ramp in [&mut u.force, &mut u.torque, &mut u.h_wheels] {
             ramp.slope = [0.0; 3];
@@ -494,7 +494,7 @@ fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
         let (out, rate) = (craft.outputs(&u), craft.derivatives(&u));
         let x = craft.continuous_states();
         let w = v(&out.omega);
-        // The dry craft: (M + sum of M_a) [a; w'] = rest + sum of bias.
+        // The dry craft solves (M + sum of M_a) [a; w'] = rest + sum of bias.
         let dry = Rigid::new(p.craft.mass, &p.craft.r, &p.craft.j.matrix());
         let [centrifugal, gyroscopic] = dry.gyroscopic_terms(w);
         let h = v(&u.h_wheels.value);
@@ -576,8 +576,8 @@ impl Rigid {
     }
 }
 
-/// Checked in every coupling while the tank drains. With the couplings `Lumped` and `RigidBody` the matrix M stays as at the
-/// start.
+/// This is tested in every coupling while the tank drains. With the couplings `Lumped` and `RigidBody` the added mass keeps
+/// its value of the start.
 #[test]
 fn force_and_torque_of_a_draining_tank_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..16 {

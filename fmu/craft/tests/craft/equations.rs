@@ -1,4 +1,4 @@
-//! Derivatives of rates and outputs that hosts receive, compared with finite differences.
+//! Tests of the directional derivatives of rates and outputs, by comparison with finite differences.
 
 use craft::{
     Coupling, INPUTS, Inputs, Line, MODES, Mount, Outputs, Parameters, Ramp, STATES, SloshTank,
@@ -69,8 +69,8 @@ fn flat_tank(out: &SloshTankOutputs) -> Vec<f64> {
     all
 }
 
-/// Returns central differences with Richardson's extrapolation. Their errors, of the orders step^4 and 1e-16/step, are about 1e-10 of the
-/// quantity and of its curvature.
+/// Returns central differences with Richardson's extrapolation. Their errors, of the orders step^4 and 1e-16/step, are about
+/// 1e-10 of the quantity and of its curvature.
 fn difference(f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     let step = 5e-4;
     let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|s| f(s * step));
@@ -84,7 +84,7 @@ fn assert_same(exact: &[f64], by_differences: &[f64], now: &[f64], what: &str) {
     }
 }
 
-/// Returns a random craft in motion; quaternion and directions of its states are not of unit length.
+/// Returns a random craft in motion. Quaternion and directions of its states do not have unit length.
 fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -127,7 +127,7 @@ fn directional_derivatives_equal_finite_differences() {
         let (mut random, p, mut craft, u) = somewhere(seed);
         let (mut dx, du): ([f64; STATES], _) = (random.vector(1.0), random.vector(100.0));
         if p.mount == Mount::Pivot {
-            // O does not move.
+            // On a pivot position and velocity of O do not change.
             dx[index::POSITION..index::POSITION + 6].fill(0.0);
         }
         let x = craft.continuous_states();
@@ -145,7 +145,7 @@ fn directional_derivatives_equal_finite_differences() {
         assert_same(&exact, &rates_by_differences, &now[0], &format!("{seed} rate"));
         let exact = to_list(&craft.output_derivatives(&u, &dx, &du));
         assert_same(&exact, &outputs_by_differences, &now[1], &format!("{seed} output"));
-        assert_eq!(craft.continuous_states(), x, "nothing has moved");
+        assert_eq!(craft.continuous_states(), x, "the states must not have changed");
         assert_eq!(to_list(&craft.outputs_held(&u)), now[1]);
     }
 }
@@ -211,7 +211,8 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
         assert_same(&exact, &rates, &now[0], &format!("{seed} rate"));
         let exact = flat_tank(&tank.output_derivatives(&u, &dx, &du));
         assert_same(&exact, &outputs, &now[1], &format!("{seed} output"));
-        // Waves of all modes may nearly cancel: too curved for differences.
+        // The sum of the waves of all modes is left out where the waves nearly cancel, because it is too curved for
+        // differences.
         let (out, slope) = (tank.outputs(&u).tank, tank.output_derivatives(&u, &dx, &du).tank);
         let wave = |angle: &[f64; MODES]| -> f64 {
             (0..p.tank.modes).map(|n| p.tank.wave[n] * angle[n]).sum()
@@ -220,7 +221,7 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
         let rate = across * wave(&slope.angle_x) + along * wave(&slope.angle_y);
         assert!((out.wave_height - f64::hypot(across, along)).abs() < 1e-15);
         assert!((out.wave_height * slope.wave_height - rate).abs() < 1e-14);
-        // Along the motion itself.
+        // Derivatives along the motion itself.
         let along = |t: f64| {
             let mut moved = tank.clone();
             let dx = tank.clone().derivatives(&u);
@@ -232,7 +233,7 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
                 TankInputs { a: ramp(&u.a), omega, omega_dot: ramp(&u.omega_dot), mass_flow: flow };
             flat_tank(&moved.outputs(&u))
         };
-        // The fastest bobs' rates change by a tenth in 1 ms, and drag that follows their amplitude with them.
+        // In 1 ms the rates of the fastest bobs change by a tenth, and so does drag that depends on their amplitude.
         let slopes: Vec<f64> =
             difference(|s| along(s / 8.0)).into_iter().map(|slope| 8.0 * slope).collect();
         let exact = flat_tank(&output_slopes(&mut tank, &u));

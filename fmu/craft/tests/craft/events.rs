@@ -1,5 +1,5 @@
-//! Events of detached liquid: impacts, release and settling occur at the same instants for every integrator and every
-//! length of step.
+//! Tests of the events of detached liquid: impacts, release and settling occur at the same instants for every integrator and
+//! every length of step.
 //!
 //! The reference is a simulator in maximal coordinates: the craft is a rigid body, the detached liquid is a point mass, and the
 //! wall is a constraint with a Lagrange multiplier. The integrator is an extrapolation method of order 10, and events are located by
@@ -13,7 +13,7 @@ use super::ball_on_host::Craft;
 use super::random::Random;
 use super::seeds::every_or;
 
-/// A craft, the force and torque that act on it, and the length of the motion, s.
+/// A craft, the force and torque on it, and the duration of the simulation, s.
 struct Case {
     p: Parameters,
     u: Inputs,
@@ -21,8 +21,7 @@ struct Case {
 }
 
 impl Case {
-    /// Returns the time in which the liquid moves by a tenth of the wall's least radius of curvature, at most
-    /// 20 ms.
+    /// Returns the time in which the liquid moves by a tenth of the wall's smallest radius of curvature, at most 20 ms.
     fn step(&self) -> f64 {
         let (_, semi, _) = wall(&self.p, 0);
         let radius = (semi.x * semi.x / semi.z).min(semi.z * semi.z / semi.x);
@@ -30,8 +29,8 @@ impl Case {
         (0.1 * radius / f64::sqrt(4.0 * acceleration * semi.z)).min(0.02)
     }
 
-    /// Returns true if the liquid leaves its bottom at once and stays off it, the only case for which the
-    /// simulator has equations.
+    /// Returns true if the liquid leaves the bottom at the start and does not settle afterwards. Only for such motions does
+    /// the simulator have equations.
     fn stays_loose(&self) -> bool {
         let mut craft = Spacecraft::new(&self.p, &self.u, 0.0, 1e-9).unwrap();
         (0..100).all(|k| {
@@ -44,13 +43,12 @@ impl Case {
     }
 }
 
-/// Returns a craft with one tank of any size, under a thrust between 0.02 and 0.5 m/s2 that takes the liquid
-/// off its bottom.
+/// Returns a craft with one tank of random size and a thrust of 0.02 to 0.5 m/s2 that makes the liquid leave the bottom.
 fn case(seed: u64) -> Case {
     let mut random = Random::new(seed);
     let mut p = Parameters { tanks: 1, ..off_axis_craft(&mut random) };
     p.init.omega = random.vector(0.05);
-    // At the bottom the liquid's centre is on the wall.
+    // In half of the cases the centre of the liquid at the bottom lies on the wall.
     if random.below(2) == 0 {
         p.tank[0].p_0 = [[0.0, 0.0, -1.0]; craft::MODES];
     }
@@ -75,13 +73,13 @@ fn case(seed: u64) -> Case {
         torque: Ramp::held(torque),
         ..Inputs::default()
     };
-    // Some two to five crossings.
+    // The simulation lasts about two to five crossings of the tank.
     let end = random.between(2.0, 5.0) * f64::sqrt(4.0 * half / acceleration);
     Case { p, u, end }
 }
 
-/// Centre of mass of the dry craft and its velocity, attitude, rate (body axes), the liquid's centre and its velocity, energy dissipated.
-/// Inertial axes.
+/// Centre of mass of the dry craft and its velocity, attitude, angular velocity (body axes), the liquid's centre and its
+/// velocity, and dissipated energy; inertial axes unless stated otherwise.
 type Coordinates = [f64; 20];
 
 const PLACE: usize = 0;
@@ -107,7 +105,8 @@ enum Mode {
     Light,
 }
 
-/// Motion of the liquid's centre in the tank, body axes: position from the wall's centre, rate, gradient D x, and f.
+/// Motion of the liquid's centre in the tank, body axes: position from the wall's centre, rate, gradient D x of the function
+/// f that describes the wall, and f.
 struct InTank {
     x: V,
     rate: V,
@@ -141,7 +140,7 @@ impl Simulator<'_> {
         let inertia = Matrix3::from_fn(|i, k| j[i][k]) + shape(p, 0, &x);
         let origin = v(&p.tank[0].position) - v(&p.craft.r);
         let center = origin + axes * (V::z() * height);
-        // The common centre of rigid liquid and bobs.
+        // Common centre of mass of rigid liquid and bobs.
         let tank = &p.tank[0];
         let bobs = (0..tank.modes).map(|n| {
             let at = V::z() * tank.hinge[n] + v(&x[index::bob(0, n)..]) * tank.length[n];
@@ -172,8 +171,8 @@ impl Simulator<'_> {
         InTank { x, rate, gradient, f: 1.0 - x.dot(&gradient) }
     }
 
-    /// Returns y' and the force with which the liquid presses on the wall, N, from a system of 10 equations
-    /// on the wall.
+    /// Returns y' and the force, N, with which the liquid presses on the wall. If the liquid is on the wall, they solve a
+    /// system of 10 equations.
     fn rates(&self, y: &Coordinates, mode: Mode) -> (Coordinates, f64) {
         let (q, w) = (attitude(y), v(&y[W..]));
         let Parameters { craft, tank, .. } = &self.case.p;
@@ -223,8 +222,8 @@ impl Simulator<'_> {
         (rates, press)
     }
 
-    /// Returns the motion after `h` s by the modified midpoint rule with 2, 4, ... 10 steps, extrapolated to
-    /// infinitely many.
+    /// Returns the coordinates after `h` s, by the modified midpoint rule with 2, 4, ... 10 steps, extrapolated
+    /// to infinitely many steps.
     fn state_after(&self, h: f64) -> Coordinates {
         let plus = |y: &Coordinates, r: &Coordinates, h: f64| -> Coordinates {
             std::array::from_fn(|i| y[i] + h * r[i])
@@ -257,12 +256,12 @@ impl Simulator<'_> {
         y
     }
 
-    /// Returns a number that is positive until the next event: until flying liquid meets the wall
-    /// from inside, sliding liquid is released, or light liquid is pressed enough for its drag.
+    /// Returns a number that is positive until the next event: flying liquid hits the wall from inside, sliding liquid is
+    /// released, or light liquid is pressed to the wall strongly enough for drag.
     fn distance_to_event(&self, y: &Coordinates) -> f64 {
         let InTank { rate, gradient, f, .. } = self.in_tank(y);
         match self.mode {
-            // Next to the wall and on its way inwards it has met it already.
+            // Liquid next to the wall that moves inwards has already hit the wall.
             Mode::Flying if f < 1e-9 && gradient.dot(&rate) < 0.0 => 1.0,
             Mode::Flying => f,
             Mode::Sliding => self.rates(y, self.mode).1,
@@ -284,7 +283,8 @@ impl Simulator<'_> {
             let mut past = self.state_after(h);
             let (mut low, mut high) = (0.0, h);
             if self.mode == Mode::Flying {
-                // Within the step the liquid may have met the wall and come back: f has a minimum where its slope is 0.
+                // Within the step the liquid may have hit the wall and moved away again: then f has a minimum, where
+                // its slope is 0.
                 let outwards = |y: &Coordinates| {
                     let InTank { rate, gradient, .. } = self.in_tank(y);
                     rate.dot(&gradient) > 0.0
@@ -335,7 +335,7 @@ impl Simulator<'_> {
         self.rates(&self.y, mode).1 > 0.0
     }
 
-    /// Sets f and n.x' to 0 on the wall, where errors of the integration have left small values.
+    /// Sets f and n.x' of liquid on the wall to 0, because integration errors make them slightly different from 0.
     fn put_on_wall(&mut self) {
         if self.mode == Mode::Flying {
             return;
@@ -355,9 +355,9 @@ impl Simulator<'_> {
         let ball = self.case.p.tank[0].ball;
         let InTank { rate, gradient, .. } = self.in_tank(&self.y);
         let (before, approach) = (self.y, gradient.normalize().dot(&rate));
-        // A release leaves a rate of rounding, which is not an impact.
+        // After a release the normal rate is a rounding error, which does not count as an impact.
         self.impacts += usize::from(approach > 1e-9);
-        assert!(self.impacts < 1_000, "the reference does not end");
+        assert!(self.impacts < 1_000, "the simulator finds more than 1,000 impacts");
         if ball.restitution * approach <= ball.contact_speed {
             self.strike(0.0);
             for mode in [Mode::Sliding, Mode::Light] {
@@ -379,7 +379,8 @@ impl Simulator<'_> {
         let turned = self.inertia.try_inverse().unwrap() * arm.cross(&n);
         let mu = 1.0 / (1.0 / self.mass + 1.0 / mass + arm.cross(&n).dot(&turned));
         let (approach, y) = (n.dot(&rate), self.y);
-        // 1e-12 m/s inwards tell a body that has left the wall from one that is about to meet it.
+        // The body leaves with at least 1e-12 m/s inwards, so that the next search for events does not take it for a body
+        // that is about to hit the wall.
         let j = mu * ((1.0 + e) * approach + 1e-12);
         put(&mut self.y, SPEED, v(&y[SPEED..]) - q * n * (j / self.mass));
         put(&mut self.y, VELOCITY, v(&y[VELOCITY..]) + q * n * (j / mass));
@@ -387,8 +388,8 @@ impl Simulator<'_> {
         self.y[DISSIPATED] += (1.0 - e * e) * mu * approach * approach / 2.0;
     }
 
-    /// Returns the quantities that are compared between hosts: rate, the liquid's position and rate in the
-    /// tank (tank axes), velocity of O, dissipated energy.
+    /// Returns the quantities that are compared between simulators: angular velocity of the craft, position and rate of the
+    /// liquid in the tank (tank axes), velocity of O, and dissipated energy.
     fn compared_quantities(&self) -> Shown {
         let tank = &self.case.p.tank[0];
         let axes = rotation(&tank.q).inverse();
@@ -425,7 +426,7 @@ fn by_co_simulation(case: &Case, h: f64) -> Shown {
     compared_quantities(&mut craft, u)
 }
 
-/// Returns the tank of the default craft under a thrust of 1.2 kN that is reversed and slightly inclined to the axis.
+/// Returns the default craft under a thrust of 1.2 kN that is reversed and slightly inclined to the axis.
 fn default_case() -> Case {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
@@ -433,8 +434,8 @@ fn default_case() -> Case {
     Case { p, u, end: 10.0 }
 }
 
-/// Impacts occur at the times at which an independent simulator has them, for all communication steps. Before 0.6.0 an
-/// impact of case 12 in mid-air made an error of 0.01 with steps of 0.5 s.
+/// Impacts occur at the same times as in an independent simulator, for all communication steps. Before version 0.6.0 an
+/// impact in seed 12 had an error of 0.01 with steps of 0.5 s.
 #[test]
 fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
     let cases = every_or(&[0, 3, 6, 12], 0..13).into_iter().map(|seed| (seed, case(seed)));
@@ -444,7 +445,7 @@ fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
         let want = simulator.compared_quantities();
         for h in [0.01, 0.07, 0.5, 1.0, 10.0] {
             let error = distance(&by_co_simulation(&case, h), &want);
-            // The tolerance is 1e-12. Each of up to 16 impacts multiplies errors some two to ten times.
+            // The tolerance of the solver is 1e-12. Each of up to 16 impacts amplifies errors some two to ten times.
             assert!(error < 1e-8, "{seed}, steps of {h} s: {error:e}");
         }
     }
@@ -460,10 +461,10 @@ pub(super) trait Equations {
     fn event(&mut self, x: &[f64]) -> Vec<f64>;
 }
 
-/// Integrator of a host: the method of Dormand and Prince, of order 5.
+/// Integrator of a host: the method of Dormand and Prince of order 5, and the settings of its steps and events.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Method {
-    /// Relative and absolute tolerance of a step; 0 for steps of the length `longest`.
+    /// Relative and absolute tolerance of a step. If it is 0, all steps have the length `longest`.
     pub tolerance: f64,
     pub longest: f64,
     /// True if the integrator locates events within a step. Otherwise events are handled at the end
@@ -471,7 +472,8 @@ pub(super) struct Method {
     pub locates: bool,
 }
 
-/// Coefficients of the method: stages, the order 5, the error, the continuous extension.
+/// Coefficients of the method of Dormand and Prince: stages, the result of order 5, the error estimate, the continuous
+/// extension.
 const A: [&[f64]; 6] = [
     &[1.0 / 5.0],
     &[3.0 / 40.0, 9.0 / 40.0],
@@ -503,8 +505,8 @@ fn sum(stages: &[Vec<f64>], weights: &[f64], i: usize) -> f64 {
     stages.iter().zip(weights).map(|(stage, weight)| stage[i] * weight).sum()
 }
 
-/// Integrates to `end` as CVODE does: the indicators' signs are compared at the ends of each step, and an event is located with the
-/// continuous extension. Returns the states and how many events the equations had.
+/// Integrates to `end` as CVODE does: the signs of the indicators are compared at the ends of each step, and an event is
+/// located with the continuous extension. Returns the states and the number of events.
 pub(super) fn integrate(
     equations: &mut impl Equations,
     x: &[f64],
@@ -611,8 +613,8 @@ impl Equations for Own<'_> {
     }
 }
 
-/// Simulates the case with a Model Exchange host that integrates by `method`. Returns the outputs
-/// at the end and the number of impacts.
+/// Simulates the case in a Model Exchange host that integrates by `method`. Returns the outputs at the end and
+/// the number of impacts.
 fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     let craft = Spacecraft::new(&case.p, &case.u, 0.0, 1e-12).unwrap();
     let start = craft.continuous_states();
@@ -622,12 +624,13 @@ fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     (compared_quantities(&mut own.craft, &case.u), own.impacts)
 }
 
-/// Returns hosts that locate events, as CVODE does with an output every 5 ms, and with a fixed step, each with the largest allowed error of
-/// its results.
+/// Returns two hosts that locate events, each with the largest allowed error of its results: one as CVODE with an output
+/// every 5 ms, and one with fixed steps.
 fn locating(case: &Case) -> [(Method, f64); 3] {
     let step = case.step();
     let fixed = (step / 4.0).min(5e-3);
-    // Steps and events leave 1e-11, of the second method 1e-8. Each of up to 16 impacts multiplies errors some two to ten times.
+    // Steps and located events have errors of 1e-11, or 1e-8 with fixed steps. Each of up to 16 impacts amplifies errors
+    // some two to ten times.
     [
         (Method { tolerance: 1e-9, longest: step, locates: true }, 1e-6),
         (Method { tolerance: 1e-6, longest: 5e-3, locates: true }, 1e-4),
@@ -635,8 +638,8 @@ fn locating(case: &Case) -> [(Method, f64); 3] {
     ]
 }
 
-/// Bounces are often shorter than these steps. Before 0.6.0 the indicator was below zero before and after such a bounce, and the
-/// liquid left the tank through its wall.
+/// Bounces are often shorter than the steps of these hosts. Before version 0.6.0 the indicator was below zero before and
+/// after such a bounce, so that the host found no event and the liquid passed through the wall.
 #[test]
 fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps() {
     let cases = every_or(&[0, 1, 2], 0..9).into_iter().map(|seed| (seed, case(seed)));
@@ -652,8 +655,8 @@ fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps()
     }
 }
 
-/// Simulates a host that does not locate events and handles an impact when the liquid is already outside.
-/// Returns the error of the energy balance, over 1 J or the energy.
+/// Simulates a host that does not locate events, and handles an impact when the liquid is already outside the wall. Returns
+/// the error of the energy balance, divided by the energy or by 1 J if the energy is smaller.
 fn without_location(case: &Case, seed: u64) -> f64 {
     let longest = (case.step() / 10.0).min(2e-3);
     let method = Method { tolerance: 0.0, longest, locates: false };
@@ -666,13 +669,13 @@ fn without_location(case: &Case, seed: u64) -> f64 {
     let end = own.craft.outputs(&case.u);
     let balance = end.energy - end.work + end.dissipated - begin.energy;
     let balance = balance.abs() / (1.0 + end.energy);
-    // Rounding, and what Dormand and Prince's method leaves.
+    // The tolerance is for rounding errors and the errors of Dormand and Prince's method.
     assert!(balance < 1e-9, "{seed}: {balance:e}");
     let (height, semi, _) = wall(&case.p, 0);
     let at = v(&end.tank[0].ball_position) - V::z() * height;
     let outside = at.component_div(&semi).norm() - 1.0;
     let speed = v(&end.tank[0].ball_velocity).norm();
-    // At most some steps' way.
+    // The liquid may be outside by the distance of a few steps.
     let bound = 10.0 * speed * longest / semi.min() + 1e-6;
     assert!(outside < bound, "{seed}: {outside:e} {:?} {speed}", own.ball());
     balance
@@ -689,19 +692,18 @@ fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
 #[derive(Debug, Default)]
 struct Figures {
     craft: usize,
-    /// Number of craft that are left out of the comparison. Their liquid settles, or a change of
-    /// the thrust by a factor of 1 + 1e-7 changes the result by more than 1e-3 or the number of
-    /// impacts.
+    /// Number of craft that are left out of the comparison, because their liquid settles, or because a change of the thrust
+    /// by a factor of 1 + 1e-7 changes the result by more than 1e-3 or changes the number of impacts.
     settled: usize,
     too_sensitive: usize,
     impacts: usize,
-    /// Largest error in Co-Simulation, in Model Exchange, and of the energy balance of hosts that locate no events.
+    /// Largest errors of Co-Simulation and of Model Exchange, and of the energy balance in hosts that do not locate events.
     errors: [f64; 3],
     problems: Vec<String>,
 }
 
-/// Compares Co-Simulation at steps of 1 ms to 10 s, hosts of Model Exchange and the independent simulator for `count` craft from the
-/// seed `first` on.
+/// Compares Co-Simulation at steps of 1 ms to 10 s, Model Exchange hosts and the independent simulator for `count` craft,
+/// whose seeds start at `first`.
 fn compare_hosts(first: u64, count: u64) -> Figures {
     let mut figures = Figures::default();
     for seed in first..first + count {
@@ -731,9 +733,9 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
         figures.impacts += impacts;
         for h in [1e-3, 0.01, 0.07, 0.5, 1.0, 10.0] {
             let error = distance(&by_co_simulation(&case, h), &want);
-            // Both sides leave 1e-12 of the motion at each impact.
+            // Both simulators add 1e-12 of the motion at each impact.
             if error > 1e-8 + sensitivity {
-                figures.problems.push(format!("{seed}, steps of {h} s: {error:e}"));
+                figures.problems.push(format!("{seed}, steps of {h} s: error {error:e}"));
             }
             figures.errors[0] = figures.errors[0].max(error);
         }
@@ -762,7 +764,7 @@ fn co_simulation_and_model_exchange_find_the_same_impacts_of_random_craft() {
     );
 }
 
-/// Runs the comparison with a seed from the environment variable HUBSLOSH_EVENTS_SEED, if it is set, so that a nightly run tries new cases.
+/// A seed can be set by the environment variable HUBSLOSH_EVENTS_SEED, so that every nightly run compares other craft.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn co_simulation_and_model_exchange_find_the_same_impacts_of_two_hundred_random_craft() {
@@ -822,7 +824,8 @@ fn hosts_of_a_slosh_tank_find_impacts_after_bounces_shorter_than_their_steps() {
     }
 }
 
-/// The first three modes of the default tank. The liquid leaves the bottom obliquely and comes back under thrust along the axis.
+/// The tank has the first three modes of the default tank. The liquid leaves the bottom obliquely and returns under
+/// thrust along the axis.
 #[test]
 fn liquid_of_three_modes_that_has_settled_stays_under_steady_thrust() {
     for seed in 0..9 {
@@ -842,15 +845,18 @@ fn liquid_of_three_modes_that_has_settled_stays_under_steady_thrust() {
         for k in 0..700 {
             craft.step(&forward, 0.1).unwrap();
             let is_settled = craft.outputs(&forward).tank[0].ball_state == BallState::Settled;
-            assert!(is_settled || !has_settled, "{seed}: has left again after {k} steps");
+            assert!(
+                is_settled || !has_settled,
+                "{seed}: the liquid left the bottom again after {k} steps"
+            );
             has_settled = is_settled;
         }
         assert!(has_settled, "{seed}");
     }
 }
 
-/// The second mode of the default tank has 1 % of the liquid. The liquid stays at the bottom if this mode is at 60 degrees, but
-/// leaves it if the first mode, which has 34 % of the liquid, is at 60 degrees.
+/// The second mode of the default tank has 1 % of the liquid, and the first mode has 34 %. The liquid stays at the bottom if
+/// the second mode is at 60 degrees, but leaves the bottom if the first mode is at 60 degrees.
 #[test]
 fn a_mode_of_little_mass_beyond_45_degrees_does_not_throw_the_liquid_off() {
     for (mode, leaves) in [(0, true), (1, false)] {

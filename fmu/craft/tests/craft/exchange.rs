@@ -1,4 +1,4 @@
-//! Hosts that integrate themselves: the craft's equations by the host's integrator, and a tank on the host's own rigid body.
+//! Tests of hosts that integrate the states themselves: the equations of a craft, and a tank on the host's own rigid body.
 
 use craft::{
     Inputs, Mount, Parameters, Ramp, STATES, TANK_STATES, TankInputs, TankParameters, index,
@@ -9,8 +9,8 @@ use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
 use super::seeds::every_or;
 
-/// Returns the inputs at t as a host that integrates itself passes them: without slopes, and with the wheels' reaction in the
-/// torque.
+/// Returns the inputs at the time t in the form of a host that integrates the states itself: without slopes, and with the
+/// wheels' reaction in the torque.
 fn after(u: &Inputs, t: f64) -> Inputs {
     let torque = u.torque.value_at(t);
     Inputs {
@@ -43,10 +43,10 @@ pub fn runge_kutta(
     }
 }
 
-/// Compares the power series with a Runge-Kutta integration of the rates in steps of 0.2 ms, or of 0.1 ms for craft whose planar
-/// modes are faster. The rates of planar modes and of other bobs than pendulums are those of contents.rs, not of the series. The
-/// fastest bobs move at 30 and 60 1/s: (30 h)^4/120 of what they do leaves 1e-11. In a quarter of a second these turn by one to
-/// two turns.
+/// Co-Simulation integrates by power series, the host by Runge-Kutta in steps of 0.2 ms, or 0.1 ms for craft whose planar
+/// modes are faster. The rates of planar modes and of bobs that are not pendulums are computed by contents.rs, not by the
+/// series. The fastest bobs move at 30 and 60 1/s, for which the method's error (30 h)^4/120 is 1e-11. They turn one to two
+/// times in a quarter of a second.
 #[test]
 fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     for seed in every_or(&[0, 1, 3, 12, 16, 18, 21, 24, 28], 0..30) {
@@ -88,8 +88,8 @@ fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     }
 }
 
-/// A rigid body with attached tanks: q, w, r, V and the tanks' states. Its host solves (M_body +
-/// sum of M_a) [a; w'] = rest + sum of bias in every stage of its integrator.
+/// A rigid body with attached tanks: its states are q, w, r, V and the tanks' states. The host solves (M_body + sum of M_a)
+/// [a; w'] = rest + sum of bias in every stage of its integrator.
 pub struct HostWithTanks {
     p: Parameters,
     tanks: Vec<SloshTank>,
@@ -106,7 +106,7 @@ impl HostWithTanks {
     }
 
     pub fn rates(&mut self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
-        // The body alone is a craft without tanks; its mass matrix is written out here.
+        // The body is a craft without tanks, whose mass matrix is written out here.
         let (w, m) = (V3::from_column_slice(&x[4..7]), self.p.craft.mass);
         let r = V3::from_column_slice(&self.p.craft.r);
         let j = self.p.craft.j.matrix();
@@ -132,7 +132,7 @@ impl HostWithTanks {
             states[..18].copy_from_slice(&x[at..at + 18]);
             states[TANK_STATES - 3..].copy_from_slice(&x[index::spin(i)..][..3]);
             tank.set_continuous_states(&states);
-            // Of a and w' neither bias nor added mass knows.
+            // Neither bias nor added mass depends on a and w', so that these inputs may be 0.
             let out = tank.outputs(&TankInputs { omega, ..TankInputs::default() });
             let mut element = out.added_mass.iter();
             for i in 0..6 {
@@ -170,7 +170,7 @@ impl HostWithTanks {
 
 type V3 = nalgebra::Vector3<f64>;
 
-/// Host and Spacecraft are integrated by the same method with the same steps, so that only rounding differs.
+/// Host and Spacecraft are integrated by the same method with the same steps, so that only rounding errors differ.
 #[test]
 fn tanks_on_a_host_that_splits_inertia_in_every_stage_move_as_spacecraft() {
     for seed in 0..30 {

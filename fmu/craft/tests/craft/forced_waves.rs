@@ -1,9 +1,10 @@
 //! Forced waves near resonance, compared with fully nonlinear potential flow in cylinders and spheres.
 //!
-//! forced_waves.csv was computed by `harness/tank/examples/forced_waves.rs`, with a damping ratio of 0.01 on every mode of the
-//! liquid. Each row has the motion of the tank (on a line or on a circle), its frequency over that of small waves and its
-//! acceleration over g; angle, phase (both in degrees) and force over the weight of the slosh mass of the wave; and the slosh
-//! mass over the mass of the liquid, coefficients and limit of this motion (degrees) that `hubslosh tank` writes for this tank.
+//! forced_waves.csv was computed by `harness/tank/examples/forced_waves.rs`, with a damping ratio of 0.01 on every mode of
+//! the liquid. Each row contains the motion of the tank (on a line or on a circle), its frequency divided by the frequency
+//! of small waves, and its acceleration divided by g. Then follow angle and phase of the wave (in degrees) and the force
+//! divided by the weight of the slosh mass. The last columns are the slosh mass divided by the mass of the liquid, and the
+//! coefficients and the limit of this motion (degrees) that `hubslosh tank` writes for this tank.
 
 use std::f64::consts::TAU;
 
@@ -47,8 +48,8 @@ fn rows() -> Vec<(String, Row)> {
 }
 
 impl Row {
-    /// Simulates the tank from the wave on, and evaluates the last of 90 periods: angle, phase and force as in the row, and true
-    /// if the tank left its range.
+    /// Simulates the tank with the wave of the row as the initial state, and evaluates the last of 90 periods. Returns
+    /// angle, phase and force as in the row, and true if the tank left its range of validity.
     fn simulate(&self) -> ([f64; 3], bool) {
         let ([ratio, push], [angle, phase, _]) = (self.motion, self.wave);
         let (w, across) = (ratio * G.sqrt(), f64::from(u8::from(self.is_circle)));
@@ -90,7 +91,8 @@ impl Row {
     }
 }
 
-/// Angle and force agree within 3 % and the phase within 3 degrees, or the tank says that it is out of range.
+/// Angle and force agree within 3 % and the phase within 3 degrees, unless the outputs of the tank state that it
+/// is out of range.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn forced_waves_agree_with_potential_flow_or_are_out_of_range() {

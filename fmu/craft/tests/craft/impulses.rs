@@ -11,8 +11,8 @@ use super::seeds::every_or;
 
 type V = Vector3<f64>;
 
-/// Returns the bob's position relative to the host's O, and its rate on the rod, with `liquid` in the tank:
-/// l, rho, axes.
+/// Returns the length of a bob's rod, the bob's position relative to the host's O, and the tank's axes, for `liquid` kg in
+/// the tank and the direction p.
 fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     let drains = tank.fill.points > 0;
     let [_, l, h] =
@@ -23,8 +23,8 @@ fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     (l, V::from(tank.position) + axes * (V::z() * h + l * p), axes)
 }
 
-/// A rod transmits only a force along itself, so that the component of the bob's velocity V + w x rho + l p' across the rod stays
-/// as it was.
+/// A rod transmits only a force along itself. Therefore the component across the rod of the bob's velocity V + w x rho + l
+/// p' does not change.
 #[test]
 fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
     for seed in 0..20 {
@@ -61,11 +61,11 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
             let kick = V::from(dv) + V::from(dw).cross(&rho);
             let (rod, mut velocity) = (axes * direction, kick + change);
             if let Some(b) = across {
-                // It is carried along across its plane.
+                // The tank takes the bob along perpendicular to the plane of the mode.
                 velocity -= b * b.dot(&kick);
                 assert!(change.dot(&b).abs() < 1e-14, "p' stays in the plane");
             }
-            // 1 m/s on rods of 0.1 m.
+            // The tolerance is for 1 m/s on rods of 0.1 m.
             assert!((velocity - rod * rod.dot(&velocity)).norm() < 1e-14, "{seed} {n}");
             assert!(change.dot(&rod).abs() < 1e-14, "p' stays tangential");
         }
@@ -73,9 +73,9 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
     }
 }
 
-/// After some liquid has drained, a jump of the wheels' angular momentum conserves the momentum P and the angular momentum H of the craft
-/// with the remaining liquid. The work of the jump equals the increase of `energy` plus `drained`. The flow moves the ends of the rods,
-/// which therefore do work, too.
+/// When some liquid has drained, a jump of the wheels' angular momentum conserves the momentum P and the angular momentum H
+/// of the craft with the remaining liquid. The work of the jump equals the increase of `energy` plus `drained`, because the
+/// flow moves the ends of the rods, which therefore do work.
 #[test]
 fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
     let (mut by_rods, h) = (0.0_f64, 1e-7);
@@ -91,7 +91,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
         let jumped = craft.outputs(&Inputs { h_wheels: Ramp::held(jump), ..now });
         let [p_0, h_0] = draining::momenta(&before);
         let [p_1, h_1] = draining::momenta(&jumped);
-        // A few roundings of numbers of this size.
+        // The tolerance is for a few rounding errors of numbers of this size.
         assert!((p_1 - p_0).norm() < 1e-14 * p_0.norm(), "{seed} {p_0} {p_1}");
         assert!((h_1 - h_0).norm() < 1e-13 * h_0.norm(), "{seed} {h_0} {h_1}");
         assert!((V::from(jumped.omega) - V::from(before.omega)).norm() > 1e-3);
@@ -105,7 +105,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
             craft.continuous_states()[craft::index::DRAINED]
         });
         let (limit, gone) = (turned - coasted, jumped.drained - before.drained);
-        // What drains at other rates in h is some 0.1 W times h.
+        // Apart from the effect of the jump, the drained energies of the two runs differ by about 0.1 W times h.
         assert!((gone - limit).abs() < 1e-3 * gone.abs() + h, "{seed}: {gone:e} {limit:e}");
         by_rods = by_rods.max(gone.abs());
     }
@@ -133,8 +133,7 @@ fn liquid_masses_beyond_the_fill_table_are_refused() {
     }
 }
 
-/// Returns the smallest number of internal steps for which `is_enough` is true, that is, the number
-/// that one step of 2 s takes.
+/// Returns the number of internal steps in one step of 2 s: the smallest `max_steps` for which `is_enough` returns true.
 fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
     let (mut few, mut enough) = (0, 1 << 12);
     while enough - few > 1 {
@@ -144,13 +143,13 @@ fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
     enough
 }
 
-/// Numbers of internal steps of a tank that keeps its liquid and one that drains, at the tolerances 1e-5 and
-/// 1e-10: alone and on a craft. More would be slower, fewer less exact.
+/// Expected numbers of internal steps of a tank that does not drain and one that drains, alone and on a craft, at the
+/// tolerances 1e-5 and 1e-10. More steps would be slower, and fewer less exact.
 const STEPS: [[[usize; 2]; 4]; 2] =
     [[[16, 8], [31, 12], [48, 26], [150, 86]], [[8, 10], [16, 13], [40, 29], [146, 98]]];
 
-/// The number of internal steps of random tanks, alone and on a craft, is compared with the expected number, so that
-/// a change that makes the integrator slower is noticed.
+/// The numbers of internal steps of random tanks, alone and on a craft, equal the expected numbers, so that a change that
+/// makes the integrator slower is noticed.
 #[test]
 fn a_step_takes_few_internal_steps() {
     let counted = [0, 1].map(|seed| {
@@ -184,9 +183,9 @@ fn a_step_takes_few_internal_steps() {
     assert_eq!(counted, STEPS);
 }
 
-/// Froude scaling: with four times the lengths and accelerations and equal masses and stiffnesses, angles pass through
-/// the same instants to the last bit, because a factor of two is exact. Dissipated energy, m l^2/s^2, is 16 times as
-/// much. The steps for a tolerance therefore do not depend on the unit of length.
+/// Froude scaling: with four times the lengths and accelerations and the same masses and stiffnesses, angles have the same
+/// values at the same instants to the last bit, because scaling by a power of two is exact. The dissipated energy, m
+/// l^2/s^2, is 16 times as large. The numerical errors therefore do not depend on the unit of length.
 #[test]
 fn a_tank_four_times_as_large_under_four_times_the_acceleration_moves_the_same() {
     for seed in 0..10 {

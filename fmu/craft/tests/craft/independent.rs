@@ -1,5 +1,6 @@
-//! An independent formulation of the same physics: Newton's law of every body with the tensions of the rods as unknowns. The
-//! bobs' unknown is p'' instead of v, there is no added mass and no power series, and one dense system is solved.
+//! An independent formulation of the same physics: Newton's law of every body, with the tensions of the rods as
+//! unknowns. The unknown of a bob is p'' instead of v, there are neither added mass nor power series, and one dense
+//! linear system is solved.
 
 use craft::{
     Coupling, DampingLaw, Inputs, MODES, Mount, Parameters, STATES, SloshTank, Spacecraft, Tank,
@@ -23,13 +24,14 @@ fn rotation(q: &[f64]) -> Rotation3<f64> {
 struct Solution {
     a: V,
     w_d: V,
-    /// p'' of each bob, tank axes, eta'' of each mode of the appendages, then force and torque about O of each tank.
+    /// p'' of each bob, tank axes, and eta'' of each mode of the appendages; then follow force and torque about
+    /// O of each tank.
     p_dd: Vec<V>,
     eta_dd: Vec<f64>,
     wrench: Vec<[V; 2]>,
 }
 
-/// Lists mass, centre of mass and inertia about it for the dry craft and for each rigid liquid.
+/// Returns mass, centre of mass and inertia about the centre of mass of the dry craft and of each rigid liquid.
 fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     let own = |j: [[f64; 3]; 3]| Matrix3::from_fn(|i, k| j[i][k]);
     let mut bodies = vec![(p.craft.mass, v(&p.craft.r), own(p.craft.j.matrix()))];
@@ -44,21 +46,22 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     bodies
 }
 
-/// Returns for a planar mode the unit vector across its plane, in tank axes, and for every mode its
-/// hinge relative to the tank's origin.
+/// Returns the unit vector perpendicular to the plane of a planar mode, in tank axes (`None` for other modes), and the
+/// position of the mode's hinge relative to the tank's origin.
 fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     let direction = V::new(tank.direction[n][0], tank.direction[n][1], 0.0);
     let on_axis = V::z() * tank.hinge[n];
     if direction == V::zeros() {
         return (None, on_axis);
     }
-    // A momentum along the direction has the moment arm about the axis where it is at arm z x direction, backwards.
+    // A momentum along the mode's direction must have the moment `arm` about the axis, so that the line of motion is at arm
+    // z x direction, with the sign reversed.
     let across = V::z().cross(&direction).normalize();
     (Some(across), on_axis - across * tank.arm[n])
 }
 
-/// Returns the torque of the craft's pivot: of the spring that turns the body's z axis to the
-/// inertial z axis, of damping and of dry friction.
+/// Returns the torque of the craft's pivot: of the springs that rotate the body's z axis to the inertial z axis, of damping
+/// and of dry friction.
 fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     let upright = rotation(&x[..4]).inverse() * V::z();
     let pull = V::new(p.pivot.k[1] * upright.x, p.pivot.k[0] * upright.y, 0.0);
@@ -71,7 +74,7 @@ fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     upright.cross(&pull) - v(&p.pivot.c).component_mul(&w) - rubs
 }
 
-/// Returns [a; w'] of craft and liquids at rest as one rigid body, about its centre of mass; body axes.
+/// Returns [a; w'] of craft and liquids at rest as one rigid body, computed about its centre of mass; body axes.
 fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     let w = v(&x[index::OMEGA..]);
     let mut all = bodies(p);
@@ -115,7 +118,7 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
         DampingLaw::ConstantRatio => tank.zeta[n],
         DampingLaw::Constant => tank.zeta[n] * w(tank.g_ref) / w(above),
     };
-    // The square of the angle from -z as a series in the chord's, six terms (`taylor::angle`).
+    // The square of the angle from -z, as a power series of the square of the chord with six terms (`taylor::angle`).
     let chord2: f64 = 2.0 + 2.0 * p_z;
     let squared: f64 = [2.0, 6.0, 20.0, 70.0, 252.0, 924.0]
         .iter()
@@ -123,7 +126,7 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
         .map(|(binomial, n)| 2.0 * chord2.powi(n) / (f64::from(n * n) * binomial))
         .sum();
     let amplitude = (squared + rate2 / w(above).powi(2) + 1e-8).sqrt();
-    // First-mode steepness in a cylinder: zeros of J1', k = xi/R, elevation 2 R/(xi^2 - 1).
+    // Steepness of each mode in a cylinder, with the zeros xi of J1', k = xi/R and the elevation 2 R/(xi^2 - 1).
     let xi = [1.841183781340659, 5.331442773525033, 8.536316366346286][n];
     let (begins, corner) = (tank.breaking_steepness[n], 0.02);
     let rounded = |x: f64| (x + x.hypot(corner)) / 2.0;
@@ -132,7 +135,7 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
     2.0 * m * w(above) * (zeta + tank.zeta_amplitude[n] * amplitude + breaking)
 }
 
-/// A bob's place x from its hinge on the surface
+/// Position x of a bob from its hinge on the surface
 ///
 /// ```text
 /// |q|^2 + (x.e - z)^2 = l^2,   z = (kappa - 1) |q|^4/(8 l^3),   q = x - e (e.x)
@@ -142,17 +145,17 @@ struct Shape {
     rate: V,
     q: V,
     q_d: V,
-    /// The derivative dz/d|q|^2 of the surface's height by the square of the displacement, followed
-    /// by the second derivative.
+    /// The derivative dz/d|q|^2 of the height z by the square of the displacement, followed by the second derivative.
     slope: f64,
     bend: f64,
-    /// Half the gradient of the left side divided by l, and the terms of the second derivative of the left side without x''.
+    /// Half the gradient of the left side of the surface's equation divided by l, and the terms of the second derivative of
+    /// the left side that do not contain x''.
     normal: V,
     curving: f64,
 }
 
 impl Shape {
-    /// Computes the bob's place and rate from `rod` and its rate, both of a pendulum with the same q.
+    /// Computes position and rate of the bob from the direction `rod` and the rate `rod_d` of a pendulum with the same q.
     fn from_rod(tank: &Tank, n: usize, e: V, rod: V, rod_d: V) -> Shape {
         let l = tank.length[n];
         let across = |x: V| x - e * e.dot(&x);
@@ -184,7 +187,7 @@ impl Shape {
     }
 }
 
-/// Deliberate mistakes in the equations, each of which at least one reference record must show.
+/// Deliberate errors in the equations. Each of them must be visible in at least one reference record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mistake {
     Nothing,
@@ -269,7 +272,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let axes = rotation(&tank.q);
         let at = index::bob(i, n);
         let (across, hinge) = plane(tank, n);
-        // What a host sets off the plane does not count.
+        // A host may set states that leave the plane of the mode; only their part in the plane counts.
         let flat = |x: V| across.map_or(x, |b| x - b * b.dot(&x));
         let dir = (axes * flat(v(&x[at..]))).normalize();
         let rate = axes * flat(v(&x[at + 3..]));
@@ -284,21 +287,22 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let (drag, centring) = (moved * (c * l), perp * (tank.k[n] * l));
         let phi = drag + centring;
         let at = 6 + 5 * b;
-        // Newton's law of the bob.
+        // Newton's law of the bob:
         put(&mut m, at, 0, one * mass);
         let euler = if wrong(EulerSign) { -1.0 } else { unless(EulerLeftOut) };
         put(&mut m, at, 3, -rho.cross_matrix() * (mass * euler));
         put(&mut m, at, at, one * (mass * l));
         for k in 0..3 {
             m[(at + k, at + 3)] = shape.normal[k];
-            // The surface, for a pendulum |p| = 1, twice differentiated.
+            // Second derivative of the surface's equation, which for a pendulum is |p| = 1:
             m[(at + 3, at + k)] = shape.normal[k];
-            // The pull on the craft.
+            // Force of the rod on the craft:
             let arm = if wrong(PullAboutTank) { rho - v(&tank.position) } else { rho };
             m[(k, at + 3)] = -shape.normal[k] * unless(NoAddedMass);
             m[(3 + k, at + 3)] = -arm.cross(&shape.normal)[k] * unless(NoAddedMass);
         }
-        // The inner kinetic energy pulls bob and craft together with m_i (|q'|^2 + q.q'') q.
+        // The internal kinetic energy exerts the force m_i (|q'|^2 + q.q'') q on the bob and the opposite force on the
+        // craft.
         let q = perp * l;
         let m_i = mass * (tank.nonlinear_inertia[n] - 1.0) / (l * l);
         let q_d = rate * l - e * (e.dot(&rate) * l);
@@ -308,7 +312,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         put(&mut m, 3, at, -rho.cross_matrix() * own);
         let inner = q * (m_i * q_d.norm_squared());
         match across.map(|b| axes * b) {
-            // b.p = 0 twice differentiated, and what holds it there.
+            // Second derivative of b.p = 0, and the force that keeps the bob in its plane:
             Some(b) => {
                 for k in 0..3 {
                     m[(at + k, at + 4)] = b[k];
@@ -325,8 +329,8 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         rhs[at + 3] = shape.curving / l;
         force += inner;
         torque += rho.cross(&inner);
-        // The pull at a = w' = 0, which takes the place of the pull where there is no added
-        // mass, and what of the pull goes astray.
+        // Tension of the rod at a = w' = 0. It replaces the tension in an equation without added mass, and is used for the
+        // error of a force that is lost.
         let velocity = rate + w.cross(&dir);
         let centrifugal = mass * dir.dot(&w.cross(&w.cross(&hinge)));
         let by_rate = mass * l * velocity.norm_squared();
@@ -348,13 +352,14 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         seen.push((i, axes, shape.normal, across, rho, phi + inner, own));
         shapes.push((shape, l, e));
     }
-    // Each mode by itself: the mass that moves by y = p eta relative to the craft, from the interface point.
+    // Newton's law of each appendage mode: its mass moves by y = p eta relative to the craft, measured from the interface
+    // point.
     for (j, mode) in p.appendage[..p.appendages].iter().enumerate() {
         let (at, row) = (v(&mode.position), first + j);
         let (along, about) = (v(&mode.participation), v(&mode.participation[3..]));
         let (eta, rate) = (x[index::ETA + j], x[index::ETA_DOT + j]);
         let y = along * eta;
-        // y'' seen from outside, and the specific force at the interface point, without a, w' and eta''.
+        // y'' relative to inertial axes, and the specific force at the interface point, both without a, w' and eta''.
         let moved = w.cross(&along) * (2.0 * rate) + w.cross(&w.cross(&y));
         let held = w.cross(&w.cross(&at));
         put(&mut m, 0, 3, -y.cross_matrix());
@@ -405,7 +410,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
     Solution { a, w_d, p_dd, eta_dd, wrench }
 }
 
-/// Returns the derivatives of attitude, angular velocity, directions and their rates; all others are 0.
+/// Returns the derivatives of attitude, angular velocity, directions and rates of directions; all other derivatives are 0.
 pub(super) fn newton_rates(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [f64; STATES] {
     let (now, mut rate) = (solve(p, x, u), [0.0; STATES]);
     let w = &x[index::OMEGA..];
@@ -455,7 +460,7 @@ fn anywhere_with(
     (random, p, x, inputs)
 }
 
-/// Asserts that elements agree within a tolerance relative to the largest element or to `size`, whichever is larger.
+/// Asserts that all elements agree within a tolerance relative to the largest element or to `size`, whichever is larger.
 fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str) {
     let size = want.iter().fold(size, |size, x| size.max(x.abs()));
     for (i, (got, want)) in got.iter().zip(want).enumerate() {
@@ -463,7 +468,7 @@ fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str
     }
 }
 
-// Both solve a system whose condition is some 1e3: rounding leaves 1e-13 to 1e-12.
+// Both formulations solve linear systems with a condition number of about 1e3, so that rounding errors are 1e-13 to 1e-12.
 const ROUNDING: f64 = 1e-11;
 
 #[test]
@@ -473,9 +478,9 @@ fn accelerations_forces_and_torques_follow_newtons_law_with_the_rod_forces_as_un
     }
 }
 
-/// The tanks have planar modes and modes that move in two directions; the tanks are not on the spin axis, and their rigid
-/// liquid is not axisymmetric. The unknown guiding forces hold each slosh mass on its line of motion. The accelerations
-/// equal the accelerations of the craft's equations.
+/// The tanks have planar modes and modes that swing in every direction; they are not on the spin axis, and their rigid
+/// liquid is not axisymmetric. Unknown guiding forces keep each bob on its line of motion. The accelerations equal those
+/// of the craft's equations.
 #[test]
 fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     for seed in 0..300 {
@@ -486,8 +491,8 @@ fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     }
 }
 
-/// Compares bobs on other surfaces than spheres, some in planes, with Newton's law in which the
-/// force of the surface is an unknown.
+/// Bobs on other surfaces than spheres, some of them in planes, follow Newton's law in which the force of the
+/// surface is an unknown.
 #[test]
 fn bobs_on_surfaces_follow_newtons_law_with_the_surface_as_a_constraint() {
     let mut compared = 0;
@@ -562,8 +567,8 @@ fn compare_with_newton(
     }
 }
 
-/// The Newton-Euler equations of the dry craft hold: its mass matrix times [a; w'] is the inputs plus the sum of the
-/// tanks' wrenches.
+/// The Newton-Euler equations of the dry craft hold: its mass matrix times [a; w'] equals the inputs plus the forces and
+/// torques of all tanks.
 #[test]
 fn forces_on_the_dry_craft_balance() {
     for seed in 0..300 {
@@ -590,8 +595,8 @@ fn forces_on_the_dry_craft_balance() {
     }
 }
 
-/// Returns a random tank with bobs anywhere on their spheres, and the host's motion. Every third tank has no
-/// axial symmetry, and every third has bobs on surfaces other than spheres.
+/// Returns a random tank with bobs anywhere on their spheres, and a motion of the host. Every third tank has no axial
+/// symmetry, and in every third tank the bobs move on surfaces other than spheres.
 fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let mut p = TankParameters { tank: random.tank(), coupling, ..TankParameters::default() };
@@ -600,7 +605,7 @@ fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, T
     }
     if seed % 3 == 1 {
         random.bend(&mut p.tank);
-        // For s < 1 the added mass is not positive.
+        // For s < 1 the added mass would not be positive.
         p.tank.nonlinear_inertia = p.tank.nonlinear_inertia.map(|s| s.max(1.0));
     }
     let mut tank = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap();
@@ -635,8 +640,8 @@ fn acceleration(u: &TankInputs) -> DVector<f64> {
     DVector::from_iterator(6, u.a.value.iter().chain(&u.omega_dot.value).copied())
 }
 
-/// SloshTank, with random liquid and each coupling, gives a host the force and torque of the liquid, and the bias and added
-/// mass with which the host can solve for its acceleration.
+/// In each coupling, a SloshTank with random liquid returns the force and torque of the liquid on the host, and the bias and
+/// added mass with which the host can solve for its acceleration.
 #[test]
 fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
     for coupling in Coupling::ALL {
@@ -646,7 +651,7 @@ fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
             let m = symmetric(&out.added_mass);
             let mut left = DVector::from_column_slice(&out.bias) - &m * acceleration(&u);
             if coupling == Coupling::RigidBody {
-                // A body that includes the mass has w x (w x S), w x (I w) in its own equations.
+                // A body that includes the mass has the terms w x (w x S) and w x (I w) in its own equations.
                 let (w, s) = (v(&u.omega), v(&[m[(5, 1)], m[(3, 2)], m[(4, 0)]]));
                 let inertia = m.fixed_view::<3, 3>(3, 3);
                 let [force, torque] = [w.cross(&w.cross(&s)), w.cross(&(inertia * w))];
@@ -658,7 +663,7 @@ fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
             let wrench = [out.tank.force, out.tank.torque].concat();
             let size = m.amax() + out.bias.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
             assert_close(left.as_slice(), &wrench, size, 1e-14, "wrench");
-            // Both matrices are inertias, as long as the rigid liquid is.
+            // Both matrices are inertias if the rigid liquid has positive mass.
             let is_body = p.tank.direction[0] == [0.0; 2];
             assert!(!is_body || m.symmetric_eigenvalues().min() > -1e-14 * m.amax());
         }
@@ -666,7 +671,7 @@ fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
 }
 
 /// Each column of M_a is minus the change of force and torque by one component of [a; w'], with drag that does not depend on
-/// them. Therefore M_a is symmetric.
+/// [a; w']. Therefore M_a is symmetric.
 #[test]
 fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     for seed in 0..50 {
@@ -682,9 +687,9 @@ fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     }
 }
 
-/// If each bob is lumped at its hinge, with twice its mass for planar modes, the constant matrix minus M_a is positive
-/// semidefinite for all directions of the bobs, so that the remaining loop converges. With less than twice the mass of planar
-/// modes it is not.
+/// The constant matrix counts each bob at its hinge, and the bobs of planar modes with twice their mass. This matrix minus
+/// M_a is positive semidefinite for all directions of the bobs, so that the remaining algebraic loop converges. If planar
+/// modes counted with less than twice their mass, it would not be.
 #[test]
 fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     let mut tight = 0;
@@ -701,14 +706,15 @@ fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
             continue;
         };
         let Some(b) = across.filter(|_| p.tank.modes == 1) else { continue };
-        // What the bound leaves, along b at the hinge and about the axis of equality, p x b, is nothing.
+        // The inequality is sharp: for an acceleration along b at the hinge and an angular acceleration about the axis p x
+        // b, both sides are equal.
         let axes = rotation(&p.tank.q);
         let x = split.continuous_states();
         let rod = v(&x) - b * b.dot(&v(&x));
         let turn = axes * rod.normalize().cross(&b);
         let l = p.tank.length[0];
         let at = v(&p.tank.position) + axes * hinge;
-        // a_P = l b, w' = p x b
+        // Here a_P = l b and w' = p x b.
         let a = axes * b * l - turn.cross(&at);
         let equal = DVector::from_iterator(6, a.iter().chain(turn.iter()).copied());
         let left = equal.dot(&(&excess * &equal));
@@ -718,9 +724,9 @@ fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     assert!(tight > 5);
 }
 
-/// A single tank is moved as a craft moves by Newton's law with the tensions as unknowns; its wrench and its bobs' p'' have to
-/// agree. The drag does not depend on the acceleration, because in the craft it would follow the motion of craft and liquids as
-/// one rigid body, but in the single tank the given motion.
+/// A single tank that is moved as a craft moves by Newton's law has the same force and torque and the same p'' of its bobs
+/// as the tank in this craft. The drag does not depend on the acceleration, because in the craft it would depend on the
+/// motion of craft and liquids as one rigid body, but in the single tank on the given motion.
 #[test]
 fn a_single_tank_follows_newtons_law() {
     for seed in 0..300 {
@@ -762,9 +768,9 @@ fn a_single_tank_follows_newtons_law() {
     }
 }
 
-/// The wrench of a tank in a craft equals the wrench of the single tank under the craft's motion. The drag does not depend on the
-/// acceleration, because in the craft it would follow the motion of craft and liquids as one rigid body, but in the single tank
-/// the given motion.
+/// The force and torque of a tank in a craft equal those of the single tank under the craft's motion. The drag does not
+/// depend on the acceleration, because in the craft it would depend on the motion of craft and liquids as one rigid body,
+/// but in the single tank on the given motion.
 #[test]
 fn a_single_tank_under_the_crafts_motion_moves_as_the_tank_in_the_craft() {
     for seed in 0..100 {
@@ -797,13 +803,14 @@ fn a_single_tank_under_the_crafts_motion_moves_as_the_tank_in_the_craft() {
     }
 }
 
-/// The hinges of the bobs and the rigid liquid are at the centre of a sphere. Without drag and without own inertia of the rigid
-/// liquid, a rotating sphere cannot turn its liquid, so that the torque about the centre is 0.
+/// The hinges of the bobs and the rigid liquid are at the centre of a spherical tank. Without drag, and without
+/// inertia of the rigid liquid about its own centre, a rotating sphere cannot rotate its liquid, so that the torque
+/// about the centre is 0.
 #[test]
 fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
     for seed in 0..50 {
         let mut random = Random::new(seed);
-        // Hinges and centre of mass at the centre, which is the tank's origin and O.
+        // Hinges and centre of mass are at the centre of the sphere, which is the tank's origin and O.
         let tank = Tank {
             position: [0.0; 3],
             h_0: 0.0,
@@ -815,8 +822,8 @@ fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
             ..random.tank()
         };
         let p = TankParameters { tank, ..TankParameters::default() };
-        // Turned about its centre, which stays where it is (a = 0), from rest of the liquid
-        // in space: p' = -w x p in tank axes.
+        // The tank rotates about its centre, which does not accelerate (a = 0), while the liquid is at rest relative to
+        // inertial axes: p' = -w x p in tank axes.
         let w: [f64; 3] = random.vector(1.0);
         let u = TankInputs {
             omega: w,
@@ -835,7 +842,7 @@ fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
         let size: f64 = tank.mass.iter().sum::<f64>() + tank.m_0;
         assert_close(&out.force, &[0.0; 3], size, 1e-14, "force");
         assert_close(&out.torque, &[0.0; 3], size, 1e-14, "torque");
-        // And by the host's acceleration it gets a force, but no torque about the centre.
+        // An acceleration of the host causes a force, but no torque about the centre.
         let pushed = TankInputs { a: craft::Ramp::held(random.vector(5.0)), ..u };
         let out = alone.outputs(&pushed).tank;
         assert!(v(&out.force).norm() > 1e-3);
@@ -875,8 +882,8 @@ fn coupling_ratio_is_the_largest_eigenvalue() {
     assert_eq!(alone.coupling_ratio(), None);
 }
 
-/// Computes the accelerations a and w' from the states of a record, and returns their largest deviation from the
-/// accelerations in the record, relative to the largest acceleration.
+/// Computes the accelerations a and w' for the states of a record. Returns their largest deviation from the accelerations in
+/// the record, relative to the largest acceleration.
 fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     let p = records::parameters(record);
     let samples = &record["samples"];
@@ -906,13 +913,13 @@ fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     worst
 }
 
-/// The reference records distinguish right from wrong equations: each typical mistake shows in at least one record, even if the
-/// accelerations are computed at the record's own states.
+/// Each typical error in the equations is visible in at least one reference record, even if the accelerations are computed
+/// from the record's own states.
 #[test]
 fn reference_records_catch_typical_mistakes() {
     let all = records::records("craft");
     for record in &all {
-        // States are printed with 14 digits; forces come from differences of theirs.
+        // The states in the records have 14 digits; forces are computed from differences of the states.
         let right = deviation(Nothing, record);
         assert!(right < 1e-11, "{} {right:e}", record["name"]);
     }

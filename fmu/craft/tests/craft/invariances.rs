@@ -1,7 +1,7 @@
-//! Descriptions of the same craft in another way, for example about another reference point, give the same motion.
+//! Two descriptions of the same craft, for example with another reference point, give the same motion.
 //!
-//! The runs take ten seconds at a tolerance of 1e-13. They differ only by rounding, some 1e-16 in each of 500 steps, which the
-//! liquids' motion multiplies by about ten.
+//! The simulations last ten seconds at a tolerance of 1e-13. They differ only by rounding, about 1e-16 in each of 500 steps,
+//! which the motion of the liquids amplifies about ten times.
 
 use craft::{INPUTS, Inputs, Parameters, Ramp, STATES, TANKS, index};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -14,8 +14,8 @@ type V = Vector3<f64>;
 
 const SAME: f64 = 1e-12;
 
-/// Returns a random craft with at least one tank, and its inputs: a force at O and a torque. The tanks stand
-/// within about 30 degrees of the thrust, because a bob that falls over makes differences grow more.
+/// Returns a random craft with at least one tank, and its inputs: a force at O and a torque. The axes of the tanks are
+/// within about 30 degrees of the thrust, because a bob that falls over would amplify differences.
 fn random_craft(seed: u64) -> (Random, Parameters, Vec<[f64; INPUTS]>) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -80,14 +80,14 @@ fn assert_same_attitude(got: &[f64], want: &[f64]) {
     assert_same(&turned, &want[..4], "attitude");
 }
 
-/// The body's origin O is moved by a random vector, and all positions of parts are changed to match; the motion in space is
-/// equal.
+/// The body's origin O is shifted by a random vector, and the positions of all parts are changed accordingly. The motion in
+/// space must be the same.
 #[test]
 fn a_craft_moves_alike_for_any_reference_point_of_its_positions() {
     for seed in 0..8 {
         let (mut random, p, knots) = random_craft(seed);
         let want = run(&p, &knots);
-        // O moves by d in the body.
+        // O is shifted by d, body axes.
         let d = v(&random.vector::<3>(1.0));
         let mut moved = p;
         let less = |x: [f64; 3]| <[f64; 3]>::from(v(&x) - d);
@@ -116,13 +116,14 @@ fn a_craft_moves_alike_for_any_reference_point_of_its_positions() {
     }
 }
 
-/// The body axes are turned at random, and all parameters and inputs are changed to match; the motion in space is equal.
+/// The body axes are rotated at random, and all parameters and inputs are changed accordingly. The motion in space
+/// must be the same.
 #[test]
 fn a_craft_moves_alike_for_any_orientation_of_its_body_axes() {
     for seed in 0..8 {
         let (mut random, p, knots) = random_craft(seed);
         let want = run(&p, &knots);
-        // turn: new body axes to old ones
+        // `turn` rotates from new to old body axes.
         let turn = attitude(&random.vector::<4>(1.0));
         let back = |x: [f64; 3]| <[f64; 3]>::from(turn.inverse() * v(&x));
         let mut turned = p;
@@ -152,11 +153,15 @@ fn a_craft_moves_alike_for_any_orientation_of_its_body_axes() {
         assert_same_attitude(&numbers(attitude(&got) * turn.inverse()), &want);
         let omega = turn * v(&got[index::OMEGA..]);
         assert_same(omega.as_slice(), &want[index::OMEGA..][..3], "omega");
-        assert_same(&got[index::POSITION..], &want[index::POSITION..], "position and all after");
+        assert_same(
+            &got[index::POSITION..],
+            &want[index::POSITION..],
+            "position and all later states",
+        );
     }
 }
 
-/// Initial attitude, position and velocity are turned at random; the motion is turned in the same way.
+/// Initial attitude, position and velocity are rotated at random. The motion must be rotated in the same way.
 #[test]
 fn a_craft_moves_alike_in_any_inertial_frame() {
     for seed in 0..8 {
@@ -174,7 +179,7 @@ fn a_craft_moves_alike_in_any_inertial_frame() {
             let vector = turn.inverse() * v(&got[at..]);
             assert_same(vector.as_slice(), &want[at..at + 3], "position, velocity");
         }
-        assert_same(&got[index::WORK..], &want[index::WORK..], "work and all after");
+        assert_same(&got[index::WORK..], &want[index::WORK..], "work and all later states");
     }
 }
 
