@@ -1,4 +1,4 @@
-//! Steps, saved states and refusals as a host relies on them.
+//! Tests of steps, saved states and error messages, on which hosts rely.
 
 use craft::{
     Coupling, Inertia, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State,
@@ -33,14 +33,15 @@ fn results_do_not_depend_on_the_communication_step() {
             cut.step(&after(&u, t), h).unwrap();
             t += h;
         }
-        // Both within the tolerance per step, grown by the liquids' motion.
+        // Both errors are within the tolerance per step, amplified by the motion of the liquid.
         let off = largest_difference(&whole.continuous_states(), &cut.continuous_states());
         assert!(off < 1e-10, "{seed}: {off:e}");
         assert_eq!(whole.time(), 7.0);
     }
 }
 
-/// Compares with runs at a tolerance of 1e-13, over a record that swings at 60 degrees and a record with all kinds of inputs.
+/// The results are compared with runs at a tolerance of 1e-13, for a record in which the liquid swings by 60 degrees and a
+/// record with all kinds of inputs.
 #[test]
 fn errors_stay_within_the_solver_tolerance() {
     for name in ["conical", "four_tanks", "wheels", "rotary"] {
@@ -62,8 +63,8 @@ fn errors_stay_within_the_solver_tolerance() {
     }
 }
 
-/// In a craft at rest the scale of a step's errors begins at 0 and grows with the motion. The craft is spun up by 1
-/// rad/s2, so that a stiffly held bob, too light to affect the craft, begins to swing at 10 rad/s.
+/// In a craft at rest the scale of a step's allowed error is 0 at first and grows with the motion. The craft is accelerated
+/// by 1 rad/s2, so that a bob with high centring stiffness, too light to affect the craft, begins to swing at 10 rad/s.
 #[test]
 fn errors_stay_within_the_solver_tolerance_from_rest() {
     let mut p = Parameters::default();
@@ -83,8 +84,8 @@ fn errors_stay_within_the_solver_tolerance_from_rest() {
     }
 }
 
-/// Runs a draining tank, alone and on a craft, over one step of 5 s and compares with runs at 1e-13. The limit is a
-/// hundred times the tolerance, the allowed error of one internal step.
+/// A draining tank, alone and on a craft, is simulated in one step of 5 s and compared with a run at a tolerance of 1e-13.
+/// The difference may be a hundred times the tolerance, which is the allowed error of one internal step.
 #[test]
 fn errors_stay_within_the_solver_tolerance_while_tanks_drain() {
     for seed in 0..4 {
@@ -185,8 +186,8 @@ fn saved_data_that_is_no_state_is_refused() {
     assert_eq!(TankState::from_words(&[0; TankState::WORDS]), None);
 }
 
-/// The wheels' momentum jumps at the first step and again after a second, or rises by the same amount within a step. The angular
-/// momentum H is conserved to rounding, and the energy changes by the work of the impulse.
+/// The wheels' momentum jumps at the first step and again after a second, or rises by the same amount within a step. The
+/// angular momentum H is constant to rounding, and the energy changes by the work of the impulse.
 #[test]
 fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
     for seed in 0..28 {
@@ -200,7 +201,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
         }
         let pivot = seed.is_multiple_of(5);
         if pivot {
-            // Without gravity, so that H is kept.
+            // Without gravity H is constant.
             (p.mount, p.init.velocity, p.gravity) = (Mount::Pivot, [0.0; 3], [0.0; 3]);
         }
         let wheels = |h: [f64; 3]| Inputs { h_wheels: Ramp::held(h), ..Inputs::default() };
@@ -210,7 +211,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
         let mut held = first;
         for _ in 0..4 {
             held = wheels(random.vector(30.0));
-            // Shown before the step already.
+            // The outputs before the step already contain the effect of the jump.
             let shown = craft.outputs(&held);
             let mut event = craft.clone();
             assert!(event.take_event(&held).unwrap());
@@ -229,7 +230,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
                 assert!(off.abs() < 1e-10 * size, "{seed}: E {off:e}");
             }
         }
-        // A jump is the limit of ever steeper ramps.
+        // A jump is the limit of ramps that become ever steeper.
         let jumped = wheels(random.vector(30.0));
         let ramp = |h: f64| {
             let (from, to) = (held.h_wheels.value, jumped.h_wheels.value);
@@ -281,7 +282,7 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
     for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         refused(&u, h, is_length, "allowed: a finite length above 0");
     }
-    // Within the step, from 0.1 s on.
+    // The error occurs within the step, at 0.1 s.
     let not_finite: fn(&StepError) -> bool =
         |e| matches!(e, StepError::NotFinite { time } if (0.1..=0.2).contains(time));
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
@@ -331,7 +332,7 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
     }
 }
 
-/// Each problem is refused in a sentence that names parameter, value and range, and all problems are returned at once.
+/// Each problem is reported in a sentence with parameter, value and allowed range, and all problems are returned together.
 #[test]
 fn every_problem_with_the_parameters_is_returned() {
     let mut p = Parameters::default();
@@ -366,7 +367,7 @@ fn every_problem_with_the_parameters_is_returned() {
     ];
     assert_eq!(problems, expected);
 
-    // A craft with no inertia about its axis but for a tank's rigid liquid.
+    // The craft has no inertia about its axis, except from the rigid liquid of a tank.
     let mut p = Parameters::default();
     p.craft.r = [0.0; 3];
     (p.craft.j.xx, p.craft.j.yy, p.craft.j.zz) = (5.0, 5.0, 0.0);
@@ -375,7 +376,7 @@ fn every_problem_with_the_parameters_is_returned() {
     assert!(problems[0].contains("is singular"), "{problems:?}");
     p.tank[0].i_z = 1.0;
     assert!(p.problems().is_empty());
-    // So little that what is divided by it overflows.
+    // This inertia is so small that a division by it overflows.
     p.tank[0].i_z = 1e-200;
     assert!(p.problems()[0].contains("is singular"));
     p.craft.j.zz = -1.0;
@@ -396,8 +397,8 @@ fn every_problem_with_the_parameters_is_returned() {
     assert!(problems[1].starts_with("host.mass = -1.0"));
 }
 
-/// No principal moment of a body exceeds the sum of the others, in principal axes or in rotated axes. For a plate it equals the
-/// sum; moments of a plate that are rounded to four digits have to be accepted.
+/// No principal moment of inertia of a body exceeds the sum of the other two, whether the axes are principal axes or not.
+/// For a flat plate it equals the sum, so that moments of a plate that are rounded to four digits must be accepted.
 #[test]
 fn principal_moments_that_no_body_has_are_refused() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
@@ -413,11 +414,11 @@ fn principal_moments_that_no_body_has_are_refused() {
     };
     let wanted = message(["100.0", "200.0", "400.0", "300.0"]);
     assert_eq!(with([100.0, 400.0, 200.0, 0.0, 0.0, 0.0]), std::slice::from_ref(&wanted));
-    // The same by 30 degrees about x.
+    // The same inertia in axes that are rotated by 30 degrees about x is refused with the same message.
     let (c, s) = (f64::sqrt(0.75), 0.5);
     let (yy, zz) = (c * c * 400.0 + s * s * 200.0, s * s * 400.0 + c * c * 200.0);
     assert_eq!(with([100.0, yy, zz, 0.0, 0.0, c * s * 200.0]), [wanted]);
-    // Positive definite, every diagonal element within the sum of the others.
+    // This matrix is positive definite, and no diagonal element exceeds the sum of the other two.
     let wanted = message(["10.0", "10.0", "280.0", "20.0"]);
     assert_eq!(with([100.0, 100.0, 100.0, 90.0, 90.0, 90.0]), [wanted]);
     let fits: [[f64; 6]; 3] = [
@@ -447,7 +448,7 @@ fn random_steps_give_finite_results_or_an_error() {
         let tolerance = random.magnitude(1e-14, 1e-1);
         let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap();
         for _ in 0..30 {
-            // One in twenty is beyond all sense.
+            // In one of twenty steps the inputs are unreasonably large.
             let nonsense = random.below(20) == 0;
             let size = if nonsense { 1e160 } else { random.magnitude(1e-6, 1e5) };
             let ramp = |random: &mut Random| Ramp {
@@ -473,7 +474,8 @@ fn random_steps_give_finite_results_or_an_error() {
     assert!((100..600).contains(&refused), "{refused}");
 }
 
-/// However long the run, directions and quaternion keep the length 1 to rounding, and the rates of directions stay tangential.
+/// However long the simulation is, directions and quaternion have the length 1 to rounding, and the rates of directions stay
+/// perpendicular to the directions.
 #[test]
 fn constraints_are_kept_to_rounding() {
     let record = record("four_tanks");
@@ -564,7 +566,7 @@ fn nothing_is_allocated_while_stepping() {
 fn an_impossible_outflow_is_refused() {
     let (mut p, mut u) = (Parameters::default(), Inputs::default());
     let flow = |value: f64| [value, 0.0, 0.0, 0.0].map(|value| Line { value, slope: 0.0 });
-    // A tank without a table stays as it is.
+    // A flow out of a tank without a fill table has no effect.
     u.mass_flow = flow(0.1);
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     let mass = craft.outputs(&u).mass;
@@ -582,7 +584,8 @@ fn an_impossible_outflow_is_refused() {
         assert!(matches!(error, StepError::Model(_)), "{message}");
         assert!(message.contains("(allowed: 10 to 20 kg"), "{message}");
     }
-    // Out and back within a step, 6 - 3 t kg/s for 4 s: 6 kg are missing on the way, at the end none.
+    // Within the step the flow of 6 - 3 t kg/s reverses: after 2 s of 4 s 6 kg have drained, and at the end all have
+    // returned.
     for (value, missing) in [(6.0, 6.0), (-6.0, -6.0)] {
         u.mass_flow = flow(value);
         u.mass_flow[0].slope = -value / 2.0;
@@ -591,7 +594,7 @@ fn an_impossible_outflow_is_refused() {
             format!("mass_flow[1] would change the liquid in tank[1] to {} kg", 15.0 - missing);
         assert!(message.contains(&wanted), "{message}");
     }
-    // Of a tank alone there is one.
+    // For a single tank the message has no index.
     let alone = craft::TankParameters { tank: p.tank[0], ..craft::TankParameters::default() };
     let of_tank = craft::TankInputs { mass_flow: flow(6.0)[0], ..craft::TankInputs::default() };
     let mut tank = super::component::SloshTank::new(&alone, &of_tank, 0.0, 1e-9).unwrap();
@@ -607,7 +610,7 @@ fn an_impossible_outflow_is_refused() {
     u.mass_flow = flow(5.0);
     craft.step(&u, 1.0).unwrap();
 
-    // All of it, in pieces whose sum is that but for rounding.
+    // All liquid flows out in several steps, whose sum is exact only to rounding.
     (p.tank[0].fill.liquid[0], p.tank[0].fill.liquid[1]) = (1000.0, 2000.0);
     p.tank[0].liquid_0 = 1500.0;
     let mut rounded = false;
@@ -664,7 +667,7 @@ fn the_dissipated_energy_of_a_long_step_is_the_sum_over_short_steps() {
         assert!(now > before, "{now} {before}");
         before = now;
     }
-    // The tolerance over a hundred steps.
+    // The allowed difference is the tolerance of a hundred steps.
     let dissipated = long.outputs(&inputs).dissipated;
     assert!((dissipated / before - 1.0).abs() < 1e-8, "{dissipated} {before}");
 }

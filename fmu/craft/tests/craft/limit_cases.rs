@@ -1,6 +1,6 @@
-//! Random tanks inside of all limits, and beyond each limit, at which a tank's pendulums no longer represent its liquid.
+//! Random tanks within all limits of validity, and beyond each limit, at which pendulums no longer represent the liquid.
 //!
-//! `tests/six` includes this file as well and runs it with the packed FMU as component.
+//! `tests/six` includes this file as well, and runs it with the packed FMU instead of this crate.
 
 use craft::{LimitedBy, Ramp, Tank, TankInputs, TankParameters};
 use fastrand::Rng;
@@ -29,8 +29,8 @@ pub fn reason(tank: &Tank, motion: Motion) -> LimitedBy {
     seen.limited_by
 }
 
-/// An upright cylinder of random size, on its own axis, with limits of the slosh angle, and a
-/// motion that is well inside of all limits.
+/// An upright cylinder of random size with limits of the slosh angle, on the host's axis, and a motion that is
+/// well within all limits.
 struct Case {
     tank: Tank,
     motion: Motion,
@@ -58,7 +58,7 @@ impl Case {
         (tank.angle_limit[0], tank.swirl_limit[0]) = (angle_limit, angle_limit * 0.5);
         tank.breaking_steepness[0] = 2.0 * XI * (angle_limit + 0.1) / (XI * XI - 1.0);
         let mut case = Case { tank, motion: Motion { axial, spin: 0.0 }, rng };
-        // At rest at an angle in any direction; swirl below its limit.
+        // The bob is at rest at an angle in any direction, or in rotary motion below its limit.
         let (angle, rate) = match case.rng.bool() {
             true => (0.999 * angle_limit * case.rng.f64(), 0.0),
             false => (0.999 * tank.swirl_limit[0] * case.rng.f64(), 1.0),
@@ -73,8 +73,8 @@ impl Case {
         self.motion.axial / self.tank.length[0] + self.tank.k[0] / self.tank.mass[0]
     }
 
-    /// Returns the spin rate, rad/s, at which the first of the two limits by spin is reached, by
-    /// formulas other than the ones that are tested.
+    /// Returns the spin rate, rad/s, at which the first of the two spin limits is reached, by other formulas than
+    /// those that are tested.
     fn largest_spin(&self) -> f64 {
         let radius = self.tank.wave[0] * (XI * XI - 1.0) / 2.0;
         let kh = (radius / (XI * self.tank.length[0])).atanh();
@@ -83,7 +83,7 @@ impl Case {
         waves.min((0.3 * self.omega2() * self.tank.length[0] / radius).sqrt())
     }
 
-    /// Moves the bob of mode 1 to this angle, with `rate` times the rate of circular motion.
+    /// Moves the bob of mode 1 to `angle`. Its rate is `rate` times the rate of circular motion.
     fn move_bob(&mut self, angle: f64, rate: f64) {
         let (sin, cos) = (std::f64::consts::TAU * self.rng.f64()).sin_cos();
         let r = angle.sin();
@@ -93,7 +93,8 @@ impl Case {
     }
 }
 
-/// 1,000 random tanks inside of all limits are in range, and 1,000 beyond each limit are out of range for that reason.
+/// 1,000 random tanks within all limits are in range. Beyond each limit, 1,000 tanks are out of range for the
+/// reason of this limit.
 #[test]
 fn a_tank_is_out_of_range_beyond_each_of_its_limits_only() {
     for seed in 0..1000 {
@@ -107,7 +108,7 @@ fn a_tank_is_out_of_range_beyond_each_of_its_limits_only() {
             let limit = case.tank.angle_limit[0];
             case.move_bob(limit * 1.001 + (0.0989 - 0.0005) * by, 0.0);
         }),
-        // The other mode, in a tank whose first mode rests.
+        // The second mode exceeds its limit while the first mode is at rest.
         (LimitedBy::ThirdOrder, |case, by| {
             case.move_bob(0.0, 0.0);
             case.tank.modes = 2;
@@ -145,8 +146,8 @@ fn a_tank_is_out_of_range_beyond_each_of_its_limits_only() {
     }
 }
 
-/// Swirl is distinguished from planar motion at every phase: an ellipse with semi-axes in a ratio of 0.6 swirls, one of 0.4 does
-/// not.
+/// Rotary motion is distinguished from planar motion at every phase: an ellipse whose semi-axes have the ratio 0.6 counts as
+/// rotary, and one with the ratio 0.4 does not.
 #[test]
 fn a_wide_ellipse_counts_as_rotary_motion_at_every_phase() {
     for (ratio, expected) in [(0.6, LimitedBy::SecondaryResonance), (0.4, LimitedBy::None)] {

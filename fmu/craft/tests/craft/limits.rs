@@ -1,4 +1,4 @@
-//! Ends of the range in which a tank's pendulums represent its liquid, and the reasons.
+//! Tests of the limits within which a tank's pendulums represent its liquid, and of the reported reasons.
 
 use craft::{
     Inputs, LimitedBy, Parameters, Ramp, SloshTank, Spacecraft, Tank, TankInputs, TankParameters,
@@ -6,8 +6,8 @@ use craft::{
 
 use super::limit_cases::{Motion, XI, reason};
 
-/// A cylinder of known dimensions has limits without parameters: pendulums in the default depth end at 4.3 degrees, bobs of
-/// the third order at 9.3, swirl at 5.9.
+/// A cylinder of known dimensions has limits without limit parameters. At the default depth they are 4.3 degrees for
+/// pendulums, 9.3 degrees with coefficients of the third order, and 5.9 degrees for rotary motion.
 #[test]
 fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     let still = Motion { axial: 9.81, spin: 0.0 };
@@ -29,7 +29,8 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     assert_eq!([9.2, 9.4].map(|x| at(third, x, false)), [LimitedBy::None, LimitedBy::ThirdOrder]);
     let rotary = [LimitedBy::None, LimitedBy::SecondaryResonance];
     assert_eq!([5.8, 6.0].map(|x| at(third, x, true)), rotary);
-    // At h/R 0.5 the third order ends at 6.5 degrees, and with the wave's energy at 11.8.
+    // At h/R = 0.5 the limit is 6.5 degrees with the third order, and 11.8 degrees with the coefficients of the wave's
+    // energy.
     for (has_energy, ends) in [(false, 6.5), (true, 11.8)] {
         let limited = [0.99, 1.01].map(|factor| {
             let mut tank = Tank { diameter: 0.2, depth: 0.05, g_ref: 9.81, ..Tank::default() };
@@ -47,7 +48,7 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
         });
         assert_eq!(limited, [LimitedBy::None, LimitedBy::ThirdOrder], "{has_energy}");
     }
-    // Given limits have priority, and tanks without dimensions have none.
+    // Limits that are given as parameters have priority. A tank without known dimensions has no other limits.
     let mut tank = Tank { diameter: 0.2, depth: 0.1227, g_ref: 9.81, ..Tank::default() };
     tank.p_0[0] = [0.1f64.sin(), 0.0, -0.1f64.cos()];
     tank.angle_limit[0] = 0.11;
@@ -57,8 +58,8 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     assert_eq!(reason(&tank, still), LimitedBy::None);
 }
 
-/// The tank on the axis of a spinner at 9 rad/s whose free surface is 5.5 cm higher at the wall than its mean: R = 0.3 m, h
-/// = 0.4 m, 5 m/s2. The craft and the tank alone give the same reason.
+/// The tank is on the axis of a spinner that rotates at 9 rad/s. Its free surface is 5.5 cm higher at the wall than its
+/// mean: R = 0.3 m, h = 0.4 m, 5 m/s2. The craft and the single tank report the same reason.
 #[test]
 fn a_tank_on_a_spinner_is_limited_by_spin() {
     let mut p = Parameters::default();
@@ -76,7 +77,7 @@ fn a_tank_on_a_spinner_is_limited_by_spin() {
         [LimitedBy::Spin, LimitedBy::Spin, LimitedBy::None, LimitedBy::None]
     );
     assert_eq!(reason(&p.tank[0], Motion { axial: 5.0, spin: 9.0 }), LimitedBy::Spin);
-    // About an axis across the tank's it may turn faster.
+    // The craft may rotate faster about an axis perpendicular to the tank's axis.
     p.init.omega = [2.5, 0.0, 0.0];
     let inputs = Inputs { force: Ramp::held([0.0, 0.0, 6500.0]), ..Inputs::default() };
     let mut across = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
@@ -84,7 +85,7 @@ fn a_tank_on_a_spinner_is_limited_by_spin() {
     assert_eq!(craft(2.5, &p), LimitedBy::Spin);
 }
 
-/// Limits of a draining tank are those at its fill; at the end of the table it is empty.
+/// The limits of a draining tank are those at its present fill. At the first point of the fill table the tank is empty.
 #[test]
 fn a_draining_tank_has_the_limits_of_its_fill() {
     let mut tank = Tank { g_ref: 1.5, ..Tank::default() };

@@ -1,7 +1,7 @@
-//! Tests of the craft and of the tank alone.
+//! Tests of a spacecraft with tanks and of the single tank.
 //!
-//! `tests/six`, at the root of the project, shows that the packed FMUs compute the same bits, and has the coupling by
-//! co-simulation.
+//! `tests/six`, at the root of the project, tests that the packed FMUs compute the same bits, and contains the tests
+//! of coupling by co-simulation.
 
 mod appendages;
 mod balances;

@@ -1,4 +1,4 @@
-//! Mass, centre of mass and inertia of everything, summed up body by body.
+//! Tests of mass, centre of mass and inertia of craft and liquid, by a sum over all bodies.
 
 use craft::{Inputs, Tank, TankInputs, TankParameters};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -41,7 +41,7 @@ fn liquid(tank: &Tank, p: &[[f64; 3]]) -> Vec<Body> {
 #[track_caller]
 fn assert_same(got: (f64, [f64; 3], [[f64; 3]; 3]), want: &Body) {
     let (mass, center, inertia) = got;
-    // Rounding of some 1000 kg, 1 m and 1000 kg m2.
+    // The tolerance is for rounding errors of about 1000 kg, 1 m and 1000 kg m2.
     assert!((mass / want.0 - 1.0).abs() < 1e-14);
     assert!((V::from(center) - want.1).norm() < 1e-13);
     for i in 0..3 {

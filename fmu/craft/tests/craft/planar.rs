@@ -1,4 +1,4 @@
-//! Tanks without axial symmetry: modes that swing in one plane.
+//! Tests of tanks without axial symmetry, whose modes swing in one plane.
 
 use craft::{
     Coupling, Inertia, Inputs, Line, MODES, Mount, POINTS, Parameters, Ramp, STATES, TANK_STATES,
@@ -11,8 +11,8 @@ use super::exchange::{HostWithTanks, runge_kutta};
 use super::random::Random;
 use super::seeds::every_or;
 
-/// Returns a box with 1000 kg of liquid, as wide as deep along y and twice as long along x. It has one mode along each
-/// axis, and their masses add up to more than the liquid's.
+/// Returns a box with 1000 kg of liquid, which is as deep as it is wide along y and twice as long along x. It has one mode
+/// along each axis. The masses of both modes add up to more than the mass of the liquid.
 fn a_box() -> Tank {
     let mut tank = Tank {
         position: [0.0; 3],
@@ -40,8 +40,8 @@ fn craft(tank: Tank) -> Parameters {
     p
 }
 
-/// A craft with a box that moves in a plane of symmetry has, at any amplitude, the motion of a craft with an
-/// axisymmetric tank. The mode along the other axis is then rigid at its position at rest.
+/// A craft with a box that moves in a plane of symmetry moves, at any amplitude, as a craft with an axisymmetric tank. The
+/// mode along the other axis is then rigid at its position at rest.
 #[test]
 fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
     for along in [0, 1] {
@@ -50,7 +50,8 @@ fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
         for all in [&mut around.mass, &mut around.length, &mut around.hinge] {
             all[0] = all[along];
         }
-        // m_0 and the bob across as one body, its inertia about the axis that the motion turns about.
+        // m_0 and the bob of the mode across the plane are combined into one body, with its inertia about the axis about
+        // which the motion rotates.
         let (m, z) = (planar.mass[across], planar.hinge[across] - planar.length[across]);
         around.m_0 = planar.m_0 + m;
         around.h_0 = (planar.m_0 * planar.h_0 + m * z) / around.m_0;
@@ -78,16 +79,18 @@ fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
         let same = (0..index::BOBS).map(|i| (i, i)).chain(bob(along).zip(bob(0)));
         for (i, k) in same {
             let (got, want) = (planar[i], around[k]);
-            // 1e-12 a step, grown over 4 s; bob.rs against constrained.rs.
+            // Each step has an error of 1e-12, which grows over 4 s. The two motions are computed by bob.rs and
+            // constrained.rs.
             assert!((got - want).abs() < 1e-10 * (1.0 + want.abs()), "{along} [{i}]: {got} {want}");
         }
-        // Across nothing moves.
+        // Nothing moves perpendicular to the plane.
         assert!((planar[bob(across)][2] + 1.0).abs() < 1e-14);
     }
 }
 
-/// Expected: k/m (1 + m/M + m z^2/I_y + m y^2/I_z) of a free craft without thrust. z is the bob's height and y the arm
-/// of its line of motion, both from the centre of mass of the remaining body, with mass M and moments of inertia I.
+/// The expected squared frequency of a free craft without thrust is k/m (1 + m/M + m z^2/I_y + m y^2/I_z). z is the bob's
+/// height and y the distance of its line of motion, both from the centre of mass of the remaining body, with mass M and
+/// moments of inertia I.
 #[test]
 fn a_free_body_with_a_planar_mode_off_its_axis_has_the_closed_form_s_frequency() {
     for along in [0, 1] {
@@ -112,7 +115,8 @@ fn a_free_body_with_a_planar_mode_off_its_axis_has_the_closed_form_s_frequency()
     }
 }
 
-/// On a craft too heavy to turn, a box has a frequency along each axis, and a motion that starts along one axis stays along it.
+/// On a craft that is too heavy to rotate, a box has one frequency along each axis, and a motion that starts along one axis
+/// stays along this axis.
 #[test]
 fn a_box_at_rest_under_gravity_has_two_frequencies() {
     let heavy = 1e11;
@@ -123,21 +127,21 @@ fn a_box_at_rest_under_gravity_has_two_frequencies() {
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     for n in [0, 1] {
         let mut dx = [0.0; STATES];
-        // Both directions of every bob.
+        // The test covers both directions of every bob.
         for bob in [index::bob(0, 0), index::bob(0, 1)] {
             (dx[bob], dx[bob + 1]) = (1.0, 1.0);
         }
         let rate = craft.directional_derivative(&u, &dx, &Default::default());
         let at = index::bob(0, n) + 3;
         let want = 9.81 / p.tank[0].length[n];
-        // Its 1000 kg turn 1e11 kg m2 by 1e-8 of it.
+        // The 1000 kg of liquid rotate the craft's 1e11 kg m2 by 1e-8 of the slosh angle.
         assert!((-rate[at + n] / want - 1.0).abs() < 1e-7, "{n}: {} {want}", rate[at + n]);
         assert_eq!(rate[at + 1 - n], 0.0);
     }
 }
 
-/// For example `diameter`, `fill.points` or `ball.travel` together with `direction` or `dI_y`; the error names both
-/// parameters.
+/// For example `diameter`, `fill.points` or `ball.travel` is refused together with `direction` or `dI_y`. The
+/// message contains both parameters.
 #[test]
 fn options_of_axisymmetric_tanks_are_refused_together_with_options_of_asymmetric_tanks() {
     type Change = fn(&mut Tank);
@@ -170,7 +174,8 @@ fn options_of_axisymmetric_tanks_are_refused_together_with_options_of_asymmetric
     assert!(p.problems()[0].starts_with(names));
 }
 
-/// Rigid liquid of negative mass is allowed only with planar modes, and craft and liquid together must have positive inertia.
+/// Rigid liquid of negative mass is allowed only with planar modes, and only if craft and liquid together have positive
+/// inertia.
 #[test]
 fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_positive() {
     let mut p = craft(a_box());
@@ -189,8 +194,8 @@ fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_posi
     assert!(p.problems()[0].starts_with("tank[1].direction[2] = "), "{:?}", p.problems());
 }
 
-/// 10 kg of craft carry a box whose m_0 is -120 kg: at rest both modes carry the craft along the axis, at 90 degrees none does.
-/// Earlier versions found the craft regular and its inputs wrong once it moved. A craft in which the rigid part is enough is accepted.
+/// A craft of 10 kg has a box whose m_0 is -120 kg. At rest the masses of both modes make the mass matrix regular; if both
+/// modes swing by 90 degrees, it is singular.
 #[test]
 fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_allowed() {
     let light = |mass: f64| {
@@ -198,9 +203,10 @@ fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_all
         p.craft.mass = mass;
         p
     };
-    // Its mass matrix is singular only where planar modes swing beyond 45 degrees, out of the range of the model.
+    // The mass matrix of this craft is singular only where planar modes swing beyond 45 degrees, out of the
+    // range of the model.
     assert_eq!(light(10.0).problems(), [""; 0]);
-    // Craft and rigid liquid alone have 880 kg and inertia about every axis, to which bobs only add.
+    // Craft and rigid liquid have 880 kg and positive inertia about every axis even without bobs, which only add inertia.
     assert_eq!(light(1000.0).problems(), [""; 0]);
     let host = TankParameters {
         tank: a_box(),
@@ -212,8 +218,8 @@ fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_all
     assert_eq!(host.problems(), [""; 0]);
 }
 
-/// A craft without inertia about its own axis has only the inertia of the liquid in a tank off the axis. While the
-/// liquid flies, even this inertia is missing.
+/// A craft without inertia about its own axis has only the inertia of the liquid in a tank away from the axis. While the
+/// liquid is in flight, the craft does not even have this inertia.
 #[test]
 fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_may_detach() {
     let mut p = Parameters::default();
@@ -230,9 +236,8 @@ fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_m
 
 type V = Vector3<f64>;
 
-/// Returns the momentum and the angular momentum about the inertial origin, and the energy, of a
-/// craft with its tanks, computed from positions and velocities of every mass. This sum is
-/// independent of the craft's outputs.
+/// Returns the momentum and the angular momentum about the inertial origin, and the energy, of a craft with its tanks, as a
+/// sum over the positions and velocities of all masses, without the craft's outputs.
 fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
     let v = |at: usize| V::from_column_slice(&x[at..at + 3]);
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(x[0], x[1], x[2], x[3]));
@@ -262,7 +267,8 @@ fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
             let place = index::bob(i, n);
             let (rod, rate, l) = (v(place), v(place + 3), tank.length[n]);
             let [along, across] = tank.direction[n];
-            // Off the axis by the arm, on the side from which the direction goes round it.
+            // The line of motion is at the distance `arm` from the axis, on the side on which a motion along the direction
+            // goes around the axis in the positive sense.
             let aside = V::new(along, across, 0.0).try_normalize(0.0).unwrap_or_default();
             let hinge = aside.cross(&V::z()) * tank.arm[n] + V::z() * tank.hinge[n];
             add(tank.mass[n], at(hinge + rod * l), zero, axes * rate * l);
@@ -273,8 +279,8 @@ fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
     [p.x, p.y, p.z, h.x, h.y, h.z, energy + springs]
 }
 
-/// Nothing acts on a body whose host solves (M_body + sum of M_a) [a; w'] = rest + sum of bias. It conserves momentum
-/// and angular momentum in every stage of the host's integrator, and loses the energy that the tanks dissipate.
+/// A host without external forces solves (M_body + sum of M_a) [a; w'] = rest + sum of bias. Its body conserves momentum and
+/// angular momentum in every stage of the host's integrator, and loses the energy that the tanks dissipate.
 #[test]
 fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_dissipate() {
     let mut telling = 0;
@@ -284,7 +290,7 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
         let mut p = random.parameters();
         random.make_all_planar(&mut p);
         for tank in &mut p.tank {
-            // Held, so that bias does not hang on the acceleration that it is to give.
+            // The drag is constant, so that bias does not depend on the acceleration that the host computes from it.
             tank.zeta = [0.05; MODES];
         }
         let u = Inputs::default();
@@ -295,7 +301,7 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
         let (before, after) = (sums(&p, &start), sums(&p, &x));
         let size = before.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
         for i in 0..6 {
-            // (h w)^5/120 of bobs at up to 60 1/s, 4000 times; drift of |p| alike.
+            // The error is (h w)^5/120 in each of 4000 steps, for bobs at up to 60 1/s. The lengths |p| drift by as much.
             let off = (after[i] - before[i]).abs();
             assert!(off < 1e-10 * size, "{seed} [{i}] {off:e} of {size}");
         }
@@ -314,8 +320,8 @@ fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     TankInputs { a: at(&u.a), omega, omega_dot: at(&u.omega_dot), ..*u }
 }
 
-/// One step of 2 s gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives, for every
-/// law of drag. A mass flow has no effect.
+/// One step of 2 s gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives, for
+/// every damping law. A mass flow has no effect in these tanks.
 #[test]
 fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
     for seed in every_or(&[0, 1, 2, 3], 0..8) {
@@ -352,7 +358,8 @@ fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
         let (whole, cut) = (whole.continuous_states(), cut.continuous_states());
         for i in 0..TANK_STATES {
             let size = 1.0 + whole[i].abs();
-            // 1e-12 a step, grown over 2 s; Runge-Kutta as in `exchange.rs`.
+            // Each step has an error of 1e-12, which grows over 2 s. The error of the Runge-Kutta method is explained in
+            // `exchange.rs`.
             assert!(
                 (cut[i] - whole[i]).abs() < 1e-10 * size,
                 "{seed} [{i}] {} {}",
@@ -365,8 +372,8 @@ fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
     }
 }
 
-/// In a tank that is held, the squared frequency along each axis is g/l. If the tank is accelerated along x, the host feels at
-/// first only the liquid's mass less the masses of the modes that swing along x.
+/// In a tank that is held, the squared frequency along each axis is g/l. If the tank is accelerated along x, the host at
+/// first feels only the mass of the liquid minus the masses of the modes that swing along x.
 #[test]
 fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
     let p = TankParameters { tank: a_box(), ..TankParameters::default() };
@@ -382,7 +389,7 @@ fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
         moved.set_continuous_states(&x);
         let got = -moved.derivatives(&u)[6 * along + 3 + along] / small;
         let want = 9.81 / p.tank.length[along];
-        // sin of 1e-6
+        // The test compares the sine of an angle of 1e-6 rad.
         assert!((got / want - 1.0).abs() < 1e-11, "{along}: {got} {want}");
         let diagonal = out.added_mass[if along == 0 { 0 } else { 6 }];
         assert!((diagonal - (1000.0 - p.tank.mass[along])).abs() < 1e-10, "{along} {diagonal}");
@@ -390,7 +397,7 @@ fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
     assert!((out.mass - 1000.0).abs() < 1e-10);
 }
 
-/// Refused are liquid whose total mass is negative, and liquid that leaves the host without positive inertia.
+/// A tank is refused if the total mass of its liquid is negative, or if it leaves the host without positive inertia.
 #[test]
 fn a_tank_with_negative_total_liquid_mass_is_refused() {
     let mut p = TankParameters { tank: a_box(), ..TankParameters::default() };

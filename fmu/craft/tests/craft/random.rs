@@ -1,4 +1,4 @@
-//! Random craft, states and inputs, of the sizes that spacecraft have.
+//! Random craft, states and inputs, with the sizes of real spacecraft.
 
 use craft::{
     APPENDAGES, Craft, DampingLaw, FillTable, Inertia, Init, Inputs, Line, Mount, POINTS,
@@ -28,8 +28,8 @@ impl Random {
         [(); N].map(|()| self.between(-size, size))
     }
 
-    /// Returns a random tank. Half the bobs have centring stiffness, a third have no damping; the drag depends neither on
-    /// acceleration nor on amplitude.
+    /// Returns a random tank. Half of the bobs have centring stiffness, and a third have no damping. The drag depends
+    /// neither on acceleration nor on amplitude.
     pub fn tank(&mut self) -> Tank {
         let mut tank = Tank {
             position: self.vector(0.8),
@@ -56,18 +56,19 @@ impl Random {
         tank
     }
 
-    /// Makes the drag of a tank's bobs follow acceleration and amplitude, by every law. Half of the
-    /// bobs have drag that grows with the amplitude, and half of these have waves that break.
+    /// Makes the drag of a tank's bobs depend on acceleration and amplitude, by every damping law. Half of the bobs have
+    /// drag that grows with the amplitude, and half of these have breaking waves.
     pub fn follow(&mut self, tank: &mut Tank) {
         tank.damping_law = DampingLaw::ALL[self.below(3)];
-        // Wide enough for differences of the kink there is without it at reversed thrust.
+        // Under reversed thrust a_+ has a corner, which this g_floor rounds so widely that finite differences resolve it.
         tank.g_floor = self.between(0.3, 1.0);
         for growth in &mut tank.zeta_amplitude {
             *growth = [0.0, self.between(0.0, 0.1)][self.below(2)];
         }
         for (n, growth) in tank.zeta_amplitude.iter_mut().enumerate() {
             if *growth > 0.05 {
-                // 0.025 to 0.05 from a steepness of 0 to 0.5; every other one without growth below it.
+                // The coefficient is 0.025 to 0.05 and the steepness 0 to 0.5. Every second of these modes has no drag that
+                // grows below the steepness.
                 (tank.zeta_breaking[n], tank.breaking_steepness[n]) =
                     (0.5 * *growth, 10.0 * (*growth - 0.05));
                 *growth *= f64::from((*growth * 1e6) as u32 % 2);
@@ -86,8 +87,8 @@ impl Random {
         p.tank.iter_mut().for_each(|tank| self.bend_further(tank));
     }
 
-    /// Gives the bobs of a tank that keeps its liquid coefficients beyond the third order, those that rotate also inertia of
-    /// rotary motion. No inertia vanishes at any angle.
+    /// Gives the bobs of a tank that does not drain coefficients beyond the third order, and in modes with rotary motion
+    /// also rotary inertia. The inertia is positive at every angle.
     pub fn bend_further(&mut self, tank: &mut Tank) {
         if tank.fill.points > 0 {
             return;
@@ -136,7 +137,8 @@ impl Random {
         nonlinear_stiffness.as_flattened_mut().fill_with(|| self.between(0.3, 2.5));
     }
 
-    /// Makes a tank asymmetric: two thirds of its modes are planar, and it has less rigid liquid than the mass of these modes.
+    /// Makes a tank asymmetric: two thirds of its modes are planar, and the mass of its rigid liquid is smaller than the
+    /// mass of these modes.
     pub fn make_planar(&mut self, tank: &mut Tank) {
         let bobs: f64 = tank.mass[..tank.modes].iter().sum();
         tank.m_0 = f64::max(tank.m_0 * self.between(-0.1, 1.0), -0.5 * bobs);
@@ -149,7 +151,7 @@ impl Random {
                 tank.arm[n] = self.between(-0.3, 0.3);
             }
         }
-        // At least one, which makes them effective below 0.
+        // At least one mode is planar, which allows a negative m_0.
         if tank.direction[0] == [0.0; 2] {
             tank.direction[0] = [0.0, 1.0];
         }
@@ -182,8 +184,8 @@ impl Random {
         }
     }
 
-    /// Gives a craft up to six modes of appendages, below 2 Hz, that carry a tenth of its mass and inertia each at most and start
-    /// at deflections that no appendage survives.
+    /// Gives a craft up to six modes of appendages, below 2 Hz. Each mode participates with at most a tenth of the mass and
+    /// inertia of the craft. The initial deflections are larger than a real appendage could have.
     pub fn flex(&mut self, p: &mut Parameters) {
         let (mass, moment) = (p.craft.mass.sqrt(), p.craft.j.xx.min(p.craft.j.zz).sqrt());
         p.appendages = 1 + self.below(APPENDAGES);
@@ -204,7 +206,8 @@ impl Random {
         let k = [(); 2].map(|()| self.magnitude(1e2, 1e4));
         let mut torques = || [(); 3].map(|()| self.magnitude(0.1, 10.0));
         let (c, d) = (torques(), torques());
-        // So wide that differences and sums over time see it, too; steep signs are in tilting.rs.
+        // The Stribeck curve is so wide that finite differences and sums over time resolve it; narrow curves
+        // are tested in tilting.rs.
         let friction = PivotFriction { c, d, omega_s: 2.0, eps: 0.5 };
         Pivot { k, c: [(); 3].map(|()| self.magnitude(1.0, 100.0)), friction }
     }
@@ -220,8 +223,8 @@ impl Random {
     }
 }
 
-/// Returns a tank with a fill table: an upright cylinder of 0.45 m radius with `modes` modes,
-/// rotated and off the craft's centre. With an odd number of modes the table has damping ratios.
+/// Returns a tank with a fill table: an upright cylinder of 0.45 m radius with `modes` modes, rotated and off the craft's
+/// centre. If the number of modes is odd, the table contains damping ratios.
 pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
     let mut tank = Tank { modes, diameter: 0.0, ..random.tank() };
     let mut table = FillTable { points: POINTS, ..tank.fill };
@@ -229,7 +232,7 @@ pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
         let depth = 0.15 + 0.1 * i as f64;
         let liquid = 1000.0 * std::f64::consts::PI * 0.45 * 0.45 * depth;
         table.liquid[i] = liquid;
-        // Potential flow: some 40 % in the first mode of a half-full tank, less above.
+        // By potential flow the first mode of a half-full tank contains some 40 % of the liquid, and less in a fuller tank.
         let mut left = liquid;
         for n in 0..modes {
             let xi = [1.8412, 5.3314, 8.5363][n];
@@ -250,9 +253,8 @@ pub fn draining_tank(random: &mut Random, modes: usize) -> Tank {
     tank
 }
 
-/// Returns a craft with one to three draining tanks and one tank that keeps its liquid. From seed
-/// 20 on bobs move on surfaces other than spheres, and from seed 40 on these surfaces depend on the
-/// fill.
+/// Returns a craft with one to three draining tanks and one tank that does not drain. From seed 20 on the bobs move on
+/// surfaces other than spheres, and from seed 40 on these surfaces depend on the fill.
 pub fn draining_craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();

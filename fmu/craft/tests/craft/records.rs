@@ -1,5 +1,5 @@
-//! Reference records in ../six.json: an excerpt of motions that were computed with two further implementations of the equations,
-//! one of them in 113-bit arithmetic. The entry `about` in the file describes its signals.
+//! Reference records in ../six.json: motions that were computed with two other implementations of the equations, one of them
+//! in 113-bit arithmetic. The entry `about` of the file describes the signals.
 
 use craft::{
     Craft, DampingLaw, Inertia, Init, Inputs, Line, Mount, Parameters, Ramp, TANKS, Tank,
@@ -9,11 +9,11 @@ use serde_json::Value;
 
 use super::component::{SloshTank, Spacecraft};
 
-/// Communication step of the records, s: inputs are linear between its multiples.
+/// Communication step of the records, s. Between its multiples the inputs are linear.
 pub const STEP: f64 = 0.02;
 
-/// Reads the records of the kind `craft` or `tank`. The variable SIX_JSON can name another file of the same
-/// form, such as the complete one.
+/// Reads the records of the kind `craft` or `tank`. The environment variable SIX_JSON may contain the path of another file
+/// of the same form, for example of the complete records.
 pub fn records(kind: &str) -> Vec<Value> {
     let text = match std::env::var("SIX_JSON") {
         Ok(file) => std::fs::read_to_string(file).unwrap(),
@@ -69,7 +69,7 @@ fn tank(value: &Value) -> Tank {
         (tank.mass[n], tank.length[n], tank.hinge[n]) = (get("m"), get("l"), get("h"));
         tank.k[n] = get("k");
         tank.zeta[n] = 0.5;
-        // c = 2 zeta m sqrt(g_ref/l + k/m), the other way round.
+        // This inverts c = 2 zeta m sqrt(g_ref/l + k/m).
         tank.zeta[n] *= get("c") / tank.drag(n);
         tank.p_0[n] = array(&mode["p"], [0.0; 3]);
         tank.p_dot_0[n] = array(&mode["p_dot"], [0.0; 3]);
@@ -109,8 +109,8 @@ pub fn tank_parameters(record: &Value) -> TankParameters {
     TankParameters { tank: tank(&record["tank"]), ..TankParameters::default() }
 }
 
-/// Returns an input of the craft from knot k to the next, as value and slope: the sum of those
-/// `terms` that belong to `port`.
+/// Returns an input of the craft between time knot k and the next as a ramp (value and slope): the sum of the `terms`
+/// whose port is `port`.
 fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
     let knot = |k: usize| k as f64 * STEP;
     let mut ends = [[0.0; 3]; 2];
@@ -118,8 +118,8 @@ fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
     for term in terms.iter().filter(|term| term["port"] == port) {
         let (dir, get) = (numbers(&term["dir"]), |name: &str| term[name].as_f64().unwrap_or(0.0));
         let middle = knot(k) + STEP / 2.0;
-        // Frequencies are multiples of 0.001 Hz, so the cycles at a knot are a fraction of whole
-        // numbers. Far from t = 0, an angle of many turns would have lost digits.
+        // All frequencies are multiples of 0.001 Hz, so that the number of cycles at a knot is computed from whole numbers.
+        // Far from t = 0 the sine of an angle of many turns would have fewer digits.
         let cycles = |k: usize| {
             let per_knot = (get("freq") * 1000.0).round() as usize * 2;
             (per_knot * k % 100_000) as f64 / 1e5
@@ -167,7 +167,7 @@ pub fn at_end(inputs: &Inputs) -> Inputs {
     }
 }
 
-/// Returns the host's motion from knot k to the next, where its rate is `omega` at the knot.
+/// Returns the host's motion between time knot k and the next. `omega` is the angular velocity at knot k.
 pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
     let terms = &record["motion"];
     TankInputs {

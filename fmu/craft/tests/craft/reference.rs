@@ -1,4 +1,4 @@
-//! Spacecraft and SloshTank agree with the reference records within the digits of the records.
+//! Spacecraft and SloshTank agree with the reference records, within the number of digits that each record states.
 
 use std::collections::BTreeMap;
 
@@ -19,15 +19,15 @@ impl Deviations {
         assert_eq!(want.len(), got.len(), "{signal}");
         let (worst, scale) = self.0.entry(signal.into()).or_insert((0.0, largest));
         for (got, want) in got.iter().zip(want) {
-            // NaN counts.
+            // Written so that NaN counts as a deviation.
             let deviation = (got - want).abs();
             *worst = if deviation <= *worst { *worst } else { deviation };
         }
         assert_eq!(*scale, largest);
     }
 
-    /// Lists the signals whose difference from the record exceeds the digits that the record
-    /// promises. The record's numbers are rounded to 14 digits, which `digits_of` includes.
+    /// Returns a line for each signal whose difference from the record exceeds the digits that the record states. The
+    /// numbers in the record are rounded to 14 digits, which `digits_of` takes into account.
     fn excess(&self, record: &Value) -> Vec<String> {
         let name = record["name"].as_str().unwrap();
         let mut excess = Vec::new();

@@ -1,8 +1,9 @@
-//! Every number has a range: at the ends of the range it is accepted, beyond the ends it is refused by name.
+//! Tests of the ranges of all numeric parameters: at the ends of its range a parameter is accepted, and beyond them it is
+//! refused with a message that contains its name.
 
 use craft::{Inertia, Inputs, MODES, Mount, POINTS, Parameters, Spacecraft, Tank, TankParameters};
 
-/// A parameter: its name in messages, its place, and its range.
+/// A parameter: its name in messages, a function that returns a reference to its value, and the ends of its range.
 type Number = (&'static str, fn(&mut Parameters) -> &mut f64, f64, f64);
 
 const NUMBERS: [Number; 22] = [
@@ -83,7 +84,7 @@ fn parameters_are_accepted_up_to_the_ends_of_their_ranges_and_refused_beyond() {
             );
             let below = if low == 0.0 { -1e-300 } else { low - low.abs() * 1e-9 };
             for value in [below, high * (1.0 + 1e-9), f64::NAN, f64::INFINITY] {
-                // A diameter of 0 or less is not a cylinder.
+                // With a diameter of 0 or less the tank is not a cylinder, so that the value is accepted.
                 if name == "tank[1].diameter" && (0.0..high).contains(&value) {
                     continue;
                 }
@@ -131,7 +132,8 @@ fn an_initial_velocity_is_refused_only_on_a_pivot() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// For each pair of axes |J_ij|^2 may be up to J_ii J_jj. A rod, J = (0, 1, 1) along x, has exactly this value in rotated axes.
+/// For each pair of axes |J_ij|^2 may be up to J_ii J_jj. A thin rod, J = (0, 1, 1) along x, has exactly this
+/// value in rotated axes.
 #[test]
 fn products_of_inertia_need_moments_of_inertia_large_enough() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
@@ -141,7 +143,7 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
     };
     let base = [200.0, 250.0, 300.0, 0.0, 0.0, 0.0];
     assert_eq!(with(base), [""; 0]);
-    // 10 % above the root of the product of its two moments; the other products say nothing.
+    // This product of inertia is 10 % above the root of the product of its two moments; only this product is reported.
     for (i, name, most) in [
         (3, "craft.Jxy^2 = ", 50_000f64),
         (4, "craft.Jxz^2 = ", 60_000f64),
@@ -158,24 +160,25 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
             assert_eq!(with(j), [""; 0], "{name}");
         }
     }
-    // A rod in the plane of two axes has |J_xy|^2 = J_xx J_yy but for rounding.
+    // A thin rod in the plane of two axes has |J_xy|^2 = J_xx J_yy, except for rounding errors.
     for degrees in 1..90 {
         let (s, c) = f64::from(degrees).to_radians().sin_cos();
         assert_eq!(with([s * s, c * c, 1.0, -s * c, 0.0, 0.0]), [""; 0], "{degrees}");
     }
-    // Every pair is consistent and one principal moment is below 0. With equal moments 1 and products c the determinant
-    // is 1 + 2 c^3 - 3 c^2 = (1 - c)^2 (1 + 2 c), negative below c = -1/2.
+    // Each pair of moments is consistent with its product, but one principal moment is below 0. With equal moments 1 and
+    // products c the determinant is 1 + 2 c^3 - 3 c^2 = (1 - c)^2 (1 + 2 c), which is negative for c below -1/2.
     let equal = |c: f64| with([1.0, 1.0, 1.0, c, c, c].map(|x| 100.0 * x));
     let negative = equal(-0.51);
     assert!(negative.len() == 1, "{negative:?}");
     assert!(negative[0].contains("the inertia matrix is -45602"), "{negative:?}");
     assert_eq!(equal(-0.49), [""; 0]);
-    // So for a craft of any size.
+    // The same is true for a craft of any size.
     let small = with([1.0, 1.0, 1.0, -0.51, -0.51, -0.51].map(|x| 1e-6 * x));
     assert!(small.len() == 1 && small[0].contains("negative principal moment"), "{small:?}");
     let wide = with([1.0, 1.0, 2.5, 0.0, 0.0, 0.0].map(|x| 1e-6 * x));
     assert!(wide.len() == 1 && wide[0].contains("exceeds"), "{wide:?}");
-    // Unequal ones: 2 3 5 + 2 d - (2 yz^2 + 3 xz^2 + 5 xy^2), d the product of all three.
+    // With the moments 2, 3 and 5 the determinant is 30 + 2 d - (2 yz^2 + 3 xz^2 + 5 xy^2), where d is the product of
+    // xy, xz and yz.
     let [xy, xz, yz] = [0.7, -1.1, 2.0f64];
     let determinant = 30.0 + 2.0 * xy * xz * yz - 2.0 * yz * yz - 3.0 * xz * xz - 5.0 * xy * xy;
     let scaled = |factor: f64| {
@@ -183,7 +186,7 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
         with(c).iter().any(|text| text.contains("negative principal moment"))
     };
     assert!(determinant > 0.0 && !scaled(1.0));
-    // With yz alone the bracket vanishes where 2 yz^2 + 1.54 yz - 23.92 = 0: at 3.0949.
+    // If only yz changes, the determinant vanishes where 2 yz^2 + 1.54 yz - 23.92 = 0, that is, at 3.0949.
     assert!(!scaled(3.09 / 2.0) && scaled(3.10 / 2.0));
 }
 
@@ -202,7 +205,7 @@ fn a_slosh_frequency_must_give_a_pendulum_length() {
     assert!(problems.len() == 1, "{problems:?}");
     assert!(problems[0].starts_with("tank[1].frequency[1] = 0.317"), "{problems:?}");
     assert!(problems[0].contains("above 0.318309"), "{problems:?}");
-    // A length of 1e-6 m at 1.5 m/s2: sqrt(1.5e6)/2 pi
+    // The frequency of a pendulum of 1e-6 m at 1.5 m/s2 is sqrt(1.5e6)/(2 pi).
     assert!(problems[0].contains("below 194.9"), "{problems:?}");
     p.tank[0].frequency[0] = 195.0;
     assert_eq!(p.problems().len(), 1);
@@ -210,7 +213,7 @@ fn a_slosh_frequency_must_give_a_pendulum_length() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// The mass of liquid must increase from point to point and must be at least the sum of the modal masses.
+/// The mass of liquid must increase from point to point, and must be at least the sum of the modal masses.
 #[test]
 fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     let with = |change: fn(&mut Tank)| {
@@ -236,17 +239,17 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     one(|t| t.liquid_0 = 190.9, "tank[1].liquid_0 = 190.9");
     assert_eq!(with(|t| t.liquid_0 = t.fill.liquid[2]), [""; 0]);
     one(|t| t.fill.mass[0][2] = 190.0, "tank[1].fill.mass at point 3 adds up to 193.9");
-    // All of the liquid, exactly.
+    // The modal masses may be exactly the mass of the liquid.
     let all = |t: &mut Tank| t.fill.mass[0][2] = t.fill.liquid[2] - t.fill.mass[1][2];
     let problems = with(all);
     assert!(problems.iter().all(|text| !text.contains("adds up")), "{problems:?}");
     one(|t| t.diameter = 0.9, "tank[1].diameter cannot be combined with tank[1].fill");
     one(|t| t.frequency[1] = 1.0, "tank[1].frequency cannot be combined with tank[1].fill");
-    // The third mode is not kept.
+    // The table's values of the third mode are not checked, because the tank has two modes.
     assert_eq!(with(|t| t.fill.mass[2][0] = 1e9), [""; 0]);
 }
 
-/// A host without inertia about its z axis is refused; with a second problem, both are returned.
+/// A host without inertia about its z axis is refused. If there is a second problem, both messages are returned.
 #[test]
 fn a_host_without_inertia_about_an_axis_is_refused() {
     let mut p =
@@ -263,7 +266,8 @@ fn a_host_without_inertia_about_an_axis_is_refused() {
     assert_eq!(p.problems().len(), 2);
 }
 
-/// Unused tanks, modes and points have numbers that would be refused, or cause a division by 0, if they were in use.
+/// The values of tanks, modes and points that are not in use would be refused, or would cause a division by 0, if
+/// they were in use.
 #[test]
 fn unused_tanks_modes_and_table_points_are_never_evaluated() {
     let step = |p: &Parameters| {

@@ -1,5 +1,5 @@
-//! Communication points while inputs are held change no bit of the motion, because they lie within expansions that do not depend
-//! on them.
+//! While the inputs are constant, additional communication points change no bit of the motion, because they lie within power
+//! series that do not depend on them.
 
 use craft::{INPUTS, Inputs, Mount, Parameters, Ramp, STATES, Spacecraft, State, index};
 
@@ -21,8 +21,8 @@ fn random_rows(random: &mut Random, total: f64) -> Vec<f64> {
     times.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Returns a craft of the given kind: pendulums, drag that follows the motion, other surfaces, planar modes, a pivot with dry friction,
-/// liquid that may detach, flexible appendages, or spinning liquid.
+/// Returns a craft of the given kind: with pendulums, drag that depends on the motion, other surfaces than spheres, planar
+/// modes, a pivot with dry friction, liquid that may detach, flexible appendages, or spinning liquid.
 fn craft_of(kind: usize, seed: u64) -> (Parameters, [Inputs; 4]) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -57,8 +57,8 @@ fn bits(craft: &Spacecraft) -> [u64; STATES] {
     craft.borrow_states().map(f64::to_bits)
 }
 
-/// Runs the craft for 2 s with each of the inputs, with rows from `rows`; `look` is called after each row. Returns the states
-/// at each change of the inputs.
+/// Simulates the craft for 2 s with each of the inputs, with steps that end at the times from `rows`. Calls `look` after
+/// each step. Returns the states at each change of the inputs.
 fn run(
     (p, inputs, tolerance): (&Parameters, &[Inputs; 4], f64),
     mut rows: impl FnMut() -> Vec<f64>,
@@ -116,8 +116,8 @@ fn communication_points_change_no_bit_of_the_motion_while_inputs_are_held() {
     assert!(compared > 50, "{compared}");
 }
 
-/// Between rows a host may read outputs (also under other inputs), derivatives and event indicators, and may save and restore the
-/// state.
+/// Between steps a host may read outputs (also for other inputs), derivatives and event indicators, and may save and restore
+/// the state, without changing the motion.
 #[test]
 fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
     every_kind(|motion, kind, seed| {
@@ -150,8 +150,8 @@ fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
     });
 }
 
-/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. Events are roots of the Taylor
-/// series of a whole integration step, and output rows do not shorten this step.
+/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. Events are roots of the power
+/// series of a whole internal step, which output rows do not shorten.
 #[test]
 fn the_spacing_of_output_rows_changes_no_bit_of_the_motion_of_detached_liquid() {
     let mut p = Parameters::default();
@@ -188,7 +188,8 @@ fn states_that_are_set_start_a_new_expansion() {
     assert!((turned - 0.1).abs() < 0.05, "{turned}");
 }
 
-/// Returns the largest error of attitude, rate and bobs after 20 s of inputs that change every `h` seconds.
+/// Returns the largest error of attitude, angular velocity and bobs after 20 s of inputs that change every `h` seconds, so
+/// that a power series starts at each change.
 fn error_of_restarts(h: f64, tolerance: f64) -> f64 {
     let (p, _) = craft_of(0, 2);
     let run = |tolerance: f64| {

@@ -1,5 +1,5 @@
-//! Small motions about steady thrust: poles, zeros and the danger zone of the attitude loop from
-//! directional derivatives, compared with closed forms.
+//! Small motions about steady thrust: poles, zeros and unstable slosh locations (danger zone) of the attitude loop, computed
+//! from directional derivatives, equal closed forms.
 //!
 //! All heights are from the centre of mass of the rigid part R (dry craft and rigid liquid), which has the mass M and the
 //! transverse inertia I about this centre. The hinge is at the height h, the bob at b = h - l, and a lateral force acts at z_f:
@@ -86,7 +86,8 @@ impl Closed {
     }
 }
 
-/// Returns the derivatives of w_y' and of the first bob's p_x'' by one state or along a direction of the inputs.
+/// Returns the derivatives of w_y' and of the first bob's p_x'' with respect to one state, or for a change of
+/// the inputs by `du`.
 fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f64; 2] {
     let mut dx = [0.0; STATES];
     if let Some(at) = state {
@@ -96,14 +97,15 @@ fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f
     [rate[PITCH_RATE], rate[SLOSH_RATE]]
 }
 
-/// Returns pole^2, the damping 2 zeta_p w_p, and zero^2 of theta over the given input.
+/// Returns the squared pole, the damping 2 zeta_p w_p, and the squared zero of theta with respect to the input that `du`
+/// describes.
 fn pole_and_zero(p: &Parameters, du: [f64; INPUTS]) -> [f64; 3] {
     let mut craft = Spacecraft::new(p, &inputs(), 0.0, 1e-9).unwrap();
     let [alpha, gamma] = column(&mut craft, Some(SLOSH), [0.0; INPUTS]);
     let [_, delta] = column(&mut craft, Some(SLOSH_RATE), [0.0; INPUTS]);
     let [b_w, b_p] = column(&mut craft, None, du);
-    // p'' = gamma p + delta p' + b_p u, w' = alpha p + ... + b_w u; without damping
-    // w/u = 0 at s^2 = gamma - alpha b_p/b_w.
+    // The equations are p'' = gamma p + delta p' + b_p u and w' = alpha p + ... + b_w u. Without damping w/u = 0 at s^2 =
+    // gamma - alpha b_p/b_w.
     [-gamma, -delta, -(gamma - alpha * b_p / b_w)]
 }
 
@@ -123,7 +125,7 @@ fn assert_close(got: f64, want: f64, tolerance: f64) {
     assert!((got / want - 1.0).abs() < tolerance, "{got} {want}");
 }
 
-/// The results are also compared with numbers of 10 to 13 digits that were computed independently of this code.
+/// The results also agree with numbers of 10 to 13 digits that were computed independently of this code.
 #[test]
 fn poles_and_zeros_are_the_closed_forms_with_and_without_centring_stiffness() {
     let numbers = [
@@ -153,12 +155,12 @@ fn a_damped_slosh_pole_equals_the_closed_form() {
     let closed = Closed::new(&p);
     let [w_2, damping, _] = pole_and_zero(&p, torque());
     assert_close(damping, c / closed.m * closed.sigma, 1e-12);
-    // -0.14324119 +- 2.63885131 i: nine digits are given.
+    // The reference pole is -0.14324119 +- 2.63885131 i, of which nine digits are known.
     assert_close(damping / 2.0, 0.14324119, 1e-7);
     assert_close(f64::sqrt(w_2 - damping * damping / 4.0), 2.63885131, 1e-8);
 }
 
-/// Returns -p_x''/p_x of a mode whose craft is too heavy to move and accelerates by g.
+/// Returns -p_x''/p_x, the squared frequency, of a mode in a craft that is too heavy to move and accelerates by g.
 fn frequency_2(tank: Tank, g: f64) -> f64 {
     let mut p = Parameters::default();
     let heavy = 1e11;
@@ -173,7 +175,7 @@ fn frequency_2(tank: Tank, g: f64) -> f64 {
     -craft.directional_derivative(&u, &dx, &[0.0; INPUTS])[SLOSH_RATE]
 }
 
-/// The craft of 1e11 kg moves because of the liquid's 382 kg, which changes the result by 4e-9.
+/// The 382 kg of liquid move the craft of 1e11 kg a little, which changes the result by 4e-9.
 #[test]
 fn a_slosh_mode_oscillates_at_the_frequency_given_as_parameter() {
     for k in [0.0, 60.0] {
@@ -181,7 +183,7 @@ fn a_slosh_mode_oscillates_at_the_frequency_given_as_parameter() {
         (tank.k[0], tank.frequency[0]) = (k, 0.5);
         let w_2 = f64::powi(std::f64::consts::TAU * 0.5, 2);
         assert_close(frequency_2(tank, 2.0), w_2, 1e-8);
-        // Of it k/m stays the same at any acceleration.
+        // The part k/m of the squared frequency is the same at any acceleration.
         let m = tank.mass[0];
         assert_close(frequency_2(tank, 4.0), 2.0 * (w_2 - k / m) + k / m, 1e-8);
     }
@@ -194,7 +196,8 @@ fn centring_stiffness_restores_the_slosh_mass_in_weightlessness() {
     assert_close(frequency_2(tank, 0.0), 60.0 / tank.mass[0], 1e-8);
 }
 
-/// Two equal tanks at +-r, torque about e: zero w_0^2, pole w_0^2 (1 + 2 m r^2/I_z), whatever k.
+/// For two equal tanks at +-r and a torque about e, the squared zero is w_0^2 and the squared pole w_0^2 (1 + 2 m
+/// r^2/I_z), for any k.
 #[test]
 fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
     for (k, pole_given) in [(0.0, 9.785768250592), (30.0, 10.462710224511)] {
@@ -233,16 +236,16 @@ fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
     }
 }
 
-/// Gain K_p of the attitude loop over the inertia I, 1/s2, and, in the next constant, gain K_d over
-/// I: the loop has 0.2 rad/s and the damping ratio 0.7.
+/// Gains of the attitude loop divided by the inertia: K_p/I, 1/s2, and K_d/I, 1/s. The loop has a natural frequency of 0.2
+/// rad/s and the damping ratio 0.7.
 const K_P: f64 = 0.04;
 const K_D: f64 = 0.28;
 
 /// Height of the point at which the lateral force acts, above O, m.
 const ENGINE: f64 = -1.3;
 
-/// Returns the growth rate of the slosh pole, 1/s, in a loop that makes tau = -K_p theta - K_d
-/// theta' by a lateral force at the engine: tau = (z_f - center) f.
+/// Returns the growth rate of the slosh pole, 1/s, in an attitude loop with the torque tau = -K_p theta - K_d theta', which
+/// a lateral force f at the engine exerts: tau = (z_f - center) f.
 fn growth(z: f64, c: f64) -> f64 {
     let p = craft_with_tank_at(z, 0.0, c);
     let closed = Closed::new(&p);
@@ -250,13 +253,13 @@ fn growth(z: f64, c: f64) -> f64 {
     let by = |craft: &mut Spacecraft, at| column(craft, Some(at), [0.0; INPUTS]);
     let [a_wp, a_pp] = by(&mut craft, SLOSH);
     let [a_wd, a_pd] = by(&mut craft, SLOSH_RATE);
-    // A craft that has turned, or turns slowly, feels nothing of it.
+    // Attitude and a slow rotation of the craft have no effect on the derivatives.
     for at in [index::Q + 2, PITCH_RATE] {
         assert!(by(&mut craft, at).iter().all(|x| x.abs() < 1e-13));
     }
     let [b_w, b_p] = column(&mut craft, None, force_at(ENGINE));
     let gain = closed.inertia / (ENGINE - closed.center);
-    // theta, w, p, p'
+    // The states are theta, w, p and p'.
     let open = Matrix4::new(
         0.0, 1.0, 0.0, 0.0, //
         0.0, 0.0, a_wp, a_wd, //
@@ -267,7 +270,7 @@ fn growth(z: f64, c: f64) -> f64 {
     let feedback = Vector4::new(-K_P * gain, -K_D * gain, 0.0, 0.0);
     let closed_loop = open + force * feedback.transpose();
     let poles = closed_loop.complex_eigenvalues();
-    // The slosh poles are the fast ones.
+    // The slosh poles have the largest magnitude.
     poles.iter().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap().re
 }
 
@@ -290,7 +293,7 @@ fn the_growth_rate_of_the_slosh_pole_in_an_attitude_loop_equals_the_analytic_one
         (0.80, 4.5618e-4),
         (1.20, -3.2389e-3),
     ] {
-        // Half a unit of the fifth digit.
+        // The tolerance is half a unit of the fifth digit.
         assert_close(growth(z, 0.0), expected, 5e-5);
     }
 }
@@ -305,8 +308,8 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     low
 }
 
-/// The loop is unstable if the hinge is above R's centre of mass (h > 0) and the bob is below its
-/// centre of percussion (b < I/(M |z_f|)). The ends of the zone are within 1 % of its length.
+/// The loop is unstable if the hinge is above the centre of mass of the rigid part R (h > 0) and the bob is below the centre
+/// of percussion of R (b < I/(M |z_f|)). The ends of this danger zone agree within 1 % of its length.
 #[test]
 fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
     let at = |z: f64| Closed::new(&craft_with_tank_at(z, 0.0, 0.0));
@@ -333,8 +336,8 @@ fn damping_that_stabilises_is_predicted_to_5_percent() {
     }
 }
 
-/// A prolate spinner with liquid at +-x. The growth rate of its nutation, which the dissipation in the liquid causes, equals the eigenvalue
-/// of an independent linearisation, 0.002551418 +- 0.468308812 i.
+/// A prolate spinner has liquid at +-x. The nutation grows because the liquid dissipates energy, at the rate of the
+/// eigenvalue of an independent linearisation, 0.002551418 +- 0.468308812 i.
 #[test]
 fn nutation_of_a_prolate_spinner_grows_at_the_analytic_rate() {
     let mut p = parameters(&record("spinner"));
@@ -342,12 +345,12 @@ fn nutation_of_a_prolate_spinner_grows_at_the_analytic_rate() {
     let u = Inputs::default();
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     let start = craft.continuous_states();
-    // What moves: w, and p and p' of both bobs.
+    // These states change: w, and p and p' of both bobs.
     let places: Vec<usize> = (index::OMEGA..index::OMEGA + 3)
         .chain([0, 1].iter().flat_map(|&i| index::bob(i, 0)..index::bob(i, 0) + 6))
         .collect();
-    // Trim: turn the spin axis and the bobs until w' across the axis and p'' across the rods
-    // vanish; Newton's method with the exact derivatives.
+    // Trim: Newton's method with exact derivatives rotates the spin axis and the bobs until w' perpendicular to the spin
+    // axis and p'' perpendicular to the rods vanish.
     let bobs = [0, 1].map(|i| index::bob(i, 0));
     let free = [index::OMEGA, index::OMEGA + 1, bobs[0], bobs[0] + 1, bobs[1], bobs[1] + 1];
     let rates =
@@ -386,6 +389,6 @@ fn nutation_of_a_prolate_spinner_grows_at_the_analytic_rate() {
         .iter()
         .map(|pole| (pole - given).norm())
         .fold(f64::INFINITY, f64::min);
-    // Half a unit of the ninth decimal, and rounding of an eigenvalue.
+    // The tolerance is half a unit of the ninth decimal, plus the rounding error of an eigenvalue.
     assert!(nearest < 2e-9, "{nearest}");
 }

@@ -41,7 +41,7 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     let mut cylinder = given;
     let tank = &mut cylinder.tank[0];
     (tank.diameter, tank.depth, tank.density) = (0.9, 0.6, 1000.0);
-    // Those count from mid-depth.
+    // The modes of `formulas::cylinder` have their heights from mid-depth.
     tank.position[2] -= 0.3;
     let (got, want) = (after_ten_seconds(&cylinder), after_ten_seconds(&given));
     let off = largest_difference(&got[..index::POSITION], &want[..index::POSITION]);
@@ -50,8 +50,8 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
 }
 
-/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes. The values
-/// equal the properties of liquid under a rigid lid.
+/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes, and equal those of
+/// liquid under a rigid lid.
 #[test]
 fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
     let of = |modes: usize| {
@@ -77,8 +77,8 @@ fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
     }
 }
 
-/// If mass m, drag c and stiffness k of the bobs go to 0 in proportion, the rest of the craft moves as without the bobs, with an
-/// error in proportion to m.
+/// If mass m, drag coefficient c and stiffness k of the bobs go to 0 in proportion, the motion of the craft approaches its
+/// motion without bobs, with an error proportional to m.
 #[test]
 fn bobs_without_mass_move_without_effect_on_the_craft() {
     let mut without = Parameters::default();
@@ -96,8 +96,8 @@ fn bobs_without_mass_move_without_effect_on_the_craft() {
     assert!((ratio / 1e3 - 1.0).abs() < 0.01, "{ratio}");
 }
 
-/// If the length l goes to 0, the bob moves as a mass at its hinge, with an error in proportion to l. The bobs are made to rest
-/// at first; strong damping lets them follow.
+/// If the length l goes to 0, the bob approaches a mass at its hinge, with an error proportional to l. The bobs are at rest
+/// at first, and strong damping keeps them from oscillating.
 #[test]
 fn a_pendulum_without_length_is_a_mass_at_its_hinge() {
     let mut lumped = Parameters::default();
@@ -136,12 +136,11 @@ fn a_tank_without_rigid_liquid_is_allowed() {
             m[(j, i)] = m[(i, j)];
         }
     }
-    // Both bobs hang on the same axis: their directions are the same.
+    // Both bobs have the same direction, because they hang on the same axis.
     assert_eq!(m.symmetric_eigenvalues().iter().filter(|x| x.abs() > 1e-9).count(), 1);
 }
 
-/// The upright position, at which stereographic coordinates fail, is not special for the bob's equations: a motion through it
-/// conserves energy.
+/// A bob may swing through the upright position, at which stereographic coordinates would fail, and its energy is conserved.
 #[test]
 fn a_bob_swings_through_the_upright_position() {
     let mut p = Parameters::default();
@@ -157,14 +156,14 @@ fn a_bob_swings_through_the_upright_position() {
         craft.step(&u, 0.02).unwrap();
         lowest = lowest.min(craft.continuous_states()[index::bob(0, 0) + 2]);
     }
-    assert!(lowest < -0.9, "it swung through: {lowest}");
+    assert!(lowest < -0.9, "the bob did not swing through: {lowest}");
     let end = craft.outputs(&u);
     let residual = end.energy - start.energy - end.work;
     assert!(residual.abs() < 1e-10 * end.work, "{residual}");
 }
 
-/// Without force and stiffness a bob coasts on its sphere: p'' = -|p'|^2 p as seen without the
-/// rotation; here the craft is a billion times heavier.
+/// Without force and stiffness a bob moves on a great circle of its sphere, p'' = -|p'|^2 p, in axes that do not rotate. The
+/// craft is a billion times heavier, so that it does not move.
 #[test]
 fn without_force_and_stiffness_a_bob_coasts_on_its_sphere() {
     let mut p = Parameters::default();
@@ -194,13 +193,13 @@ fn a_rigid_body_without_tanks_precesses_by_euler() {
     for _ in 0..500 {
         craft.step(&u, 0.02).unwrap();
     }
-    // w_x + i w_y turns at (I_z - I)/I w_z.
+    // w_x + i w_y rotates at the rate (I_z - I)/I w_z.
     let (sin, cos) = f64::sin_cos((600.0 - 900.0) / 900.0 * 0.7 * 10.0);
     let want = [0.3 * cos, 0.3 * sin, 0.7];
     assert!(largest_difference(&craft.continuous_states()[index::OMEGA..][..3], &want) < 1e-13);
 }
 
-/// A craft on a pivot moves as a free craft with a very large mass at O, which accelerates by -g.
+/// A craft on a pivot moves as a free craft with a very large mass at O on which the force -g times this mass acts.
 #[test]
 fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
     for seed in 0..5 {
@@ -210,8 +209,8 @@ fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         let u = Inputs { torque: Ramp::held(random.vector(20.0)), ..Inputs::default() };
         let mut pivot = Spacecraft::new(&p, &u, 0.0, 1e-12).unwrap();
-        // Push the free craft at O by -g times its total mass, in the inertial frame. Over this
-        // short time only the start matters, so compare the rates there.
+        // The free craft is pushed at O by -g times its total mass, in the inertial frame. The test compares the derivatives
+        // at the start, where both craft have the same state.
         let heavy = 1e11;
         let mut free = p;
         free.mount = Mount::Free;
@@ -221,7 +220,7 @@ fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
         let r2: f64 = r.iter().map(|x| x * x).sum();
         let about_o =
             |i: usize, k: usize| j[i][k] + m * (if i == k { r2 } else { 0.0 } - r[i] * r[k]);
-        // The mass at O leaves S = m r, I about O as they were.
+        // The mass at O does not change the first moment S and the inertia I about O.
         let share = m / (m + heavy);
         free.craft.mass = m + heavy;
         free.craft.r = r.map(|x| x * share);
@@ -241,7 +240,7 @@ fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
         let push = Inputs { force: Ramp::held(a.map(|a| a * heavy)), ..u };
         let mut free = Spacecraft::new(&free, &push, 0.0, 1e-12).unwrap();
         let (got, want) = (free.outputs(&push).omega_dot, pivot.outputs(&u).omega_dot);
-        // The rest of the mass, 1e3 of 1e11, falls behind.
+        // The error is the mass of the craft divided by the added mass, 1e3/1e11.
         assert!(largest_difference(&got, &want) < 1e-6, "{got:?} {want:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Liquid that spins with its tank (`src/spin.rs`).
+//! Tests of liquid that spins with its tank (`src/spin.rs`).
 
 use craft::{
     Craft, INPUTS, Inertia, Inputs, LimitedBy, MODES, Parameters, Ramp, STATES, TANK_INPUTS,
@@ -12,9 +12,10 @@ use super::random::{Random, draining_craft};
 
 type C = Complex<f64>;
 
-/// Rows of A_r, C_r, m, a, c and of both rates of nutation lambda, relative to the rate of spin and seen from the body. A rigid
-/// body with the inertias A_r across its axis and C_r about it carries a full spheroid of m kg with the semi-axes a across and c
-/// along the axis, whose centre is the body's. The rates follow from Poincare's equations (`fmu/craft/src/spin.rs`).
+/// Each row contains A_r, C_r, m, a, c and the rates lambda of both nutations, seen from the body and divided by the rate
+/// of spin. The body is a rigid body with the moments of inertia A_r across its axis and C_r about it, and a full
+/// spheroid of m kg of liquid with the semi-axes a across and c along the axis, both about the same centre. The rates
+/// follow from Poincare's equations (`fmu/craft/src/spin.rs`).
 const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([60.0, 40.0, 30.0, 0.3, 0.2], [[-0.326391621079, 0.0], [-1.3901790763, 0.0]]),
     ([60.0, 40.0, 30.0, 0.25, 0.25], [[-1.0 / 3.0, 0.0], [-1.0, 0.0]]),
@@ -27,7 +28,8 @@ const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([50.0, 90.0, 80.0, 0.3, 0.4], [[0.783443734998, 0.0], [-0.71017527478, 0.0]]),
 ];
 
-/// A craft that turns about its z axis at `rate`, rad/s, with the friction `decay` of the liquid.
+/// Returns a craft that rotates about its z axis at `rate`, rad/s. `decay` is the decay rate of the liquid's spin by
+/// friction.
 fn spheroid([across, axial, m, a, c]: [f64; 5], rate: f64, decay: [f64; 2]) -> Parameters {
     let mut p = Parameters::default();
     let j = Inertia { xx: across, yy: across, zz: axial, xy: 0.0, xz: 0.0, yz: 0.0 };
@@ -55,8 +57,8 @@ fn roots(a: C, b: C, c: C) -> [C; 2] {
     [(-b + root) / (a * 2.0), (-b - root) / (a * 2.0)]
 }
 
-/// Returns lambda of both nutations from the craft's own derivatives. By symmetry w_x + i w_y and L_x + i L_y obey two complex
-/// equations.
+/// Returns the rates lambda of both nutations from the craft's directional derivatives. By symmetry w_x + i w_y and L_x + i
+/// L_y fulfil two complex equations.
 fn nutations(p: &Parameters) -> [C; 2] {
     let inputs = Inputs::default();
     let mut craft = Spacecraft::new(p, &inputs, 0.0, 1e-9).unwrap();
@@ -69,7 +71,7 @@ fn nutations(p: &Parameters) -> [C; 2] {
     });
     let [[a, c], [b, d]] = columns;
     let one = C::from(1.0);
-    // exp(i lambda Omega t)
+    // The motion is proportional to exp(i lambda Omega t).
     roots(one, -(a + d), a * d - b * c).map(|sigma| sigma / C::new(0.0, p.init.omega[2]))
 }
 
@@ -88,8 +90,8 @@ fn craft_with_full_spheroids_nutate_at_the_rates_of_poincare() {
     }
 }
 
-/// Returns the rates lambda that solve (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda +
-/// (A - C) C' = 0, with C' - i K/Omega in place of C' if the liquid has friction.
+/// Returns the rates lambda that solve (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda + (A - C) C' = 0. If the
+/// liquid has friction, C' is replaced by C' - i K/Omega.
 fn closed_form([across, axial, m, a, c]: [f64; 5], by_friction: C) -> [C; 3] {
     let (inner, whole) = (m * (a * a + c * c) / 5.0, 2.0 * m * a * a / 5.0);
     let shared = 2.0 * m * a * c / 5.0;
@@ -122,9 +124,9 @@ fn friction_in_full_spheroids_changes_nutation_as_the_closed_form_says() {
     }
 }
 
-/// A craft is stable if lambda is real (Rumyantsev). In an unstable craft a nutation of 1e-7 rad/s at least doubles
-/// in the time in which the closed form predicts a growth by a factor of 1,000; in a stable craft it stays within the beat of the
-/// two nutations.
+/// By Rumyantsev's criterion a craft is stable if lambda is real. In an unstable craft a nutation of 1e-7 rad/s at least
+/// doubles in the time in which the closed form predicts a growth by a factor of 1,000. In a stable craft its amplitude
+/// stays within the beat of the two nutations.
 #[test]
 fn spinning_craft_are_stable_where_rumyantsev_says_so() {
     let mut random = Random::new(2);
@@ -134,7 +136,7 @@ fn spinning_craft_are_stable_where_rumyantsev_says_so() {
         let coefficients = closed_form(body, C::from(0.0));
         let [a, b, c] = coefficients.map(|x| x.re);
         let discriminant = b * b - 4.0 * a * c;
-        // At the boundary a nutation grows slower than by any power of e.
+        // At the boundary of stability a nutation grows slower than exponentially.
         if discriminant.abs() < 1e-3 * b * b {
             continue;
         }
@@ -162,9 +164,9 @@ fn spinning_craft_are_stable_where_rumyantsev_says_so() {
     assert!(stable > 5 && unstable > 5, "{stable} {unstable}");
 }
 
-/// h/R, Omega^2 R/g, C and K of upright cylinders with R = 1 m under g = 1 m/s2, fitted to both frequencies of the first mode that
-/// the equations of a rotating liquid have for every Omega, seen from the tank: against the spin and with it, rad/s; and the
-/// largest errors of C_0 and K = omega_0^2, per cent.
+/// Each row contains h/R, Omega^2 R/g, C and K of an upright cylinder with R = 1 m under g = 1 m/s2. C and K are fitted to
+/// the frequencies of the first mode in the equations of a rotating liquid for every Omega, seen from the tank. Then follow
+/// both frequencies, against the spin and with it, rad/s, and the largest errors of C_0 and K = omega_0^2, per cent.
 const CYLINDERS: [([f64; 4], [f64; 2], [f64; 2]); 6] = [
     ([0.25, 0.1, 0.75653, 0.82912], [1.1806962, -0.702227], [0.8, 3.8]),
     ([0.5, 0.1, 0.65208, 1.35843], [1.3898245, -0.9774112], [0.2, 1.4]),
@@ -174,8 +176,8 @@ const CYLINDERS: [([f64; 4], [f64; 2], [f64; 2]); 6] = [
     ([2.0, 0.3, 0.41797, 1.90865], [1.6293091, -1.1714488], [1.4, 2.4]),
 ];
 
-/// h/R, Omega^2 R/g, l/Omega and the force of the same liquids on a tank per lateral acceleration exp(-i l t), kg, at the rate (l -
-/// i/20) Omega, from the equations of a rotating liquid: real and imaginary parts.
+/// Each row contains h/R, Omega^2 R/g and l/Omega of the same liquids, and real and imaginary part of the force on the tank
+/// per lateral acceleration exp(-i l t), kg, at the rate (l - i/20) Omega, from the equations of a rotating liquid.
 const FORCES: [[f64; 5]; 48] = [
     [1.0, 0.1, -3.0, 6.90214, 0.32358],
     [1.0, 0.1, -2.5, 4.98723, 0.11426],
@@ -227,8 +229,8 @@ const FORCES: [[f64; 5]; 48] = [
     [0.5, 0.3, 3.0, -4.19429, -2.11511],
 ];
 
-/// Returns a cylinder whose liquid turns with it, and its inputs, with the coefficients C and (K -
-/// omega_0^2)/Omega^2 of the first mode.
+/// Returns a cylinder whose liquid rotates with it, and its inputs. `c` is the coefficient C of the first mode, and
+/// `stiffness` is (K - omega_0^2)/Omega^2.
 fn cylinder(fill: f64, beta: f64, c: f64, stiffness: f64) -> (TankParameters, TankInputs) {
     let mut p = TankParameters::default();
     p.tank = Tank {
@@ -247,8 +249,8 @@ fn cylinder(fill: f64, beta: f64, c: f64, stiffness: f64) -> (TankParameters, Ta
     (p, TankInputs { a, omega: [0.0, 0.0, beta.sqrt()], ..TankInputs::default() })
 }
 
-/// Coefficients of a slosh mass's z = p_x + i p_y and of the force on the tank: z'' = at[0] z + at[1] z' + at[2] a, force = at[3] z + at[4] z'
-/// + at[5] a.
+/// Returns the coefficients `at` of the lateral motion z = p_x + i p_y of a slosh mass and of its force on the tank: z'' =
+/// at[0] z + at[1] z' + at[2] a, and force = at[3] z + at[4] z' + at[5] a.
 fn lateral(p: &TankParameters, u: &TankInputs) -> [C; 6] {
     let mut tank = SloshTank::new(p, u, 0.0, 1e-9).unwrap();
     let mut at = [C::from(0.0); 6];
@@ -262,7 +264,7 @@ fn lateral(p: &TankParameters, u: &TankInputs) -> [C; 6] {
     at
 }
 
-/// Returns the rates l of both waves, against the spin and with it: z is exp(-i l t).
+/// Returns the frequencies l of both waves, against the spin and with it; z is proportional to exp(-i l t).
 fn waves(p: &TankParameters, u: &TankInputs) -> [f64; 2] {
     let [z, z_d, ..] = lateral(p, u);
     let mut waves = roots(C::from(1.0), -z_d, -z).map(|sigma| {
@@ -293,13 +295,13 @@ fn waves_in_spinning_cylinders_have_the_frequencies_of_the_rotating_liquid() {
         let (p, u) = cylinder(fill, beta, c, (k - squared) / beta);
         let fitted = waves(&p, &u);
         for i in 0..2 {
-            // C and K are given to five digits.
+            // C and K in the table have five digits.
             assert!(
                 (fitted[i] / exact[i] - 1.0).abs() < 3e-5,
                 "{fill} {beta}: {fitted:?} {exact:?}"
             );
         }
-        // A pendulum in space: Omega +- omega_0.
+        // A pendulum (C = 1) has the frequencies Omega +- omega_0, because its motion in space does not depend on the spin.
         let (p, u) = cylinder(fill, beta, 1.0, 0.0);
         for (found, sign) in waves(&p, &u).into_iter().zip([1.0, -1.0]) {
             assert!((found - beta.sqrt() - sign * squared.sqrt()).abs() < 1e-9, "{found}");
@@ -307,9 +309,9 @@ fn waves_in_spinning_cylinders_have_the_frequencies_of_the_rotating_liquid() {
     }
 }
 
-/// Lateral forces of a shaken spinning cylinder with the pendulum model differ from the theory of the rotating liquid by at
-/// most 1 % at Omega^2 R/g = 0.1; at 0.3 by at most 3 % up to 1.5 Omega and by 14 % at higher frequencies (in parts of the
-/// force, or of the liquid's mass if this is larger).
+/// Lateral forces of a spinning cylinder that is shaken, computed with the pendulum model, differ from the theory of the
+/// rotating liquid by at most 1 % at Omega^2 R/g = 0.1. At 0.3 they differ by at most 3 % up to 1.5 Omega, and by 14 % at
+/// higher frequencies. The differences are relative to the force, or to the mass of the liquid if this is larger.
 #[test]
 fn lateral_forces_of_spinning_cylinders_are_those_of_the_rotating_liquid() {
     for [fill, beta, rate, re, im] in FORCES {
@@ -332,8 +334,8 @@ fn lateral_forces_of_spinning_cylinders_are_those_of_the_rotating_liquid() {
     }
 }
 
-/// At h/R = 1 the coefficient C_0 is 0.496, so that the tank is out of range above 2 Omega/omega_0 = 0.818, which is a spin of
-/// 0.541 rad/s here. Only the rate of the liquid counts, not the rate of the tank.
+/// At h/R = 1 the coefficient C_0 is 0.496. The tank is then out of range above 2 Omega/omega_0 = 0.818, which is a spin of
+/// 0.541 rad/s here. Only the rate of the liquid's spin matters, not the rate of the tank.
 #[test]
 fn the_spin_of_the_liquid_and_not_of_its_tank_limits_the_range() {
     let squared = 1.8411837813 * f64::tanh(1.8411837813);
@@ -351,14 +353,14 @@ fn the_spin_of_the_liquid_and_not_of_its_tank_limits_the_range() {
         assert_eq!(out.ranges.limited_by, expected, "{liquid} {tank}");
         assert!((out.spin_ratio / (2.0 * f64::abs(liquid) / squared.sqrt()) - 1.0).abs() < 1e-9);
         assert!((out.spin_number / (liquid * liquid) - 1.0).abs() < 1e-9, "{out:?}");
-        // Without a spin of its own the liquid counts as turning with the tank.
+        // Liquid whose spin is not modelled is assumed to rotate with the tank.
         p.tank.spin_inertia = 0.0;
         let out = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap().outputs(&u).tank;
         assert!((out.spin_number - tank * tank).abs() < 1e-9 * (1.0 + tank * tank), "{out:?}");
     }
 }
 
-/// Omega/omega_0 and Omega^2 l change by the shares d Omega/Omega - da/(2 a) and 2 d Omega/Omega - da/a.
+/// Omega/omega_0 and Omega^2 l change by the relative amounts d Omega/Omega - da/(2 a) and 2 d Omega/Omega - da/a.
 #[test]
 fn the_numbers_of_the_spin_have_derivatives() {
     let (mut p, u) = cylinder(1.0, 0.1, 0.5, 0.0);
@@ -375,8 +377,8 @@ fn the_numbers_of_the_spin_have_derivatives() {
     }
 }
 
-/// The liquid starts at rest in a tank that turns at Omega about its axis. It spins at Omega (1 -
-/// exp(-t decay)), and its torque on the tank is I Omega decay exp(-t decay).
+/// The liquid is at rest at first, in a tank that rotates at Omega about its axis. It spins up as Omega (1 - exp(-t decay)),
+/// and exerts the torque I Omega decay exp(-t decay) on the tank.
 #[test]
 fn liquid_spins_up_with_its_tank_at_the_rate_of_its_decay() {
     let mut p = TankParameters::default();

@@ -1,6 +1,7 @@
-//! Coefficients of the third order and beyond: bobs on other surfaces than spheres.
+//! Tests of the coefficients of the third order and beyond, with which bobs move on other surfaces than spheres.
 //!
-//! `tests/six` compares their waves with potential flow. The random tanks of `independent.rs`, `equations.rs`, `exchange.rs`,
+//! `tests/six` compares waves with these coefficients with potential flow. The random tanks of `independent.rs`,
+//! `equations.rs`, `exchange.rs`,
 //! `balances.rs`, `draining.rs` and `impulses.rs` also have bobs on other surfaces than spheres.
 
 use craft::{
@@ -21,8 +22,8 @@ fn resting(tank: Tank) -> (SloshTank, TankInputs) {
     (SloshTank::new(&p, &u, 0.0, 1e-12).unwrap(), u)
 }
 
-/// The relative shifts are (3 kappa/8 - s/2) A^2 for planar and (kappa/2) A^2 for circular motion. If A is halved, the remaining
-/// difference falls by a factor of 16.
+/// The frequency changes by the relative amount (3 kappa/8 - s/2) A^2 in planar motion and (kappa/2) A^2 in circular motion.
+/// The remaining difference is of the fourth order: it falls by a factor of 16 if A is halved.
 #[test]
 fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
     for (s, kappa) in [(1.0, 1.0), (1.408, 0.734), (1.0, 8.0), (-3.0, 0.5), (1.0, 0.25), (0.0, 1.0)]
@@ -35,7 +36,7 @@ fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
         ] {
             let left = |a: f64| frequency(tank, a).powi(2) - 1.0 - shift * a * a;
             let [large, small] = [left(0.1), left(0.05)];
-            // Up to the sixth order.
+            // The bound includes terms up to the sixth order.
             let bound = 30.0 * (1.0 + s.abs() + kappa.abs()).powi(2) * f64::powi(0.1, 4);
             assert!(large.abs() < bound, "{s} {kappa}: {large:e} of {bound:e}");
             let ratio = large / small;
@@ -78,7 +79,7 @@ fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
             let h = f64::min(random.magnitude(1e-3, 0.5), 2.0 - t);
             cut.step(&later(t), h).unwrap();
             let lost = cut.continuous_states()[6 * MODES];
-            assert!(lost >= dissipated, "{seed}: drag never drives");
+            assert!(lost >= dissipated, "{seed}: drag added energy");
             (t, dissipated) = (t + h, lost);
         }
         let mut x = [0.0; STATES];
@@ -93,15 +94,15 @@ fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
         let (whole, cut) = (whole.continuous_states(), cut.continuous_states());
         for i in 0..TANK_STATES {
             let size = 1.0 + whole[i].abs();
-            // 1e-12 a step, grown over 2 s.
+            // Each step has an error of 1e-12, which grows over 2 s.
             assert!((cut[i] - whole[i]).abs() < 1e-10 * size, "{seed} [{i}]");
             assert!((x[i] - whole[i]).abs() < 1e-9 * size, "{seed} [{i}]");
         }
     }
 }
 
-/// With the coefficients of a pendulum the power series of a pendulum are used, so that no bit differs from a tank without
-/// coefficients.
+/// For s = kappa = 1 the power series of a pendulum are used, so that no bit differs from a tank without these coefficients.
+/// For coefficients near 1 the motion is nearly the same.
 #[test]
 fn coefficients_near_one_move_as_a_pendulum() {
     let mut tank = Random::new(3).tank();
@@ -114,12 +115,12 @@ fn coefficients_near_one_move_as_a_pendulum() {
     });
     let [(x, bias, mass), (y, bias_y, mass_y)] = ends;
     for (a, b) in x.iter().chain(&bias).chain(&mass).zip(y.iter().chain(&bias_y).chain(&mass_y)) {
-        // bob.rs against constrained.rs, 1e-12 a step.
+        // The two motions are computed by bob.rs and constrained.rs, with an error of 1e-12 in each step.
         assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
     }
 }
 
-/// With s = -6 the inertia along the meridian reaches half of a pendulum's at 16.1 degrees.
+/// With s = -6 the inertia along the meridian falls to half of a pendulum's at 16.1 degrees.
 #[test]
 fn angles_at_which_the_inertia_vanishes_are_refused() {
     let mut tank = bench(1.227);
@@ -127,7 +128,7 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
     tank.nonlinear_stiffness[0] = 1.0;
     let u = TankInputs { a: Ramp::held([0.0, 0.0, G]), ..TankInputs::default() };
     let p = TankParameters { tank, ..TankParameters::default() };
-    // u (1 - u) = 0.5/7
+    // The limit follows from u (1 - u) = 0.5/7.
     let sin = f64::sqrt((1.0 - f64::sqrt(1.0 - 2.0 / 7.0)) / 2.0);
     let degrees = sin.asin().to_degrees();
     let bound = format!("exceeds {:.1} degrees", (degrees * 10.0).floor() / 10.0);
@@ -140,7 +141,7 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
     tilted.tank.p_0[0] = [0.98 * sin, 0.0, -f64::sqrt(1.0 - sin * sin)];
     assert_eq!(tilted.problems(), [""; 0]);
 
-    // Pushed across until it reaches the bound, in one step and in many.
+    // The bob is pushed across the axis until it reaches the limit, in one step and in many.
     let pushed = TankInputs { a: Ramp::held([3.0, 0.0, G]), ..u };
     for h in [3.0, 0.01] {
         let mut tank = SloshTank::new(&p, &u, 0.0, 1e-8).unwrap();
@@ -156,7 +157,7 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
         assert!(why.to_string().contains(&bound), "{why}");
         assert!(!why.shorter_may_succeed());
         assert_eq!(tank.continuous_states(), before);
-        // A host that integrates itself is refused at the same angle.
+        // A host that integrates the states itself gets the error at the same angle.
         let mut x = before;
         (x[0], x[2]) = (1.02 * sin, -f64::sqrt(1.0 - 1.0404 * sin * sin));
         tank.set_continuous_states(&x);
@@ -191,13 +192,13 @@ fn large_wave_coefficients_are_refused_out_of_range_and_with_detached_liquid() {
         );
         assert!(said.len() == 1 && said[0].starts_with(&name), "{said:?}");
     }
-    // Modes that are not in use do not count.
+    // Parameters of modes that are not in use have no effect.
     p.tank[1].modes = 0;
     p.tank[0].ball.travel = 1.0;
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// For s = 0 a bob lends a third of its mass at 45 degrees.
+/// For s = 0 a bob at 45 degrees reduces the inertia of the craft by a third of its own mass.
 #[test]
 fn a_craft_too_light_for_its_coefficients_is_refused() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
@@ -220,15 +221,15 @@ fn a_craft_too_light_for_its_coefficients_is_refused() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// One mode of a draining tank as a Lagrangian, per mass:
+/// Lagrangian of one mode of a draining tank, divided by the mass:
 ///
 /// ```text
 /// L = |rho' + w x rho|^2/2 - a.rho + (s - 1) l^2 (q.q')^2/2 - (k/m) l^2 |q|^2/2
 /// rho = d + h e + l q + [(kappa - 1) l |q|^4/8 - l sqrt(1 - |q|^2)] e
 /// ```
 ///
-/// q: x and y of the unit vector from hinge to bob. The table has two points, between which 1/l, h - l, m over the liquid,
-/// s and kappa are straight lines.
+/// q has the x and y components of the unit vector from hinge to bob. The table has two points, between which 1/l, h - l, m
+/// divided by the mass of liquid, s and kappa are straight lines.
 struct Lagrangian<'a> {
     tank: &'a Tank,
     n: usize,
@@ -287,8 +288,7 @@ impl Lagrangian<'_> {
     }
 }
 
-/// The central difference of the sixth order: for each pair of points the number of steps from the
-/// centre, and the weight.
+/// Central difference of the sixth order: for each pair of points its distance from the centre, in steps, and its weight.
 const DIFFERENCES: [(f64, f64); 6] = [
     (1.0, 0.75),
     (2.0, -0.15),
@@ -298,8 +298,9 @@ const DIFFERENCES: [(f64, f64); 6] = [
     (-3.0, -1.0 / 60.0),
 ];
 
-/// The motion of a tank's bobs satisfies Lagrange's equations d(dL/dq')/dt = dL/dq, by differences of L and along the
-/// motion. Liquid flows so fast that s' and kappa' matter, or has coefficients beyond the third order.
+/// The motion of a tank's bobs fulfils Lagrange's equations d(dL/dq')/dt = dL/dq, where the derivatives are computed by
+/// differences of L and along the motion. Either the liquid flows so fast that s' and kappa' matter, or the modes have
+/// coefficients beyond the third order.
 #[test]
 fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
     for seed in 0..36 {
@@ -320,7 +321,7 @@ fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
         let u = TankInputs { a, omega, omega_dot, mass_flow };
         let p = TankParameters { tank, ..TankParameters::default() };
         let start = SloshTank::new(&p, &u, 0.0, 1e-13).unwrap();
-        // Error h^6 times the seventh derivative of a motion with up to 20 rad/s, 1e-13/h.
+        // The errors are h^6 times the seventh derivative of a motion with up to 20 rad/s, and 1e-13/h.
         let (h, middle) = (2e-3, 0.05);
         let at = |t: f64| {
             let mut tank = start.clone();
@@ -338,7 +339,7 @@ fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
                 q[i] += by;
                 q
             };
-            // L is quadratic in q'.
+            // One difference is enough because L is quadratic in q'.
             let momentum = |k: usize, i: usize| {
                 let ([place, rate], t) = (q(&states[k]), middle + (k as f64 - 3.0) * h);
                 let [more, less] = [0.5, -0.5].map(|by| law.at(place, moved(rate, i, by), t));
@@ -363,8 +364,8 @@ fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
     }
 }
 
-/// A wave with coefficients beyond the third order decays as its energy does: the dissipated power is 2 c/m times the kinetic
-/// energy, that within the liquid included.
+/// A wave with coefficients beyond the third order decays as its energy does: the dissipated power is 2 c/m times the
+/// kinetic energy, which includes the kinetic energy within the liquid.
 #[test]
 fn drag_acts_on_the_whole_kinetic_energy() {
     for seed in 0..20 {
@@ -384,15 +385,15 @@ fn drag_acts_on_the_whole_kinetic_energy() {
         let kinetic = Lagrangian { tank: &tank, n: 0, u: &u }.at([x[0], x[1]], [x[3], x[4]], 0.0);
         let expected = 4.0 * 0.01 * f64::sqrt(tank.g_ref / tank.length[0]) * tank.mass[0] * kinetic;
         let power = slosh.derivatives(&u)[6 * MODES];
-        // The Lagrangian has the bob below its hinge.
+        // The Lagrangian is valid only for a bob below its hinge.
         if x[2] < -0.1 {
             assert!((power / expected - 1.0).abs() < 1e-12, "{seed}: {power} {expected}");
         }
     }
 }
 
-/// A wave does not feel a tank that turns about its axis: with and without the turn the bob is at the same place in inertial
-/// axes, and the tank gets no torque about the axis.
+/// The rotation of a tank about its axis does not change a wave: with and without rotation the bob is at the same place in
+/// inertial axes, and the tank gets no torque about its axis.
 #[test]
 fn a_wave_is_unchanged_in_a_tank_that_turns_about_its_axis() {
     let mut tank = bench(0.5);
@@ -423,7 +424,7 @@ fn a_wave_is_unchanged_in_a_tank_that_turns_about_its_axis() {
     }
 }
 
-/// At an angle at which the inertia of rotary motion, 1 - 4 u, is half of a pendulum's, the model ends: 20.7 degrees.
+/// At 20.7 degrees the inertia of rotary motion, 1 - 4 u, is half of a pendulum's, so that the model ends.
 #[test]
 fn angles_at_which_the_inertia_of_rotary_motion_vanishes_are_refused() {
     let mut tank = bench(1.227);
@@ -436,7 +437,7 @@ fn angles_at_which_the_inertia_of_rotary_motion_vanishes_are_refused() {
     assert_eq!(TankParameters { tank, ..TankParameters::default() }.problems(), [""; 0]);
 }
 
-/// For example `rotary_inertia` of a mode that has a direction; the error names both parameters.
+/// For example, `rotary_inertia` of a mode with a `direction` is refused. The message contains both parameters.
 #[test]
 fn coefficients_beyond_the_third_order_are_refused_with_planar_modes_and_fill_tables() {
     let mut p = TankParameters::default();
@@ -486,7 +487,7 @@ fn a_fill_table_with_constant_s_and_kappa_moves_as_a_tank_with_these_values() {
     }
 }
 
-/// At a point of its table and without flow, a tank has the same rates as a tank with the coefficients of this point.
+/// At a point of its fill table and without flow, a tank has the same rates as a tank with the coefficients of this point.
 #[test]
 fn a_tank_at_a_point_of_its_table_has_the_coefficients_of_this_point() {
     let mut random = Random::new(5);
@@ -512,8 +513,8 @@ fn a_tank_at_a_point_of_its_table_has_the_coefficients_of_this_point() {
     }
 }
 
-/// While the liquid falls from a point with s = 1 to one with s = -6, the bound of the angle comes down to a bob on a
-/// circle of 20 degrees.
+/// While the liquid falls from a point of the table with s = 1 to a point with s = -6, the largest valid angle falls until
+/// it reaches 20 degrees, the angle of a bob in circular motion.
 #[test]
 fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
     let mut tank = Tank { modes: 1, zeta: [0.0; MODES], ..Tank::default() };
@@ -537,14 +538,14 @@ fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
         "{why}"
     );
     assert!(slosh.continuous_states()[6 * MODES + 1] > 305.0);
-    // Its coefficients at the last point refuse the same start there.
+    // With the coefficients of the last point the same initial angle is refused.
     let empty = TankParameters { tank: Tank { liquid_0: 300.0, ..tank }, ..p };
     let said = empty.problems();
     assert!(said.len() == 1 && said[0].contains("exceeds 16.1 degrees"), "{said:?}");
 }
 
-/// A draining tank uses `fill.nonlinear_inertia` and `fill.nonlinear_stiffness`; values out of range are refused with the
-/// index of the table's point.
+/// A draining tank uses `fill.nonlinear_inertia` and `fill.nonlinear_stiffness` instead of the tank's own coefficients.
+/// Values out of range are refused with the index of the table's point.
 #[test]
 fn the_large_wave_coefficients_of_a_fill_table_replace_those_of_the_tank_and_are_checked() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
@@ -565,11 +566,11 @@ fn the_large_wave_coefficients_of_a_fill_table_replace_those_of_the_tank_and_are
     let why = p.overridden("tank[].nonlinear_inertia", &[0, 0]).unwrap();
     assert_eq!(why, "tank[1].fill.nonlinear_inertia[1,1] to fill.nonlinear_inertia[1,3]");
     assert_eq!(p.overridden("tank[].nonlinear_inertia", &[0, 1]), None);
-    // Points and modes that are not in use do not count.
+    // Values of points and modes that are not in use are not checked.
     p.tank[0].fill.points = 0;
     p.tank[0].fill.nonlinear_inertia[0][0] = f64::NAN;
     assert_eq!(p.problems(), [""; 0]);
-    // A craft that is heavy enough at the start, but not where s is 0.
+    // This craft is heavy enough for the liquid at the start, but not at the point of the table where s is 0.
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
     let tank = &mut p.tank[0];
     (tank.fill.points, tank.liquid_0) = (2, 127.0);

@@ -1,4 +1,5 @@
-//! A platform that tilts: nutation, coupling of turning and tilt, liquid on it, against closed forms.
+//! Tests of a platform that tilts on a pivot: nutation, coupling of rotation and tilt, and liquid on the platform
+//! agree with closed forms.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +12,7 @@ use super::component::Spacecraft;
 
 const G: f64 = 9.81;
 
-/// Returns a platform of 12 kg without a tank, with its centre of mass 0.1 m above the pivot.
+/// Returns a platform of 12 kg without a tank, whose centre of mass is 0.1 m above the pivot.
 fn platform() -> Parameters {
     let j = Inertia { xx: 0.25, yy: 0.25, zz: 0.4, xy: 0.0, xz: 0.0, yz: 0.0 };
     Parameters {
@@ -46,8 +47,9 @@ fn tilted([x, y]: [f64; 2]) -> [f64; 4] {
     [1.0, x / 2.0, y / 2.0, 0.0]
 }
 
-/// Tilt angles theta = theta_x + i theta_y in rotating axes, phi = theta e^(i W t) in space: I phi'' - i I_a W phi' +
-/// (k - M g h) phi = 0, with the spin W and I and I_a about O across and along the axis.
+/// The tilt angles theta = theta_x + i theta_y in rotating axes are phi = theta e^(i W t) in space. They fulfil I phi''
+/// - i I_a W phi' + (k - M g h) phi = 0, where W is the spin, and I and I_a are the moments of inertia about O across
+/// and along the axis.
 #[test]
 fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_spring() {
     let mut p = platform();
@@ -58,7 +60,7 @@ fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_sp
         for omega in
             [(along * spin + root) / (2.0 * across), (along * spin - root) / (2.0 * across)]
         {
-            // theta = e e^(i (omega - W) t); w_x + i w_y = theta' + i W theta = i omega theta
+            // theta = e e^(i (omega - W) t), so that w_x + i w_y = theta' + i W theta = i omega theta.
             let e = 1e-5;
             p.init.q = tilted([e, 0.0]);
             p.init.omega = [0.0, omega * e, spin];
@@ -69,7 +71,7 @@ fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_sp
                 let (sin, cos) = f64::sin_cos((omega - spin) * 0.05 * k as f64);
                 let want = [-omega * e * sin, omega * e * cos];
                 for i in 0..2 {
-                    // Quadratic in the tilt: 1e-10.
+                    // The error is quadratic in the tilt, 1e-10.
                     let off = (out.omega[i] - want[i]).abs();
                     assert!(off < 1e-7 * omega.abs() * e, "{spin} {omega} {k}: {off:e}");
                 }
@@ -78,8 +80,8 @@ fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_sp
     }
 }
 
-/// Returns the response of the rates about all axes to the torque about z at a frequency, from x' = A x + B u
-/// of rates and accelerations at rest.
+/// Returns the frequency response of the angular velocities about all axes to the torque about z. It follows from the linear
+/// equations x' = A x + B u of the platform at rest.
 fn rates_per_torque(p: &Parameters, frequency: f64) -> [Complex<f64>; 3] {
     let mut craft = start(p);
     let column = |craft: &mut Spacecraft, state: Option<usize>| -> [f64; STATES] {
@@ -104,8 +106,8 @@ fn rates_per_torque(p: &Parameters, frequency: f64) -> [Complex<f64>; 3] {
     [0, 1, 2].map(|i| x[index::OMEGA + i])
 }
 
-/// Two products of inertia, elasticity about x and y: w_x (k_x - I_xx s^2) = I_xz s^2 w_z, s the circular frequency;
-/// likewise about y. The leakage of thesis 6.3.6 is sqrt(w_x^2 + w_y^2)/w_z.
+/// With two products of inertia and springs about x and y, w_x (k_x - I_xx s^2) = I_xz s^2 w_z, where s is the angular
+/// frequency, and likewise about y. The leakage (Rubaga's thesis, section 6.3.6) is sqrt(w_x^2 + w_y^2)/w_z.
 #[test]
 fn an_unbalanced_platform_leaks_into_the_tilt_by_its_products_of_inertia() {
     let mut p = platform();
@@ -119,13 +121,14 @@ fn an_unbalanced_platform_leaks_into_the_tilt_by_its_products_of_inertia() {
         for (got, want) in [x / z, y / z].into_iter().zip(want) {
             assert!((got - want).norm() < 1e-12 * want.abs().max(1.0), "{frequency}: {got} {want}");
         }
-        // I_zz s w_z + I_xz s w_x + I_yz s w_y = tau
+        // Expected: I_zz s w_z + I_xz s w_x + I_yz s w_y = tau.
         let total = z * 0.4 + x * 0.02 - y * 0.03;
         assert!((total * Complex::new(0.0, s2.sqrt()) - 1.0).norm() < 1e-12);
     }
 }
 
-/// A centre of mass at the distance d from the axis also couples by gravity: at rest it tilts the platform by M g d/(k - M g h).
+/// A centre of mass at the distance d from the axis also couples by gravity: at rest the platform is tilted by M g d/(k
+/// - M g h).
 #[test]
 fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     let mut p = platform();
@@ -141,8 +144,8 @@ fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     assert!(out.omega.iter().all(|w| w.abs() < 1e-9));
 }
 
-/// Platform and bob form a double pendulum: (K - omega^2 M)(theta, phi) = 0 with the bob at z theta + l phi, M = [[I +
-/// m z^2, m z l], [m z l, m l^2]], K = diag(k - g (M h + m z), m g l).
+/// Platform and bob form a double pendulum: (K - omega^2 M)(theta, phi) = 0 with the bob at z theta + l phi, M = [[I + m
+/// z^2, m z l], [m z l, m l^2]] and K = diag(k - g (M h + m z), m g l).
 #[test]
 fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
     let mut p = platform();
@@ -159,19 +162,19 @@ fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
         let e = 1e-5;
         let phi = e * m * z * l * omega2 / (m * G * l - m * l * l * omega2);
         p.init.q = tilted([0.0, e]);
-        // Seen from the platform the bob hangs at phi + theta.
+        // Relative to the platform the bob hangs at phi + theta.
         p.tank[0].p_0[0] = [phi + e, 0.0, -1.0];
         let mut craft = start(&p);
         craft.step(&Inputs::default(), TAU / omega2.sqrt() * 7.0 / 3.0).unwrap();
         let out = craft.outputs(&Inputs::default());
-        // cos(7 2 pi/3) = -1/2
+        // The factor is cos(7 2 pi/3) = -1/2.
         for (got, start) in [(2.0 * out.q[2], e), (out.tank[0].angle_x[0], phi + e)] {
             assert!((got / start + 0.5).abs() < 1e-6, "{omega2}: {got} {start}");
         }
     }
 }
 
-/// A stiffer pivot approaches HubSlosh's hub, which turns about its axis alone: the difference falls as 1/k.
+/// A stiffer pivot approaches HubSlosh's hub, which only rotates about its axis: the difference falls as 1/k.
 #[test]
 fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
     let u = Inputs { torque: Ramp::held([0.0, 0.0, 0.05]), ..Inputs::default() };
@@ -179,13 +182,13 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
         let mut p = platform();
         p.tanks = 1;
         p.tank[0] = Tank { position: [0.225, 0.0, 0.05], ..tank() };
-        // Critically damped.
+        // The tilt is critically damped.
         p.pivot = Pivot { k: [k; 2], c: [1.3 * k.sqrt(), 1.3 * k.sqrt(), 0.0], ..Pivot::default() };
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
         craft.step(&u, 1.5).unwrap();
         craft.outputs(&u).omega[2]
     };
-    // The linear hub: I0 w' = tau + r m g alpha, alpha'' = -(g/l) alpha - (r/l) w'.
+    // The linear hub: I0 w' = tau + r m g alpha and alpha'' = -(g/l) alpha - (r/l) w'.
     let (i_0, m, l, r) = (0.4 + 1.33 * 0.225 * 0.225, 0.756, 0.0452, 0.225);
     let i = i_0 + m * r * r;
     let omega = (G / l * i / i_0).sqrt();
@@ -197,8 +200,8 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
     assert!((ratio - 10.0).abs() < 0.5, "{ratio} {soft:e} {stiff:e}");
 }
 
-/// Far above eps the smoothed sign of the rate is 1 to the last bit, so that I w' = -C with the Coulomb torque C until the
-/// platform stops. From 2 rad/s it stops after 2 I/C = 16 s.
+/// If the rate is far above eps, the smoothed sign of the rate is 1 to the last bit, so that I w' = -C with the Coulomb
+/// torque C until the platform stops. From 2 rad/s it stops after 2 I/C = 16 s.
 #[test]
 fn coulomb_friction_stops_a_platform_and_holds_it() {
     let mut p = platform();
@@ -214,15 +217,15 @@ fn coulomb_friction_stops_a_platform_and_holds_it() {
         let lost = 0.4 * (2.0 * 2.0 - want * want) / 2.0;
         assert!((out.dissipated - lost).abs() < 1e-11, "{k}: {} {lost}", out.dissipated);
     }
-    // Within eps, 1e-3 rad/s, it decays with I eps/C = 8 ms.
+    // Within eps, 1e-3 rad/s, the rate decays with the time constant I eps/C = 8 ms.
     craft.step(&Inputs::default(), 2.0).unwrap();
     let out = craft.outputs(&Inputs::default());
     assert!(out.omega[2].abs() < 1e-20, "{}", out.omega[2]);
 }
 
-/// The friction law alone, r = (C + D exp(-(w/w_s)^2)) tanh(w/eps), in another simulator. I w' = tau - c w - r is
-/// integrated by classical Runge-Kutta in steps of eps I/(C + D)/20, whose error is below 1e-9 rad/s (a twentieth of it
-/// with half the step).
+/// The platform follows the friction law r = (C + D exp(-(w/w_s)^2)) tanh(w/eps) as in a separate simulator, which
+/// integrates I w' = tau - c w - r by classical Runge-Kutta in steps of eps I/(C + D)/20. The error of this simulator
+/// is below 1e-9 rad/s.
 #[test]
 fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
     let (mut p, i_z, tau, w) = (platform(), 0.4, 0.12, 3.0);
@@ -237,7 +240,8 @@ fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
     let (mut x, mut t, h) = (0.0, 0.0, 2e-4);
     let mut most: f64 = 0.0;
     for k in 0..2000 {
-        // The craft's torque is linear between its steps of 2 ms, which leaves tau w^2 h^2/8 = 4e-7 N m.
+        // The torque on the craft is linear within its steps of 2 ms, which differs from the sine by tau w^2 h^2/8
+        // = 4e-7 N m.
         let at = |k: i32| tau * (w * 2e-3 * f64::from(k)).sin();
         let slope = (at(k + 1) - at(k)) / 2e-3;
         let torque = Ramp { value: [0.0, 0.0, at(k)], slope: [0.0, 0.0, slope] };
@@ -252,10 +256,10 @@ fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
         }
         most = most.max(x.abs());
         let got = craft.outputs(&Inputs::default()).omega[2];
-        // 4e-7 N m over I for half a swing of the torque.
+        // The tolerance is the effect of 4e-7 N m on I over half a cycle of the torque.
         assert!((got - x).abs() < 1e-6, "{t}: {got} {x}");
     }
-    assert!(most > 0.05, "it has to slide past w_s: {most}");
+    assert!(most > 0.05, "the rate must exceed w_s, but its maximum is {most}");
 }
 
 #[test]
@@ -272,9 +276,9 @@ fn pivot_parameters_do_not_change_a_free_craft() {
     );
 }
 
-/// The bench of book/tilting.md: root mean square of the leakage from 1.25 to 3.5 Hz. With a damping ratio of 0.03
-/// `hubslosh analyse` finds 0.0419 from the rates of a sweep at 0.0125 N m. With 0.003 it finds 0.125 of 0.135: a sweep
-/// smooths the tip of the antiresonance, 0.014 Hz wide, over which the rate is divided.
+/// The bench of book/tilting.md: the root mean square of the leakage from 1.25 to 3.5 Hz. With a damping ratio of 0.03
+/// `hubslosh analyse` finds 0.0419 from the rates of a sweep at 0.0125 N m. With a damping ratio of 0.003 it finds 0.125
+/// instead of 0.135, because a sweep smooths the tip of the antiresonance, which is 0.014 Hz wide.
 #[test]
 fn the_leakage_of_the_books_platform_equals_that_of_its_linear_equations() {
     let j = Inertia { xx: 0.22, yy: 0.25, zz: 0.304, xy: 0.0, xz: 0.004, yz: -0.006 };
@@ -295,7 +299,7 @@ fn the_leakage_of_the_books_platform_equals_that_of_its_linear_equations() {
     assert!((sharp / 0.135 - 1.0).abs() < 5e-3, "{sharp}");
 }
 
-/// Returns the root mean square of the leakage on a logarithmic grid from 1.25 to 3.5 Hz.
+/// Returns the root mean square of the leakage on a logarithmic frequency grid from 1.25 to 3.5 Hz.
 fn rms(p: &Parameters) -> f64 {
     let squares: f64 = (0..2000)
         .map(|k| {

@@ -1,6 +1,6 @@
-//! Free waves of the first mode in the tank of the bench, at rest or driven sideways.
+//! Tests of free waves of the first mode in the bench's tank, which is at rest or driven sideways.
 //!
-//! `tests/six` includes this file as well and runs it with the packed FMUs as components.
+//! `tests/six` includes this file as well, and runs it with the packed FMUs instead of this crate.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,7 +13,7 @@ pub const G: f64 = 9.80665;
 
 pub const TOLERANCE: f64 = 1e-12;
 
-/// Returns the bench's tank of 81.5 mm radius, filled to `fill` radii, with only its first mode and the
+/// Returns the bench's tank of 81.5 mm radius, filled to a depth of `fill` radii, with only its first mode and with the
 /// coefficients of potential flow.
 pub fn bench(fill: f64) -> Tank {
     let (d, h) = (0.163, 0.0815 * fill);
@@ -74,12 +74,12 @@ impl Moved for SloshTank {
     }
 }
 
-/// Returns the frequency of the mode, over the linear one, when it is released at A = |q|/l in the plane of x
-/// and z.
+/// Returns the frequency of the mode, divided by the linear frequency, if the bob is released from rest at A = |q|/l in
+/// the x z plane.
 pub fn planar<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
     let w = linear_frequency(&tank);
-    // Newton's iteration for the first zero of p_x.
+    // Newton's method finds the first zero of p_x, after a quarter of a period.
     let mut quarter = 1.5 / w;
     for _ in 0..6 {
         let mut moved = T::start(&tank);
@@ -90,14 +90,14 @@ pub fn planar<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     FRAC_PI_2 / quarter / w
 }
 
-/// Returns the frequency of the mode, over the linear one, on a circle with A = |q|/l.
+/// Returns the frequency of the mode, divided by the linear frequency, on a circle with A = |q|/l.
 pub fn circular<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     let w = linear_frequency(&tank);
     tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
-    // The acceleration along the meridian is linear in the square of the rate.
+    // The acceleration along the meridian is a linear function of the squared rate.
     let mut slide = |rate: f64| {
         tank.p_dot_0[0] = [0.0, a * rate, 0.0];
-        // On a circle p_x'' = -a rate^2.
+        // For motion on a circle p_x'' = -a rate^2.
         T::start(&tank).rates()[3] + a * rate * rate
     };
     let [at_rest, moving] = [slide(0.0), slide(w)];
