@@ -1,13 +1,14 @@
-//! Damping that grows with the amplitude.
+//! Damping of slosh modes that grows with the amplitude A of the wave:
 //!
 //! ```text
 //! zeta(A) = zeta + zeta_A A + zeta_b b(sigma A),   A^2 = |q|^2 + |q'|^2/W,   W = omega_n^2
 //! ```
 //!
-//! q is the slosh angle in both directions, rad (displacement over length in the model liquid). Waves of finite height
-//! dissipate more energy per period than the laminar layer at the wall: the surface film stretches, the contact line moves.
-//! There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The drag on the slosh mass is 2
-//! zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation A' = -omega_n zeta(A) A.
+//! q is the slosh angle in both directions, rad (in the slosh model `liquid`, displacement divided by length). Waves of
+//! finite height dissipate more energy per period than the laminar layer at the wall, because the surface film stretches
+//! and the contact line moves. There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The
+//! drag on the slosh mass is 2 zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation A'
+//! = -omega_n zeta(A) A.
 //!
 //! Waves break above a steepness s_b. Steepness is k a, with the wave's amplitude a at the wall and the mode's wave
 //! number k. Linear theory gives a = `wave` A, so k a = sigma A with sigma = k `wave`. In an upright cylinder k = xi_n/R
@@ -27,7 +28,7 @@
 //! c_b = m zeta_b [y + (y^2 + delta^2 W)^(1/2) - B omega_n],   y = sigma u^(1/2) - s_b omega_n
 //! ```
 //!
-//! A_0, far below any motion of interest, keeps u away from 0, where the root has no power series.
+//! A_0 is far below any motion of interest. It keeps u away from 0, where the root has no power series.
 
 use taylor::series::{Series, ZERO, mul_ramp, sqrt, square, time_within, values};
 
@@ -38,8 +39,8 @@ const WEIGHTLESS: f64 = 1e-6;
 
 const ROUNDED: f64 = 0.02;
 
-/// Damping by breaking waves of one mode. With the symbols of the module's head, `zeta` is zeta_b (0 if waves do not
-/// break), `onset` is the steepness s_b, and `steepness` is sigma, 1/rad.
+/// Damping of one mode by breaking waves, with the symbols of the module's head: `zeta` is zeta_b (0 if waves do not break),
+/// `onset` is the steepness s_b, and `steepness` is sigma, 1/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breaking {
     pub zeta: f64,
@@ -51,10 +52,10 @@ impl Breaking {
     const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
 }
 
-/// Growth of one mode's drag with its amplitude, with the series of the quantities in the equations above.
-/// `zeta` is zeta_A, 1/rad; `w_floor` is a constant added to W, 1/s2; `w` is W and its rate. The `share` of
-/// the other drag, viscous or a baffle's, and the gains of both growing parts are relative to the whole drag
-/// at the start.
+/// Part of one mode's drag that grows with the amplitude, with the power series of the quantities in the module's
+/// head. `zeta` is zeta_A, 1/rad; `w_floor` is a constant that is added to W, 1/s2; `w` is W and its rate. `share`,
+/// the other drag (viscous or of a baffle), and the gains of both growing parts are divided by the whole drag at the
+/// start of the expansion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
     pub acts: bool,
@@ -68,8 +69,7 @@ pub struct Growth {
     omega: Series,
     excess: Series,
     rounded: Series,
-    /// Viscous drag coefficient over its value at the start of the expansion, as a power series in
-    /// time.
+    /// Viscous drag coefficient, divided by its value at the start of the expansion, as a power series in time.
     pub viscous: Series,
     share: f64,
     gain: f64,
@@ -104,10 +104,9 @@ impl Growth {
         Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts an expansion of the drag with W and its rate `w`, at the squares of slosh angle and
-    /// rate [|q|^2, |q'|^2]. `m` is the slosh mass, kg; `c` is the drag coefficient that does not
-    /// depend on the amplitude, whose viscous part follows the series `viscous`. Returns the
-    /// coefficient of the whole drag.
+    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and
+    /// rate. `m` is the slosh mass, kg. `c` is the drag coefficient that does not depend on the amplitude; its viscous part
+    /// follows the series `viscous`. Returns the whole drag coefficient.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -149,10 +148,10 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns the drag over its value at the start of the expansion, and the quantity u of the
-    /// module's head, at `h`, s, after that start. u comes from its series up to order n, and the
-    /// drag is computed from u and from the drag `other` that does not depend on the amplitude. The
-    /// difference from the drag's own series is therefore the error of this series.
+    /// Returns, at `h`, s, after the start of the expansion, the drag divided by its value at the start, and the
+    /// quantity u of the module's head. u is computed from its series up to order n, and the drag from u and from the
+    /// drag `other` that does not depend on the amplitude. The difference of this drag from its own series is therefore
+    /// the error of the series.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);

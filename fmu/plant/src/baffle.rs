@@ -1,26 +1,25 @@
-//! A flat ring at the wall below the surface, whose damping grows with the wave.
+//! Ring baffle: a flat ring at the wall below the surface, whose damping grows with the wave.
 //!
-//! Miles (1958), first mode of an upright cylinder, for a ring of the width w at the depth d below
-//! the surface, covering alpha = (w/R)(2 - w/R) of the section, and a wave of the amplitude eta at
-//! the wall:
+//! Miles (1958) gives the damping ratio of the first mode of an upright cylinder, for a ring of the width w at the depth d
+//! below the surface, which covers alpha = (w/R)(2 - w/R) of the cross-section, and a wave of the amplitude eta at the wall:
 //!
 //! ```text
 //! zeta = 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)
 //! ```
 //!
-//! The ring separates the flow. The drag is 2 zeta omega m times the slosh mass's velocity, with the amplitude from the
-//! current q and q', eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2. It therefore always dissipates, and in a free
-//! oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
+//! The damping comes from the separated flow at the ring. The drag is 2 zeta omega m times the slosh mass's velocity. The
+//! amplitude is computed from the present q and q': eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2. The drag
+//! therefore always dissipates, and in a free oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
 //!
 //! ```text
 //! c_b = 2 m Z u^(1/4),   u = W [W (|q|^2 + A_0^2) + |q'|^2],   zeta = Z A^(1/2)
 //! ```
 //!
-//! A_0, far below the law's range, keeps u away from 0.
+//! A_0 is far below the amplitudes of the law. It keeps u away from 0, where the root has no power series.
 //!
-//! The drag follows the law of Keulegan and Carpenter for plates in oscillating flow. It holds if the liquid's stroke
-//! at the ring is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. For smaller waves the
-//! damping is higher than the law.
+//! The formula follows Keulegan and Carpenter's law for plates in oscillating flow. It holds if the liquid's stroke at the
+//! ring is 0.64 to 6.4 ring widths, the ring stays covered (d >= eta) and alpha < 0.25. For smaller waves the damping is
+//! higher than the formula.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -35,17 +34,17 @@ use crate::parameters::{Parameters, Ring, SloshSource};
 /// times exp(-1.84 d/R), to the ring's width.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 as a share of the wave amplitude from which on the baffle's law holds. It adds 2e-4 of the
-/// damping at that amplitude.
+/// A_0 divided by the smallest wave amplitude for which the baffle's law holds. At this amplitude A_0 adds 2e-4 to the
+/// damping.
 const FLOOR: f64 = 0.03;
 
 /// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
 const WEIGHTLESS: f64 = 1e-6;
 
-/// A ring baffle and its drag on one mode, with the series of the quantities in the equations above. `zeta`
-/// is Z, the damping ratio at a slosh angle of 1 rad, 0 without a baffle; `floor2` is A_0^2; `w_floor` is a
-/// constant added to W, 1/s2; `w` is W and its rate. `viscous` is relative to its value at the start of the
-/// expansion, and `gain` is 2 m Z over the whole drag coefficient there.
+/// A ring baffle and its drag on one mode, with the power series of the quantities in the module's head. `zeta` is Z, the
+/// damping ratio at a slosh angle of 1 rad, and 0 without a baffle; `floor2` is A_0^2; `w_floor` is a constant that is added
+/// to W, 1/s2; `w` is W and its rate. `viscous` is divided by its value at the start of the expansion, and `gain` is 2 m Z
+/// divided by the whole drag coefficient there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baffle {
     pub zeta: f64,
@@ -93,7 +92,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         }
         if p.slosh.source == SloshSource::Geometry && depth >= p.tank.h {
             problems.push(format!(
-                "baffle.depth = {depth} m (allowed: less than tank.h = {} m; depths count from the \
+                "baffle.depth = {depth} m (allowed: less than tank.h = {} m, because the depth is measured from the \
                  surface)",
                 p.tank.h
             ));
@@ -102,8 +101,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Lists warnings about a ring baffle for which Miles's formula does not hold: a wide ring, or a tank given
-/// by a table of modes.
+/// Returns warnings if Miles's formula does not hold for the ring baffle, because the ring is wide or the tank is given by
+/// a table of modes.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     if p.baffle.width <= 0.0 {
@@ -112,8 +111,8 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let alpha = covered(p.tank.d / 2.0, p.baffle.width);
     if alpha >= 0.25 {
         warnings.push(format!(
-            "baffle.width: the ring covers {alpha:.3} of the section, but Miles's formula holds for less \
-             than 0.25"
+            "baffle.width: the ring covers {alpha:.3} of the cross-section, but Miles's formula holds only below \
+             0.25"
         ));
     }
     if p.slosh.source == SloshSource::Table {
@@ -125,8 +124,8 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     warnings
 }
 
-/// Range of the baffle's law; `stroke` is the liquid's stroke at the ring over its width, per wave amplitude,
-/// 1/m.
+/// Range of validity of the baffle's law. `stroke` is the liquid's stroke at the ring divided by its width, per wave
+/// amplitude, 1/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     stroke: f64,
@@ -148,15 +147,15 @@ impl Range {
 
     pub fn contains(&self, amplitude: f64) -> bool {
         STROKE.contains(&(amplitude * self.stroke))
-            // d = eta is inside the range, independent of rounding.
+            // d = eta is inside the range, whatever the rounding errors.
             && amplitude <= self.depth * (1.0 + 1e-9)
             && self.covers_little
     }
 }
 
 impl Baffle {
-    /// Creates the baffle of the first mode, whose wave at the wall is `wave` per angle, m/rad, and whose
-    /// pendulum has the length `l`, m.
+    /// Creates the baffle for the first mode. `wave` is the elevation of the wave at the wall per slosh angle, m/rad, and
+    /// `l` the pendulum length, m.
     pub fn new(p: &Parameters, wave: f64, l: f64) -> Baffle {
         let (radius, Ring { width, depth }) = (p.tank.d / 2.0, p.baffle);
         let zeta = miles_ring(radius, depth, width, wave);
@@ -172,9 +171,9 @@ impl Baffle {
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts an expansion of the drag with W and its rate `w`, at the squares of slosh angle and
-    /// rate [|q|^2, |q'|^2]. `m` is the slosh mass, kg; `c` is the viscous drag coefficient, which
-    /// follows the series `viscous`. Returns the coefficient of baffle and viscous drag together.
+    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and
+    /// rate. `m` is the slosh mass, kg. `c` is the viscous drag coefficient, which follows the series `viscous`. Returns the
+    /// drag coefficient of baffle and viscosity together.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -192,7 +191,7 @@ impl Baffle {
         self.v2[n] = v2;
         self.sum[n] = mul_ramp(n, &self.w, &self.q2) + v2;
         self.u[n] = mul_ramp(n, &self.w, &self.sum);
-        // u y' = u' y/4
+        // The series follows from u y' = u' y/4.
         self.root[n] = if n == 0 {
             libm::sqrt(libm::sqrt(self.u[0]))
         } else {
@@ -209,9 +208,9 @@ impl Baffle {
         sum.min(time_within(self.w[0], self.w[1].abs(), 0.0))
     }
 
-    /// Returns the drag over its value at the start of the expansion, and the bracket W (|q|^2 +
-    /// A_0^2) + |q'|^2, at `h`, s, after that start. Both come from the series of the bracket and
-    /// of the viscous drag up to order n, so that the error of the drag's own series follows.
+    /// Returns, at `h`, s, after the start of the expansion, the drag divided by its value at the start, and the bracket W
+    /// (|q|^2 + A_0^2) + |q'|^2. Both are computed from the series of the bracket and of the viscous drag up to order n. The
+    /// difference of this drag from its own series is therefore the error of the series.
     pub fn drag_at(&self, n: usize, h: f64) -> [f64; 2] {
         let [sum, viscous] = values([&self.sum, &self.viscous], n, h);
         let (sum, w) = (sum.max(0.0), f64::max(self.w[0] + self.w[1] * h, 0.0));

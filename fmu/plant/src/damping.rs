@@ -8,7 +8,7 @@
 //! c(g) = c_0 [(g + a_n)/(g_0 + a_n)]^p,   p = 1/2 (constant_ratio) or 1/4 (laminar)
 //! ```
 //!
-//! with c_0 at a reference g_0; without restoring force there is no damping.
+//! where c_0 is the coefficient at a reference g_0. Without restoring force there is no damping.
 
 use taylor::series::{Series, ZERO};
 
@@ -17,12 +17,12 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Share of the largest specific force g on a ramp below which the factor c/c_0 is replaced by its
-/// mean, because its power series converge only up to g = 0. The time below this share is so short
-/// that the error, of second order in the time, is below rounding.
+/// Fraction of the largest specific force g on a ramp. Where g is below it, the factor c/c_0 is replaced by its mean,
+/// because its power series converge only as far as g = 0. This time is so short that the error, which is of second order in
+/// the time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
-/// Largest step as a share of the series' radius of convergence, the time to g = 0.
+/// Largest step as a fraction of the time to g = 0, which is the series' radius of convergence.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
 pub const RAMP_ORDER: usize = 10;
@@ -58,9 +58,8 @@ impl Damping {
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. It is 0 without
-    /// restoring force, and so close to that point that the formula overflows, because the ratio
-    /// has no meaning there.
+    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. Returns 0 where the ratio has no meaning:
+    /// without restoring force, and so close to this case that the formula overflows.
     pub fn ratio(&self, n: usize, g: f64) -> f64 {
         let (zeta, a) = (self.zeta[n], self.centring[n]);
         match self.exponent == 0.25 {
@@ -76,10 +75,9 @@ impl Damping {
         if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
-    /// Sets the restoring specific force of mode `n` and the series of its drag factor c/c_0 in the
-    /// mode's `pendulum`, from the specific force `g` and its slope. Returns the time, s, for which
-    /// the series hold. If g + a_n is below `floor`, the factor is its mean until the ramp ends or
-    /// g + a_n reaches twice `floor`.
+    /// Sets the restoring specific force of mode `n` and the series of its drag factor c/c_0 in the mode's `pendulum`, from
+    /// the specific force `g` and its slope. If g + a_n is below `floor`, the factor is replaced by its mean, until the ramp
+    /// ends or g + a_n reaches twice `floor`. Returns the time, s, over which the series are valid.
     pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
         let a = self.centring[n];
         let x = g.value + a;
@@ -100,14 +98,14 @@ impl Damping {
         reach
     }
 
-    /// Returns the specific force, m/s2, below which the drag factor c/c_0 is replaced by its mean
-    /// while g follows a ramp for `h` seconds.
+    /// Returns the specific force, m/s2, below which the drag factor c/c_0 is replaced by its mean if g follows a
+    /// ramp for `h` seconds.
     pub fn floor(g: Ramp, h: f64) -> f64 {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.value_at(h)) }
     }
 
-    /// Writes the binomial series of the drag factor c/c_0, divided by its value at the start, into
-    /// `c`. `relative` is the slope of the specific force over its value at the start, 1/s.
+    /// Writes the binomial series of the drag factor c/c_0, divided by its value at the start, into `c`. `relative` is the
+    /// slope of g + a_n divided by g + a_n at the start, 1/s.
     fn series(&self, relative: f64, c: &mut Series) {
         for n in 0..RAMP_ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;

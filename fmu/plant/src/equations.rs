@@ -1,8 +1,8 @@
-//! The plant as equations x' = f(x, u) with events, for hosts that integrate themselves, and their
-//! partial derivatives.
+//! The plant as equations x' = f(x, u) with events, and their partial derivatives, for hosts that integrate the states
+//! themselves.
 //!
-//! x is declared in `state.rs`. The friction's contact and the regime are discrete states. They
-//! change only in [`Plant::take_event`], when an indicator has crossed zero.
+//! x is defined in `state.rs`. The contact of hub and bearing and the slosh regime are discrete states. They change only in
+//! [`Plant::take_event`], after an event indicator has crossed zero.
 
 use alloc::format;
 use alloc::string::String;
@@ -19,23 +19,23 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples that are taken at one instant. A host that has passed more
-/// samples in one step does not handle the FMU's time events.
+/// Largest number of gyro samples that are taken at one instant. If more are due, the host does not handle the FMU's time
+/// events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
-    /// Returns the continuous states, by the indices in [`x`].
+    /// Returns the continuous states, in the order of [`x`].
     pub fn continuous_states(&self) -> &[f64; STATES] {
         &self.state.x
     }
 
-    /// Sets the continuous states from the host, by the indices in [`x`].
+    /// Sets the continuous states, in the order of [`x`], as a host has integrated them.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.state.x = *x;
     }
 
-    /// Sets the host's time, s, and, if the host integrates, the time since the start, s. Times of the host
-    /// that differ by at most `resolution`, s, count as the same.
+    /// Sets the simulation time of the host, s, and, if the host integrates the states itself, the time since the start, s.
+    /// Times of the host that differ by at most `resolution`, s, count as equal.
     pub fn set_time(&mut self, time: f64, since_start: Option<f64>, resolution: f64) {
         (self.state.time, self.resolution) = (time, resolution);
         if let Some(elapsed) = since_start {
@@ -43,16 +43,16 @@ impl Plant {
         }
     }
 
-    /// Returns the derivatives x' of the continuous states, for hosts that integrate themselves.
+    /// Returns the derivatives x' of the continuous states by time, for hosts that integrate the states themselves.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
         self.coefficients(0, -torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
-    /// Returns the directional derivative of x', the derivatives of the states, if the states change along dx and the
-    /// inputs [tau_cmd, tau_ext, g_axial] along du. It is coefficient 1 of the power series of x' along x + dx s and u
-    /// + du s. The contact (stick or slip) and the state of the wheel (blocked, at its torque limit or free) are kept.
+    /// Returns the exact derivative of x' if the states change by dx and the inputs [tau_cmd, tau_ext, g_axial] by du. It is
+    /// coefficient 1 of the power series in s of x' at x + dx s and u + du s. The contact (stick or slip) and the state of
+    /// the wheel (blocked, at its torque limit or free) do not change.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -102,9 +102,9 @@ impl Plant {
         derivatives
     }
 
-    /// Returns the event indicators, by the indices in [`indicator`]: functions that are positive between
-    /// events and cross zero at events. They are 1 where the event cannot happen, and never 0, so that a
-    /// host's root finder sees no crossing right after an event.
+    /// Returns the event indicators, in the order of [`indicator`]. They are positive between events and cross zero at
+    /// events. An indicator of an event that cannot happen is 1. No indicator is ever exactly 0, so that a host's root
+    /// finder sees no crossing right after an event.
     pub fn event_indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let just_positive = |z: f64| if z == 0.0 { f64::MIN_POSITIVE } else { z };
         self.indicators(inputs).map(just_positive)
@@ -135,16 +135,17 @@ impl Plant {
         z
     }
 
-    /// Performs everything that is due at the current instant. It puts a hub that has just stopped exactly at
-    /// rest, determines its new contact, keeps the rotor within its speeds, takes the gyro's samples, and
-    /// updates the regime. Returns true if continuous states have changed.
+    /// Performs all events that are due at the present time: sets the rate of a hub that has stopped to exactly 0,
+    /// determines its new contact, keeps the rotor's speed within its limits, takes the gyro's samples, and updates the
+    /// slosh regime. Returns true if continuous states have changed.
     ///
     /// # Errors
-    /// [`StepError::Model`], [`StepError::NotFinite`]; the plant is unchanged.
+    /// [`StepError::Model`] or [`StepError::NotFinite`]; the plant is then unchanged.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
-        // Too many samples, or a time so far from zero that the clock cannot separate two samples.
+        // Either too many samples are due, or the time is so large that double precision cannot distinguish the
+        // times of two samples.
         let endless = |due: f64| -due > SAMPLES_AT_ONCE * period || time + period <= time;
         if self.next_sample().is_some_and(endless) {
             return Err(StepError::Model(format!(
@@ -161,8 +162,8 @@ impl Plant {
             }
             self.find_contact(inputs);
         }
-        // A host's root finder may land exactly on the break-away, where the torque is still held.
-        // The next sign change would never come.
+        // A host's root finder may stop exactly at the break-away, where the bearing still holds the torque. The indicator
+        // would then not change its sign again.
         if self.state.contact == Contact::Stuck {
             let z = self.indicators(inputs);
             if z[indicator::BREAK_AWAY_FORWARD] <= 0.0 {
@@ -185,9 +186,8 @@ impl Plant {
         self.state.record_contact(contact, time);
     }
 
-    /// Returns true if an event is overdue that no indicator showed in the host's last step: the host has
-    /// integrated past a change of the contact or past a speed limit of the rotor, or the wave has reached
-    /// another regime.
+    /// Returns true if an event is overdue although no indicator changed its sign in the host's last step: the host has
+    /// integrated past a change of the contact or past a speed limit of the rotor, or the wave has reached another regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let z = self.indicators(inputs);
         let lasting = [
@@ -207,7 +207,7 @@ impl Plant {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)
     }
 
-    /// Changes the friction law from here on.
+    /// Changes the parameters of the bearing's friction law from now on.
     ///
     /// # Errors
     /// Lists all problems of the parameters; the plant is unchanged.
@@ -222,11 +222,11 @@ impl Plant {
         Ok(())
     }
 
-    /// Adds the work of a changing g_axial since the last accepted step. A host that integrates itself must
-    /// call it when its integrator has accepted a step.
+    /// Adds the work that a changing g_axial has done since the last accepted step. A host that integrates the states itself
+    /// must call this function when its integrator has accepted a step.
     ///
-    /// The inputs' derivatives are unknown here. The rule is exact to fourth order in the step if g_axial is
-    /// linear in time, otherwise to second order.
+    /// Since the inputs' derivatives are not known here, the work is exact to fourth order in the step if g_axial is linear
+    /// in time, and otherwise to second order.
     ///
     /// # Errors
     /// [`StepError::NotFinite`]; the plant is unchanged.
@@ -243,10 +243,10 @@ impl Plant {
         Ok(())
     }
 
-    /// Refuses states from the host that are outside the models' range.
+    /// Returns an error if the states that a host has integrated are outside the range of the models.
     ///
     /// # Errors
-    /// [`StepError::Model`] names the mode and the reason.
+    /// [`StepError::Model`] with the number of the mode and the reason.
     pub fn check_range(&self) -> Result<(), StepError> {
         let time = self.state.time;
         with_modes!(&self.liquid, modes => {
@@ -356,7 +356,7 @@ mod tests {
         p.init.slosh_rate = 2.0;
         p.init.slosh_rate_radial = 3.0;
         if p.slosh.table.is_askew(2) {
-            // along the direction of mode 1
+            // The motion is along the direction of mode 1.
             let across = libm::tan(p.slosh.table.direction[0]);
             p.init.slosh_angle_radial = across * p.init.slosh_angle;
             p.init.slosh_rate_radial = across * p.init.slosh_rate;
@@ -429,8 +429,8 @@ mod tests {
                 };
                 for direction in 0..STATES + 3 {
                     let (dx, du) = unit(direction);
-                    // Coordinates are 0.01 to 1. Central differences over 2e-5 of that have an
-                    // error of the square, 1e-10, times the third derivative.
+                    // The coordinates are 0.01 to 1. Central differences with a step of 1e-5 times the coordinate have an
+                    // error of 1e-10 times the third derivative.
                     let eps = 1e-5 * if is_a_length(slosh) { 0.05 } else { 1.0 };
                     let at = |sign: f64, plant: &mut Plant| {
                         let mut moved = x;
@@ -474,7 +474,7 @@ mod tests {
     fn continuous(outputs: &Outputs) -> Vec<(&'static str, f64)> {
         macro_rules! all {
             ($($name:ident),*) => {{
-                // fails to compile if an output is missing here
+                // This pattern does not compile if an output is missing here.
                 let Outputs { $($name,)* wave: [radial, tangential], discrete: _ } = *outputs;
                 vec![$((stringify!($name), $name),)* ("wave", radial), ("wave", tangential)]
             }};
@@ -522,13 +522,12 @@ mod tests {
                         plant.state.x[x::OMEGA] = 0.0;
                     }
                     let x = *plant.continuous_states();
-                    // An arbitrary direction; the models' own sizes are 0.01 to 1.
+                    // The direction is arbitrary; the states have sizes of 0.01 to 1.
                     let mut dx: [f64; STATES] = core::array::from_fn(|i| libm::sin(1.0 + i as f64));
-                    dx[x::BRISTLE] *= 1e-4; // deflections are some µrad
+                    dx[x::BRISTLE] *= 1e-4; // bristle deflections are some µrad
                     let du = [0.3, -0.4, 0.7];
-                    // Central differences have an error of the square of this step times the third
-                    // derivative, 1e-10 for a curvature over 0.1, and a rounding error of
-                    // 1e-16/1e-6.
+                    // Central differences have an error of the squared step times the third derivative, 1e-10 for a
+                    // curvature over 0.1, and a rounding error of 1e-16/1e-6.
                     let eps = 1e-6 * if is_a_length(slosh) { 0.1 } else { 1.0 };
                     let at = |sign: f64, plant: &mut Plant| {
                         let moved = core::array::from_fn(|i| x[i] + sign * eps * dx[i]);
@@ -544,7 +543,11 @@ mod tests {
                     plant.set_continuous_states(&x);
                     let before = plant.outputs_held(&inputs);
                     let derivatives = plant.output_derivatives(&inputs, &dx, &du);
-                    assert_eq!(plant.outputs_held(&inputs), before, "nothing has moved");
+                    assert_eq!(
+                        plant.outputs_held(&inputs),
+                        before,
+                        "the outputs must not have changed"
+                    );
                     let [plus, minus, before, derivatives] =
                         [plus, minus, before, derivatives].map(|o| continuous(&o));
                     for (n, (name, got)) in derivatives.into_iter().enumerate() {
@@ -575,7 +578,7 @@ mod tests {
             assert_eq!(indicators[forward].min(indicators[backward]), f64::MIN_POSITIVE);
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact().2, sign as i32);
-            // Again at the same instant.
+            // A second event at the same instant changes nothing.
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact(), (1, 0.0, sign as i32));
         }
@@ -587,7 +590,7 @@ mod tests {
         p.imu.enabled = true;
         p.imu.rate = 1e4;
         let inputs = Inputs::default();
-        // At 1e6 s, where ten microseconds later the clock resolves only 1e-10 s.
+        // At 1e6 s the clock resolves 1e-10 s; the sample is due ten microseconds later.
         let mut plant = Plant::new(&p, &inputs, 1e6, 1e-9).unwrap();
         for _ in 0..100 {
             let due = plant.next_time_event().unwrap();
@@ -600,7 +603,7 @@ mod tests {
         assert!(plant.take_event(&inputs).is_err());
         plant.set_time(before.time, Some(before.elapsed[0]), 2e-9);
         assert_eq!(*plant.state(), before);
-        // At a time whose resolution is seconds.
+        // At this time the clock has a resolution of seconds.
         let mut plant = Plant::new(&p, &inputs, 1e16, 1e-9).unwrap();
         assert!(plant.take_event(&inputs).is_err());
     }
@@ -615,7 +618,7 @@ mod tests {
         let inputs = Inputs::default();
         let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
         let before = *plant.state();
-        // Hub and liquid at rest: one step of the integrator, and 5e13 samples.
+        // Hub and liquid are at rest, so that the integrator needs only one step, but 5e13 samples would be due.
         let refused = plant.step(&inputs, 1e12);
         assert!(matches!(refused, Err(StepError::TooManySteps { .. })), "{refused:?}");
         assert_eq!(*plant.state(), before);
@@ -625,7 +628,7 @@ mod tests {
     #[test]
     fn a_motion_whose_energy_overflows_is_refused() {
         for slosh in SloshModel::ALL {
-            // indices of omega and the tangential rate of the first mode
+            // These are the indices of omega and of the tangential rate of the first mode.
             let places = if slosh == SloshModel::Frozen {
                 &[x::OMEGA][..]
             } else {
@@ -643,8 +646,8 @@ mod tests {
         }
     }
 
-    /// A damaged saved state may contain any number as the work of g_axial. If the work after a step would be too large
-    /// to be saved again, the step is refused.
+    /// A damaged saved state may contain any number as the work of g_axial. If the work after a step would be too large to
+    /// be saved, the step is refused.
     #[test]
     fn work_through_g_axial_beyond_all_magnitudes_is_refused() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);
@@ -677,11 +680,10 @@ mod tests {
         assert!(plant.omega() < 0.0);
     }
 
-    /// The derivatives of the bench, integrated by Runge–Kutta steps of 0.1 ms, end at the state that the Co-Simulation
-    /// step reaches.
+    /// Runge-Kutta steps of 0.1 ms with the derivatives of the bench end at the state that a Co-Simulation step reaches.
     #[test]
     fn a_model_exchange_host_reproduces_co_simulation_of_the_plant() {
-        // Runge-Kutta 4 at 0.1 ms: (omega_2 h)^4 = 4e-11 per step; 1e-9 over 0.2 s.
+        // Each Runge-Kutta step of 0.1 ms has the error (omega_2 h)^4 = 4e-11, so that the error after 0.2 s is 1e-9.
         for slosh in SloshModel::ALL {
             let (mut plant, inputs) = plant(slosh, FrictionModel::Viscous);
             let mut own = plant.clone();

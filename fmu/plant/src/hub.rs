@@ -3,9 +3,9 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp, number};
 
-/// Motion of the hub as seen by liquid and bearing: the series of theta, w, w^2 and w' (rad, s), the specific
-/// force `g` along the tank's axis, m/s2, with its rate, and the time `damping_reach`, s, for which the
-/// series of the damping is valid.
+/// Motion of the hub, on which liquid and bearing depend: the series of theta, w, w^2 and w' (rad, s), the specific
+/// force `g` along the tank's axis, m/s2, with its rate, and the time `damping_reach`, s, over which the series of
+/// the damping are valid.
 #[derive(Clone, Debug)]
 pub struct HubMotion {
     pub theta: Series,
@@ -17,15 +17,15 @@ pub struct HubMotion {
     pub tilt: Tilt,
 }
 
-/// Gravity across the axis of a tilted bench. In the hub's frame, with the tangent t of the tilt and the
-/// azimuth phi of the lateral component,
+/// Gravity across the axis of a tilted bench. In the hub's frame, with the tangent t of the tilt angle and the azimuth phi
+/// of the component across the axis,
 ///
 /// ```text
 /// e = g d, d = t (cos(phi - theta), sin(phi - theta))
 /// ```
 ///
-/// where g is the specific force along the axis. A mass M at the position X has the energy -M e.X, and d' = w
-/// (d_y, -d_x).
+/// where g is the specific force along the axis. A mass M at the position X has the potential energy -M e.X, and d'
+/// = w (d_y, -d_x).
 #[derive(Clone, Debug)]
 pub struct Tilt {
     pub tangent: f64,
@@ -47,7 +47,7 @@ impl Tilt {
             let (sin, cos) = libm::sincos(self.azimuth - theta[0]);
             (self.direction[0][0], self.direction[1][0]) = (self.tangent * cos, self.tangent * sin);
         } else {
-            // d' = theta' (d_y, -d_x)
+            // The series follows from d' = theta' (d_y, -d_x).
             let [x, y] = &self.direction;
             let turned = |d: &Series| {
                 (1..=n).map(|j| j as f64 * theta[j] * d[n - j]).sum::<f64>() / n as f64

@@ -1,21 +1,20 @@
 //! The rate gyro on the hub: samples the hub's rate, adds white noise, a Gauss-Markov bias, flicker
 //! noise and a rate random walk, quantises, and holds the value until the next sample.
 //!
-//! White noise per sample sigma = N sqrt(rate) (N as an Allan coefficient). The bias is of first
-//! order, with sigma_b = B/0.664 and correlation time `bias_time` (thesis 5.5; IEEE Std 952). The
-//! random numbers of sample k are functions of only the seed and k, so a restored state continues
-//! with the same noise.
+//! White noise has the standard deviation sigma = N sqrt(rate) in each sample, where N is the angle random walk (Allan
+//! coefficient). The bias is a Gauss-Markov process of first order, with sigma_b = B/0.664 and the correlation time
+//! `bias_time` (Rubaga's thesis, section 5.5; IEEE Std 952). The random numbers of sample k depend only on the seed and k,
+//! so that a restored state continues with the same noise.
 //!
-//! Flicker noise is the sum of [`FLICKERS`] Gauss-Markov processes of equal variance whose
-//! correlation times grow by the factor q = [`RATIO`]. The sum of their one-sided spectra
-//! 4 sigma² T/(1 + (2 pi f T)²) is sigma²/(f ln q) with a ripple of 2/cosh(pi²/ln q) = 1.6 %. It is
-//! B²/(pi f), the flicker noise of bias instability B, for sigma² = B² ln q/pi. The rate random walk
-//! adds K/sqrt(rate) times a normal number a sample.
+//! Flicker noise is the sum of [`FLICKERS`] Gauss-Markov processes of equal variance sigma², whose correlation times T grow
+//! by the factor q = [`RATIO`]. The sum of their one-sided spectra 4 sigma² T/(1 + (2 pi f T)²) is sigma²/(f ln q) with a
+//! ripple of 2/cosh(pi²/ln q) = 1.6 %. For sigma² = B² ln q/pi it equals B²/(pi f), the flicker noise of the bias
+//! instability B. The rate random walk adds K/sqrt(rate) times a normal random number in each sample.
 
 use crate::parameters::Imu;
 
-/// Share of a sampling period by which the gyro may take a sample early, in addition to the
-/// resolution of the host's clock.
+/// Fraction of a sampling period by which the gyro may take a sample early, in addition to the resolution of the host's
+/// clock.
 const SLACK: f64 = 1e-6;
 
 pub(crate) const FLICKERS: usize = 8;
@@ -24,9 +23,9 @@ const RATIO: f64 = 6.0;
 /// the flicker noise.
 const SHORTEST: f64 = 0.1;
 
-/// State of the gyro: the index `next` of its next sample (sample k is taken k / rate after the start), the
-/// value `held` until then, and for the next sample the bias, the rate random walk and the processes of the
-/// flicker noise, all in rad/s.
+/// State of the gyro: the number `next` of its next sample (sample k is taken k/rate seconds after the start), the reading
+/// `held` until then, and for the next sample the bias, the rate random walk and the processes of the flicker noise. All
+/// values are in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
     pub next: u64,
@@ -47,10 +46,9 @@ impl Imu {
         gyro
     }
 
-    /// Takes all gyro samples that fall due within `length`, s, after `since_start`, s since the
-    /// start of the simulation. It stops after one sample more than `allowed`, so that the caller
-    /// can refuse the step. `omega` is the hub's rate as a function of the time within `length`.
-    /// Returns the number of samples.
+    /// Takes all gyro samples that fall due within `length`, s. `since_start` is the time at the beginning, s since the
+    /// start of the simulation, and `omega` is the hub's rate as a function of the time since then. Stops after one sample
+    /// more than `allowed`, so that the caller can refuse the step. Returns the number of samples.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
@@ -69,14 +67,14 @@ impl Imu {
         allowed + 1
     }
 
-    /// Returns the delay until sample k, s, at `since_start` seconds after the start.
+    /// Returns the time, s, from `since_start` (s after the start) until sample k; it is negative if the sample is overdue.
     #[inline(always)]
     pub(crate) fn due(&self, k: u64, since_start: f64) -> f64 {
         k as f64 / self.rate - since_start
     }
 
-    /// Returns true if a sample that is due after `due`, s, can be taken now. A host's clock has a
-    /// `resolution`, and its communication points and time events match sampling instants only to rounding.
+    /// Returns true if a sample that is due in `due` seconds can be taken now. Communication points and time events of a
+    /// host match sampling times only to rounding and to the `resolution` of the host's clock.
     #[inline(always)]
     pub(crate) fn is_due(&self, due: f64, resolution: f64) -> bool {
         due <= SLACK / self.rate + resolution
@@ -95,7 +93,7 @@ impl Imu {
             reading += gyro.walk;
             gyro.walk += self.rrw / libm::sqrt(self.rate) * normal_pair(self.seed, 1, gyro.next).0;
         }
-        // Quantisation steps below rounding have no effect.
+        // A quantisation step that is smaller than the rounding error of the reading has no effect.
         let seen = reading.abs() < 1e16 * self.lsb;
         gyro.held = if seen { libm::rint(reading / self.lsb) * self.lsb } else { reading };
         let keep = libm::exp(-1.0 / (self.rate * self.bias_time));
@@ -104,9 +102,8 @@ impl Imu {
         gyro.next += 1;
     }
 
-    /// Advances all processes of the flicker noise by one sample, number `k`. `keep` maps the
-    /// correlation time of a process, s, to the fraction of the process that remains after one
-    /// sample.
+    /// Advances all processes of the flicker noise by sample number `k`. `keep` returns, for the correlation time of a
+    /// process, s, the fraction of the process that remains after one sample.
     fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;
@@ -121,8 +118,8 @@ impl Imu {
     }
 }
 
-/// Returns two independent standard normal numbers for (seed, k): the Box-Muller transform of two uniform
-/// numbers from the SplitMix64 mixer.
+/// Returns two independent standard normal numbers for the seed and the sample number k: the Box-Muller transform of two
+/// uniform numbers from the SplitMix64 mixer.
 fn normals(seed: i32, k: u64) -> (f64, f64) {
     normal_pair(seed, 0, k)
 }
@@ -155,8 +152,8 @@ mod tests {
         const COUNT: usize = 200_000;
         let all: Vec<(f64, f64)> = (0..COUNT as u64).map(|k| normals(7, k)).collect();
         let mean = |f: &dyn Fn(usize) -> f64| (0..COUNT).map(f).sum::<f64>() / COUNT as f64;
-        // Standard errors: 1/sqrt(COUNT) = 0.0022 for means and correlations, sqrt(2) times that
-        // for the variance. Five standard errors do not fail by chance.
+        // The standard errors are 1/sqrt(COUNT) = 0.0022 for means and correlations, and sqrt(2) times as large for the
+        // variance. Five standard errors are not exceeded by chance.
         assert!(mean(&|k| all[k].0).abs() < 0.012);
         assert!((mean(&|k| all[k].0 * all[k].0) - 1.0).abs() < 0.016);
         assert!((mean(&|k| all[k].1 * all[k].1) - 1.0).abs() < 0.016);
@@ -175,7 +172,7 @@ mod tests {
             sum += gyro.held * gyro.held;
         }
         let spread = (sum / COUNT as f64).sqrt();
-        // Relative standard error of the spread: 1/sqrt(10,000) = 1 %; four of them.
+        // The relative standard error of the standard deviation is 1/sqrt(10,000) = 1 %; the test allows four.
         assert!((spread / (imu.bias_instability / 0.664) - 1.0).abs() < 0.04);
     }
 
@@ -199,8 +196,7 @@ mod tests {
         Imu { rate, arw: 0.0, bias_instability: 0.0, lsb: 0.0, ..Imu::default() }
     }
 
-    /// Returns the mean Allan variance of readings at rest over the seeds 0 to `seeds`, for averages of m
-    /// samples.
+    /// Returns the Allan variance of readings at rest for averages of m samples, as the mean over `seeds` seeds.
     fn allan_variance(imu: Imu, seeds: i32, m: usize) -> f64 {
         let mut sum = 0.0;
         for seed in 0..seeds {
@@ -232,7 +228,8 @@ mod tests {
 
     #[test]
     fn flicker_noise_has_a_flat_allan_deviation_and_the_random_walk_a_rising_one() {
-        // one pair of averages for each of 10,000 seeds: √(2/10,000) = 1.4 %; four of them and the ripple
+        // There is one pair of averages for each of 10,000 seeds, so that the standard error is √(2/10,000) = 1.4 %. The
+        // test allows four of them and the ripple.
         let flicker = Imu { flicker: 1e-3, ..clean(10.0) };
         let flat = 2.0 * core::f64::consts::LN_2 / core::f64::consts::PI * 1e-6;
         for m in [10, 100] {
@@ -241,7 +238,7 @@ mod tests {
         }
         let walk = Imu { rrw: 1e-3, ..clean(10.0) };
         for m in [10, 100] {
-            // K² τ/3 with the walk in steps: 1 + 1/(2 m²)
+            // The expected variance is K² τ/3, times 1 + 1/(2 m²) because the random walk has steps.
             let expected = 1e-6 * m as f64 * 0.1 / 3.0 * (1.0 + 0.5 / (m * m) as f64);
             let found = allan_variance(walk, 10_000, m);
             assert!((found / expected - 1.0).abs() < 0.06, "{m}: {}", found / expected);
@@ -273,13 +270,13 @@ mod tests {
                 sum += (gyro.held - 2.0) * (gyro.held - 2.0);
             }
             let spread = (sum / COUNT as f64).sqrt();
-            // Relative standard error 1/sqrt(2 COUNT) = 0.35 %; four of them.
+            // The relative standard error is 1/sqrt(2 COUNT) = 0.35 %; the test allows four.
             assert!((spread / (1e-3 * rate.sqrt()) - 1.0).abs() < 0.014, "{rate} {spread}");
         }
     }
 
-    /// A gyro reading at rest is the rate plus the bias plus a multiple of the first of the two
-    /// normal numbers that the seed gives for sample k; the second number drives the bias.
+    /// At rest the reading is the sum of rate, bias and a multiple of the first of the two normal numbers that belong to the
+    /// seed and sample k. The second number drives the bias.
     #[test]
     fn a_reading_is_rate_bias_and_the_seed_s_own_noise() {
         let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };
@@ -289,7 +286,7 @@ mod tests {
             let ((white, drift), bias) = (normals(imu.seed, k), gyro.bias);
             imu.sample(&mut gyro, 0.5);
             assert!((gyro.held - 0.5 - bias - 5e-3 * white).abs() < 1e-16, "{k}");
-            // e^(-1/2.5) of the bias remains, and its standard deviation of 1 mrad/s stays
+            // The fraction e^(-1/2.5) of the bias remains, and its standard deviation stays 1 mrad/s.
             let keep = libm::exp(-0.4);
             let next = keep * bias + 1e-3 * libm::sqrt(1.0 - keep * keep) * drift;
             assert!((gyro.bias - next).abs() < 1e-17, "{k}");
@@ -299,7 +296,7 @@ mod tests {
     #[test]
     fn the_initial_gyro_bias_has_the_specified_standard_deviation_and_correlation_time() {
         const COUNT: i32 = 40_000;
-        // One period is one correlation time: exp(-1) of the bias remains.
+        // One sampling period is one correlation time, so that exp(-1) of the bias remains.
         let imu = Imu { bias_instability: 1e-3, bias_time: 0.1, ..clean(10.0) };
         let (mut first, mut product) = (0.0, 0.0);
         for seed in 0..COUNT {
@@ -307,11 +304,11 @@ mod tests {
             let mut gyro = imu.start();
             let start = gyro.bias;
             imu.sample(&mut gyro, 0.0);
-            assert_eq!(gyro.held, start, "the bias is in the reading");
+            assert_eq!(gyro.held, start, "the reading must contain the bias");
             (first, product) = (first + start * start, product + start * gyro.bias);
         }
         let variance = first / f64::from(COUNT);
-        // Four standard errors: sqrt(2/COUNT) of a variance, 1/sqrt(COUNT) of a correlation.
+        // The test allows four standard errors: sqrt(2/COUNT) for the variance, and 1/sqrt(COUNT) for the correlation.
         assert!((variance / (1e-3 / 0.664f64).powi(2) - 1.0).abs() < 0.028, "{variance}");
         assert!((product / first - (-1.0f64).exp()).abs() < 0.02, "{}", product / first);
     }
@@ -337,16 +334,16 @@ mod tests {
         let imu = clean(50.0);
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 0.0);
-        // From 13 ms on for 0.1 s: samples at 20, 40, ... 100 ms see the rate 7, 27, ... 87 ms
-        // after the beginning.
+        // From 13 ms on, 0.1 s contain the samples at 20, 40, ... 100 ms, when the rate is 7, 27, ... 87 ms after the
+        // beginning.
         assert_eq!(imu.follow(&mut gyro, 0.013, 0.1, |t| 2.0 + t, 9), 5);
         assert_eq!((gyro.next, gyro.held), (6, 2.0 + (0.1 - 0.013)));
-        // None is early within a step; where a host looks in, at most by a millionth of a period and the clock's resolution.
+        // Within a step no sample is taken early. At the end of a step a sample may be early by a millionth of a period
+        // plus the clock's resolution.
         assert_eq!(imu.follow(&mut gyro.clone(), 0.1, 0.02 * (1.0 - 1e-9), |t| t, 9), 0);
         assert!(imu.is_due(0.9e-6 * 0.02, 0.0) && !imu.is_due(1.1e-6 * 0.02, 0.0));
         assert!(imu.is_due(1.1e-6 * 0.02, 0.2e-6 * 0.02) && imu.is_due(-1.0, 0.0));
-        // An overdue sample uses the rate at the beginning. At most one sample more than allowed is
-        // taken.
+        // An overdue sample uses the rate at the beginning of the step. At most one sample more than allowed is taken.
         assert_eq!(imu.follow(&mut gyro.clone(), 0.121, 0.01, |t| 3.0 + t, 9), 1);
         let mut late = gyro;
         imu.follow(&mut late, 0.121, 0.01, |t| 3.0 + t, 9);
@@ -363,7 +360,7 @@ mod tests {
             imu.sample(&mut gyro, rate);
             assert_eq!(gyro.held, steps * 1e-3);
         }
-        // Beyond 2^53 quantisation steps no rounding is possible.
+        // A reading beyond 2^53 quantisation steps cannot be rounded.
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 1.1e13);
         assert_eq!(gyro.held, 1.1e13);

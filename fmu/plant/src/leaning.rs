@@ -1,17 +1,17 @@
-//! Modes of an upright cylinder on a tilted bench. The free surface is tilted, which changes the frequencies
-//! (`formulas::tilt`). Pendulums hang obliquely, which also changes their frequencies.
+//! Slosh modes of an upright cylinder on a tilted bench. The tilted free surface changes the frequencies of the liquid
+//! (`formulas::tilt`). The pendulums hang obliquely, which changes their frequencies, too.
 //!
-//! The liquid's force on a hub that turns through small angles has the frequency below. s is the tangent of the tilt.
-//! n = sin(beta) is the tangential component of the direction of gravity across the axis at the hub's start angle (e = g
-//! s (cos beta, sin beta), `hub.rs`):
+//! If the hub turns through small angles, the liquid's force on the hub has the frequency below. s is the tangent of the
+//! tilt angle. n = sin(beta) is the tangential component of the direction of gravity across the axis at the hub's start
+//! angle (e = g s (cos beta, sin beta), `hub.rs`):
 //!
 //! ```text
 //! omega^2 = f g/l,   f = f_along n^2 + f_across (1 - n^2)
 //! ```
 //!
-//! where l is the upright tank's pendulum length, and the sloshing mass is m f. A mode's m/omega^2 is its share of the surface's
-//! static moment, rho pi R^4/4 for all modes together. The tilt does not change that moment. A pendulum of mass m' and length l'
-//! that swings about an equilibrium at u l' from the hinge has
+//! where l is the pendulum length in the upright tank, and m f is the sloshing mass. m/omega^2 of a mode is its share of the
+//! surface's static moment, which is rho pi R^4/4 for all modes together and does not depend on the tilt. A pendulum of mass
+//! m' and length l' that swings about an equilibrium at the displacement u l' from the hinge has
 //!
 //! ```text
 //! omega^2 = (g/l') F,   sloshing mass m' M
@@ -26,10 +26,10 @@
 //! e), and F is its ratio to e.(K^-1 e), for the two equations of small motions, with e the tangent. Hence l' = l F/f
 //! and m' = m f/M.
 //!
-//! f belongs to the tangential direction. In the radial direction n^2 and 1 - n^2 are exchanged: in F for models with one
-//! pendulum for both directions, in f for the liquid. A spherical pendulum has the same frequency in both directions. `liquid`
-//! separates them by itself, similar to the real liquid (deep: c = -0.36 along the slope and 0.37 across it, compared with -0.42
-//! and 0.23).
+//! f belongs to the tangential direction. For the radial direction n^2 and 1 - n^2 are exchanged: in F for models with one
+//! pendulum for both directions, and in f for the liquid. A spherical pendulum has the same frequency in both directions. In
+//! the model `liquid` the two frequencies differ by themselves, similar to the real liquid (deep: c = -0.36 along the slope
+//! and 0.37 across it; real liquid: -0.42 and 0.23).
 
 use alloc::format;
 use alloc::string::String;
@@ -47,8 +47,8 @@ pub(crate) struct Leaning {
     tangential: f64,
 }
 
-/// A mode on a tilted bench: mass and length of its pendulum in the plant, and the length l/f of an upright
-/// pendulum with the same frequency.
+/// A slosh mode on a tilted bench: mass and length of its pendulum in the plant, and the length l/f of an upright pendulum
+/// with the same frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mode {
     pub mass: f64,
@@ -57,8 +57,7 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Returns the tilt of the bench at the start of the motion; `None` for an upright bench and
-    /// for modes given by a table.
+    /// Returns the tilt of the bench at the start of the motion; `None` for an upright bench and if a table gives the modes.
     pub fn from_parameters(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
@@ -75,8 +74,7 @@ impl Leaning {
         [mixed(self.tangential), mixed(1.0 - self.tangential)]
     }
 
-    /// Returns mode `n`, which counts from 0, of the tilted tank from its pendulum `upright` in an
-    /// upright tank.
+    /// Returns mode `n`, which counts from 0, of the tilted tank. `upright` is the pendulum of this mode in an upright tank.
     pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
         let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
         let oblique = self.oblique(n, p);
@@ -121,8 +119,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Relative error of a mode's frequency in the radial direction above which a warning follows.
-/// Models with one pendulum for both directions have such an error.
+/// Relative error of a mode's frequency in the radial direction above which a warning is issued. Slosh models with one
+/// pendulum for both directions have this error.
 const APART: f64 = 0.01;
 
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {

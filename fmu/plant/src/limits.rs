@@ -1,5 +1,5 @@
-//! Ends of the range in which the slosh modes represent the liquid. The reasons, in the order in which they are given if
-//! there are several:
+//! Limits of the range in which the slosh modes represent the liquid. If several reasons apply, the first in
+//! this order is reported:
 //!
 //! ```text
 //! spin                 omega^2 R/(l w^2) > 0.3, or 2 omega/w > (1 + C_0)^(-1/2)   (`formulas::limits::SpinLimit`)
@@ -9,9 +9,9 @@
 //! third_order          A above the angle at which the model's frequency is wrong, or above 45 degrees
 //! ```
 //!
-//! w is the frequency of mode 1, w^2 = g/l + k/m, and A is its slosh angle, sin A = displacement/l. In an upright
-//! cylinder the angles follow from the depth and from the dependence of the model's frequency on the amplitude. A
-//! table of modes gives its own angles.
+//! w is the frequency of mode 1, w^2 = g/l + k/m, and A is its slosh angle, sin A = displacement/l. In an upright cylinder
+//! the limits of A follow from the depth and from the dependence of the model's frequency on the amplitude. A table of modes
+//! contains its own limits.
 
 use formulas::limits::{self, LOW_BOND, LimitedBy, SpinLimit};
 use formulas::third_order;
@@ -20,8 +20,8 @@ use crate::parameters::{MODES, Parameters, SloshSource};
 use crate::slosh::Angles;
 use crate::tank::Calculated;
 
-/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion on wider ellipses counts
-/// as rotary.
+/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion with a larger swirl
+/// number counts as rotary.
 const ROTARY: f64 = 0.8;
 const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 
@@ -29,12 +29,11 @@ const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 pub(crate) struct Limits {
     mode: [ModeLimits; MODES],
     spin: SpinLimit,
-    /// Bond number of the tank over g, s2/m; 0 if surface tension does not limit the range of the
-    /// modes.
+    /// Bond number of the tank divided by g, s2/m; 0 if surface tension does not limit the range of the modes.
     bond_per_g: f64,
 }
 
-/// Slosh angles at which a mode is out of range, rad; 0 if they are not known.
+/// Largest slosh angles of a mode within its range, rad; 0 if they are not known.
 #[derive(Clone, Copy, Debug, Default)]
 struct ModeLimits {
     angle: f64,
@@ -82,9 +81,8 @@ impl Limits {
         }
     }
 
-    /// Returns the reason, if any, why the modes do not represent the liquid on a hub with the rate
-    /// `omega`, rad/s. `modes` yields for each mode its slosh angles, its squared frequency, 1/s2,
-    /// and its pendulum length, m.
+    /// Returns the reason why the modes do not represent the liquid, if any. `omega` is the hub's rate, rad/s. `modes`
+    /// yields the slosh angles, the squared frequency, 1/s2, and the pendulum length, m, of each mode.
     pub fn reason(&self, modes: impl Iterator<Item = (Angles, f64, f64)>, omega: f64) -> LimitedBy {
         let mut reason = LimitedBy::None;
         for (n, (angles, omega2, l)) in modes.enumerate() {
@@ -96,7 +94,7 @@ impl Limits {
                     return LimitedBy::BondNumber;
                 }
             }
-            // Displacement and rate over the length; an angle of the linear model may be above 90 degrees.
+            // These are displacement and rate divided by the length; an angle of the linear model may exceed 90 degrees.
             let largest = core::f64::consts::FRAC_PI_2;
             let [(x, c_x), (y, c_y)] =
                 angles.angle.map(|angle| libm::sincos(angle.clamp(-largest, largest)));

@@ -1,6 +1,6 @@
-//! The hub's equation as power series, and the state machine for stick and slip. The instants at which the hub comes to
-//! rest or breaks away are roots of polynomials, found without stepping back. The steps are those of
-//! `taylor::integrator`.
+//! Integration of the plant's motion: the hub's equation as power series, and the transitions between stick and slip. The
+//! instants at which the hub comes to rest or breaks away are roots of polynomials, so that no step is repeated.
+//! `taylor::integrator` determines the lengths of the steps.
 
 use alloc::format;
 use core::ops::ControlFlow;
@@ -30,9 +30,9 @@ pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
-/// Place of the current stretch of motion within its step, which decides whether an event stops the step. `offset` is the
-/// time from the start of the step to the start of the stretch, s. Events up to `passed` seconds after the start of the
-/// step do not stop it; with infinity no event does.
+/// Position of the current stretch of motion within its step, which decides whether an event stops the step. `offset` is the
+/// time from the start of the step to the start of the stretch, s. An event stops the step only if it is later than `passed`
+/// seconds after the start of the step; `passed` is infinite if no event stops the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
     pub offset: f64,
@@ -45,10 +45,10 @@ impl Stop {
         self.offset + t > self.passed
     }
 
-    /// Returns the time, at most `h` after `t` in the stretch, of the first gyro sample at which the step
-    /// stops. The stretch begins `since_start` after the gyro's start. `allowed` samples from number `next`
-    /// on may be passed.
-    // Arguments by value: a reference would force all data of a stretch into memory.
+    /// Returns the time of the first gyro sample at which the step stops, at most `h` after the time `t` in the stretch.
+    /// The stretch begins `since_start` seconds after the gyro's start. At most `allowed` samples, from number `next` on,
+    /// may be taken before.
+    // Arguments are passed by value, because a reference would force all data of a stretch into memory.
     #[cold]
     fn at_sample(
         self,
@@ -62,27 +62,25 @@ impl Stop {
     }
 }
 
-/// The hub's equation J w' = tau + tau_f + T with the power series of its terms, where J = I0 + sum of J_i
-/// and T = sum of T_i over the modes. `i0` is the inertia of hub and rigid liquid, kg m2; `imbalance` holds
-/// the static moments of the dry hub, radial and tangential, and of the rigid liquid, kg m; `tau` is the
-/// torque of wheel and environment over the step and `net` is tau + T, which the bearing must hold at rest, N
-/// m; `power` holds the power of the external torques and the power dissipated in bearing, suspension line
-/// and liquid, W.
+/// The hub's equation J w' = tau + tau_f + T with the power series of its terms, where J = I0 + sum of J_i and T = sum of
+/// T_i over the modes. `i0` is the inertia of hub and rigid liquid, kg m2. `imbalance` contains the static moments of the
+/// dry hub, radial and tangential, and of the rigid liquid, kg m. `tau` is the torque of wheel and environment over the
+/// step, and `net` is tau + T, which the bearing must hold at rest, N m. `power` contains the power of the external torques
+/// and the power dissipated in bearing, suspension line and liquid, W.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     pub i0: f64,
     pub law: Law,
     pub suspension: Suspension,
     pub damping: Damping,
-    /// True if drag or weight of a slosh mass changes along an expansion although g is constant:
-    /// with amplitude-dependent drag, on a tilted bench, and with modes in other directions than
-    /// the tangent.
+    /// True if drag or weight of a slosh mass changes along an expansion although g is constant: if the drag depends on the
+    /// amplitude, the bench is tilted, or a mode has another direction than the tangent.
     pub varies: bool,
     with_amplitude: bool,
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// The specific force g, m/s2, and its rate with which the modes were last expanded; NaN if
-    /// there was no expansion, or if it is valid only for an instant.
+    /// The specific force g, m/s2, and its rate in the last expansion of the modes. NaN if there was no expansion, or if the
+    /// expansion is valid only for one instant.
     g: [f64; 2],
     near_weightless: f64,
     tolerance: f64,
@@ -147,7 +145,7 @@ impl Motion {
     #[cold]
     fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
         self.hub.g = [g.value, g.slope];
-        // Amplitude-dependent drag is valid only at this instant.
+        // Drag that depends on the amplitude is valid only at this instant.
         self.g = if self.with_amplitude { [f64::NAN; 2] } else { self.hub.g };
         self.hub.damping_reach = f64::INFINITY;
         for (n, mode) in modes.iter_mut().enumerate() {
@@ -177,8 +175,8 @@ impl Motion {
         -(e_x * (x + self.rigid_moment) + e_y * y)
     }
 
-    /// Returns the sum of mass times height above rest of hub and liquid (kg m), which is the potential energy divided
-    /// by g, and the rate of this sum.
+    /// Returns the sum of mass times height above the rest position of hub and liquid (kg m), and the rate of this sum. The
+    /// sum times g is the potential energy.
     pub fn height<T: Number, M: SloshMode>(&self, modes: &[M]) -> [T; 2] {
         let ([x, y], still) = (self.imbalance, [T::constant(0.0); 2]);
         let moment = [x + self.rigid_moment, y].map(T::constant);
@@ -196,9 +194,8 @@ impl Motion {
             + self.hub.tilt.height(n, moment)
     }
 
-    /// Computes coefficient n of every quantity from coefficients up to n of the state, and coefficient n + 1
-    /// of the state. `ramp` is true if specific force, drag or weight changes, `hangs` if there is a
-    /// suspension line.
+    /// Computes coefficient n of every quantity from the coefficients of the state up to n, and coefficient n + 1 of the
+    /// state. `ramp` is true if specific force, drag or weight changes, and `hangs` if there is a suspension line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,
@@ -272,7 +269,7 @@ impl Motion {
         }
         let forces = (self.varies, self.suspension.exists);
         self.derivatives(0, forces, modes, Contact::Stuck);
-        // A law that cannot hold the hub needs the direction in which the torque leaves 0.
+        // For a law that cannot hold the hub the direction in which the torque departs from 0 is needed.
         if !self.law.sticks() {
             self.derivatives(1, forces, modes, Contact::Stuck);
         }
@@ -284,13 +281,13 @@ impl Motion {
         Steps::new(self.max_steps, ADVICE)
     }
 
-    /// Returns the time within `h`, s, at which the hub comes to rest, from the series of its rate
-    /// up to order n; `None` if it keeps turning.
+    /// Returns the time within `h`, s, at which the hub comes to rest, from the series of its rate up to order n; `None` if
+    /// it does not come to rest.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
         let omega = &self.hub.omega;
         let change = omega[1..=n].iter().rev().fold(0.0, |sum, x| (sum + x.abs()) * h);
         if omega[0].abs() > change {
-            return None; // far from rest
+            return None; // the hub does not come near rest
         }
         let sign = contact as i8 as f64;
         let rate = omega.map(|x| sign * x);
@@ -301,14 +298,14 @@ impl Motion {
         first_root(&rate[behind..=n], h)
     }
 
-    /// Returns the time within `h`, s, at which the torque on a stuck hub exceeds the bearing's
-    /// static friction, and the direction of the motion that follows; `None` if it stays stuck.
+    /// Returns the time within `h`, s, at which the torque on a stuck hub exceeds the static friction of the bearing, and
+    /// the direction of the following motion; `None` if the hub stays stuck.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.law.holding_torques(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
             let mut left = self.net.map(|x| -sign * x);
             left[0] += hold;
-            // A torque that is just held and falls causes no break-away.
+            // A torque that equals the static friction and falls causes no break-away.
             let behind = if left[0] > 0.0 { 0 } else { left[..n].iter().position(|&x| x > 0.0)? };
             first_root(&left[behind..n], h)
         };
@@ -320,9 +317,9 @@ impl Motion {
         }
     }
 
-    /// Advances the state by `h`, s, during which torque and specific force follow their ramps. The gyro
-    /// takes the samples that fall due, which count as steps. If the step stops at an event, returns the
-    /// elapsed time. After an error the state is unusable.
+    /// Advances the state by `h`, s, during which torque and specific force follow their ramps. The gyro takes the samples
+    /// that fall due; each counts as an internal step. If the step stops at an event, returns the elapsed time. If an error
+    /// is returned, the state is invalid.
     pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
@@ -332,7 +329,7 @@ impl Motion {
         (imu, stop): (&Imu, Stop),
         steps: &mut Steps,
     ) -> Result<ControlFlow<f64>, StepError> {
-        // The usual case is compiled separately: one mode, no loops over modes and orders.
+        // The usual case of one mode is compiled separately, without loops over modes and orders.
         match modes {
             [one] if M::UNROLLED && acting.1.slope == 0.0 && self.is_plain() => {
                 let one = core::slice::from_mut(one);
@@ -342,7 +339,7 @@ impl Motion {
         }
     }
 
-    /// Returns true if drag and weight change only with g, and there is no suspension line.
+    /// Returns true if drag and weight depend only on g, and there is no suspension line.
     fn is_plain(&self) -> bool {
         !self.varies && !self.suspension.exists
     }
@@ -393,7 +390,7 @@ impl Motion {
     }
 
     /// Returns the integral of the liquid's mass times height over the time `length` (s), kg m s, from the series up to
-    /// order n. If g changes linearly, its work is the slope of g times this integral.
+    /// order n. If g is linear in time, the work of its change is the slope of g times this integral.
     #[cold]
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;
@@ -405,10 +402,9 @@ impl Motion {
     }
 }
 
-/// One stretch of a step, along which torque and specific force (`acting`) are linear in time. It and the
-/// expansion after it start at `begin`, s; `event` is the new contact after an event at the expansion's end;
-/// `allowed` are the errors allowed for the rates of hub and liquid, rad/s, and for the friction law's own
-/// state.
+/// One stretch of a step, during which torque and specific force (`acting`) are linear in time. The stretch and its first
+/// expansion start at `begin`, s. `event` is the new contact after an event at the end of the expansion. `allowed` are the
+/// allowed errors of the rates of hub and liquid, rad/s, and of the friction law's own state.
 struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     motion: &'a mut Motion,
     modes: &'a mut [M],
@@ -460,7 +456,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         } else {
             h
         };
-        // The hub's rate passes zero many times; its error scale must not.
+        // The scale of the allowed error must not be 0 although the hub's rate passes zero many times.
         let [w, w_d] = [motion.hub.omega[0], motion.hub.omega[1]].map(f64::abs);
         let hub = RATE_FLOOR + w + w_d * h.min(0.1);
         let slosh = hub + self.modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
@@ -590,8 +586,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 }
 
-/// Returns the larger of two magnitudes. A NaN may get lost, which is harmless because other code
-/// ends a step with NaN.
+/// Returns the larger of two magnitudes. A NaN may be lost; other checks end a step whose states are NaN.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }

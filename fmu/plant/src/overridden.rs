@@ -5,10 +5,10 @@ use crate::parameters::{Parameters, SloshSource};
 use crate::slosh_model::SloshModel;
 
 impl Parameters {
-    /// Returns the reason why the value of a parameter is not used although its part of the model is in use;
-    /// `None` if it is used, or if that part is switched off. `name` is the parameter's name in the FMU; the name of a
-    /// Boolean's integer twin (the integer by which a host can set the Boolean) ends in `_kind`. The integer twins must be
-    /// applied before.
+    /// Returns the reason why the value of a parameter has no effect although its part of the model is in use. Returns
+    /// `None` if it has an effect, or if its part of the model is switched off. `name` is the parameter's name in the FMU. A
+    /// Boolean has an integer twin, by which a host can set it as well and whose name ends in `_kind`; the values of integer
+    /// twins must have been applied before.
     pub fn overridden(&self, name: &str) -> Option<String> {
         let slosh = &self.slosh;
         if slosh.model == SloshModel::Frozen {

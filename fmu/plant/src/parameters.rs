@@ -1,9 +1,7 @@
-//! Parameters of the plant with the bench's values, in SI units.
-//!
-//! `Parameters::default()` is the thesis's bench (TRACTOR, 24 degC, 10 cm of water). Fields have
-//! the names of the FMU's parameters (`tank.d` is `tank.d` there), except `hub.inertia` and
-//! `wheel.inertia` (`hub.I`, `wheel.I`) and `own_inertia` (`I_own`). The FMU's variable table has
-//! their meanings, units and ranges.
+//! Parameters of the plant, in SI units. `Parameters::default()` is the bench of Rubaga's thesis (TRACTOR, 24 degC, 10
+//! cm of water). Fields have the names of the FMU's parameters, for example `tank.d`, except for `hub.inertia`
+//! (`hub.I` in the FMU), `wheel.inertia` (`wheel.I`) and `own_inertia` (`I_own`). Meanings, units and ranges are in
+//! the FMU's variable table.
 
 use crate::slosh_model::SloshModel;
 
@@ -34,7 +32,7 @@ pub struct Hub {
     pub c: f64,
 }
 
-/// An upright cylindrical tank, its axis parallel to the bearing axis.
+/// An upright cylindrical tank, whose axis is parallel to the bearing axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Tank {
@@ -62,7 +60,7 @@ pub enum SloshSource {
 }
 
 impl SloshSource {
-    /// All items in the order of their numbers.
+    /// All values in the order of their numbers.
     pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
 }
 
@@ -70,9 +68,9 @@ impl SloshSource {
 pub const MODES: usize = 10;
 
 /// Dependence of a mode's drag coefficient c on its natural frequency omega_n. `Laminar`, c ~ omega_n^(1/2), is the damping
-/// of a laminar layer at the wall, for bare tanks. `ConstantRatio`, c ~ omega_n, keeps the damping ratio, for a measured or
-/// specified ratio. `BySource` is `Laminar` if the damping ratio comes from the correlation and `ConstantRatio` if it is
-/// given.
+/// of a laminar layer at the wall, for tanks without baffles. `ConstantRatio`, c ~ omega_n, keeps the damping ratio
+/// constant, for a measured or specified ratio. `BySource` is `Laminar` if the damping ratio comes from the correlation, and
+/// `ConstantRatio` if it is a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -83,7 +81,7 @@ pub enum DampingLaw {
 }
 
 impl DampingLaw {
-    /// All items in the order of their numbers.
+    /// All values in the order of their numbers.
     pub const ALL: [DampingLaw; 3] =
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::BySource];
 }
@@ -105,12 +103,11 @@ pub struct Slosh {
     pub breaking_steepness: f64,
 }
 
-/// Modes of a tank of any shape; 0 stands for values that are not given. `nonlinear_inertia` and
-/// `nonlinear_stiffness` are the coefficients s and kappa of the third order in the amplitude, 1 and 1 for a
-/// pendulum. `angle_limit` and `swirl_limit` are the slosh angles, rad, above which a mode, and its rotary
-/// motion, is out of range. `direction` is the angle from the tangent, positive outwards, rad, of the
-/// direction in which a mode moves its mass. `one_axis` is true if the table holds only the modes along one
-/// axis of a tank that also has modes across it.
+/// Modes of a tank of any shape; a value of 0 means that it is not given. `nonlinear_inertia` and `nonlinear_stiffness` are
+/// the coefficients s and kappa of the third order in the amplitude, which are 1 and 1 for a pendulum. `angle_limit` and
+/// `swirl_limit` are the slosh angles, rad, above which a mode, or its rotary motion, is out of range. `direction` is the
+/// angle, rad, from the tangent to the direction in which a mode moves its mass, positive outwards. `one_axis` is true if
+/// the tank also has modes along a second axis, which the table does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct ModeTable {
@@ -149,7 +146,7 @@ impl ModeTable {
     }
 }
 
-/// A flat ring baffle at the tank's wall, `depth` below the surface; width 0 for no baffle.
+/// A flat ring baffle at the tank's wall, `depth` below the surface. A width of 0 means that there is no baffle.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Ring {
@@ -166,9 +163,9 @@ pub struct Bench {
     pub tilt_azimuth: f64,
 }
 
-/// Friction laws of the bearing: viscous friction b omega; a Stribeck curve with sgn(omega) smoothed to
-/// tanh(omega / eps), or set-valued so that the hub can stick; and LuGre, with bristles that deflect before
-/// they slide. Their files describe when to choose which one.
+/// Friction laws of the bearing: viscous friction b omega; a Stribeck curve, with sgn(omega) smoothed to tanh(omega/eps), or
+/// set-valued so that the hub can stick; and LuGre, with bristles that deflect before they slide. The files of the laws
+/// describe when to choose which law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -181,7 +178,7 @@ pub enum FrictionModel {
 }
 
 impl FrictionModel {
-    /// All items in the order of their numbers.
+    /// All values in the order of their numbers.
     pub const ALL: [FrictionModel; 5] = [
         FrictionModel::None,
         FrictionModel::Viscous,
@@ -191,8 +188,8 @@ impl FrictionModel {
     ];
 }
 
-/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of cos theta,
-/// sin theta, cos 2 theta, sin 2 theta.
+/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of cos theta, sin theta, cos 2
+/// theta and sin 2 theta for each direction of rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Friction {
@@ -329,7 +326,7 @@ impl Default for Friction {
             d: 0.002423,
             omega_s: 0.08581,
             eps: 1e-5,
-            // Not from the thesis: 6 µrad of deflection, and damping well within passivity.
+            // These values are not from the thesis: a deflection of 6 µrad, and damping well within the limit of passivity.
             sigma0: 1000.0,
             sigma1: 0.01,
             asymmetry: 0.0,
@@ -369,8 +366,8 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// Allows as many internal steps as keep a communication step with one mode below a second, and a communication
-    /// step with ten spherical modes at about six seconds.
+    /// The limit keeps a communication step with one mode below a second of computation, and a communication step with ten
+    /// spherical modes at about six seconds.
     fn default() -> Self {
         Solver { max_steps: 200_000 }
     }

@@ -8,17 +8,18 @@ use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 use crate::parameters::Init;
 
-/// Largest angle, rad, between the start of mode 1 and its direction that counts as rounding of decimals.
+/// Largest angle, rad, between the initial displacement of mode 1 and its direction that counts as a rounding
+/// error of decimal parameters.
 const ALONG: f64 = 1e-6;
 
-/// Largest step as a share of the time to the nearest singularity of the drag's power series.
+/// Largest step as a fraction of the time to the nearest singularity of the drag's power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
 /// One slosh mode as a pendulum with its hinge on the tank's axis.
 ///
 /// - `m`, `l`: slosh mass, kg, and length of the pendulum, m, with `inv_l` = 1/l.
-/// - `c`: viscous coefficient of the slosh mass relative to the tank, N s/m, with `c_m` = c/m; `c_0` is that at the
-///   reference g, and `course` is c over its value at the start of the expansion.
+/// - `c`: viscous coefficient of the slosh mass relative to the tank, N s/m, with `c_m` = c/m; `c_0` is its value at
+///   the reference g, and `course` is c divided by its value at the start of the expansion.
 /// - `r`: distance of the hinge from the bearing axis, m.
 /// - `along`: unit vector (n_x, n_t), radial and tangential, of the motion in models that move along one
 ///   direction, with `r_x` = r n_x, `r_t` = r n_t and `r_l` = r_t/l; (0, 1) is the tangent.
@@ -85,9 +86,8 @@ impl Pendulum {
         self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
     }
 
-    /// Sets the viscous drag coefficient of the slosh mass to `factor` times its value at the
-    /// reference g. `course` is the series of the coefficient over its value at the start of the
-    /// expansion.
+    /// Sets the viscous drag coefficient of the slosh mass to `factor` times its value at the reference g. `course` is the
+    /// series of the coefficient, divided by its value at the start of the expansion.
     pub fn set_damping(&mut self, factor: f64, course: Series) {
         self.c = factor * self.c_0;
         self.c_m = self.c / self.m;
@@ -99,8 +99,8 @@ impl Pendulum {
         self.baffle.zeta > 0.0 || self.growth.acts
     }
 
-    /// Adds the drag of the baffle and of waves of finite height to the viscous drag. `at` holds
-    /// |q|^2 and |q'|^2, the squares of slosh angle and rate.
+    /// Adds the drag of the baffle and the drag that grows with the amplitude to the viscous drag. `at` are |q|^2 and
+    /// |q'|^2, the squares of slosh angle and rate.
     pub fn add_amplitude_drag(&mut self, at: [f64; 2]) {
         let w = self.g.map(|g| g * self.inv_l);
         if self.baffle.zeta > 0.0 {
@@ -131,8 +131,8 @@ impl Pendulum {
         SHARE_OF_RADIUS * baffle.min(growth)
     }
 
-    /// Returns the error of the slosh mass's rate (rad/s) that arises because the series of its amplitude-dependent
-    /// drag end at order n. `h` (s) is the time since the start of the expansion.
+    /// Returns the error, rad/s, of the slosh mass's rate at the time `h`, s, after the start of the expansion that arises
+    /// because the series of its amplitude-dependent drag end at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let Pendulum { baffle, growth, course, .. } = self;
         let [mut drag, mut rate2] = [0.0; 2];
@@ -152,8 +152,8 @@ impl Pendulum {
         self.along[0] != 0.0
     }
 
-    /// Returns the reason, if any, why mode 1 cannot start as `init` states: the mode moves along one direction, and the
-    /// start has another direction.
+    /// Returns the reason why mode 1 cannot start as `init` states, if any: the mode moves along one direction, but the
+    /// initial displacement or rate has another direction.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;
         let starts = [
@@ -163,7 +163,7 @@ impl Pendulum {
         starts.into_iter().find_map(|(name, unit, radial, tangential)| {
             let size = libm::hypot(radial, tangential);
             let off = libm::fabs(radial * t - tangential * x) > ALONG * size;
-            // The same magnitude along the direction.
+            // A start along the direction with the same magnitude.
             let along = libm::copysign(size, radial * x + tangential * t);
             (self.is_askew() && off).then(|| {
                 format!(

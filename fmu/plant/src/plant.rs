@@ -28,7 +28,7 @@ use crate::state::{Axial, Ranges, STATES, State, x};
 use crate::tank::{self, Calculated};
 use crate::wheel::{self, Piece};
 
-/// Hub, bearing, tank, wheel and gyro, with their state and the series of the equations of motion.
+/// Hub, bearing, tank, wheel and gyro: their state, and the power series of the equations of motion.
 #[derive(Clone, Debug)]
 pub struct Plant {
     calculated: Calculated,
@@ -47,13 +47,13 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
-    /// Two times of the host that differ by less than this, s, count as equal.
+    /// Times of the host that differ by less than this, s, count as equal.
     pub(crate) resolution: f64,
     pub(crate) stopped: Option<StoppedStep>,
 }
 
-/// The way in which a step that may stop at events has ended: at its `End`, at its end together with an
-/// event, or before its end at an event this long after the beginning, s.
+/// How a step that may stop at events has ended: at its `End`, at its end together with an event, or at an event before its
+/// end, with the elapsed time, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum StepEnd {
@@ -62,10 +62,10 @@ pub enum StepEnd {
     Event(f64),
 }
 
-/// A step that has stopped at an event. To continue it, the plant repeats it from its `start` and passes this
-/// event, so that the motion is bit-identical whether a host stops at events or not. `h` is the length of the
-/// step and `passed` the elapsed time, s; `inputs` are tau_cmd, tau_ext and g_axial during the step; `time`
-/// and `x` belong to the event.
+/// A step that has stopped at an event. The plant continues it by repeating it from its `start` and passing this event, so
+/// that the motion is bit-identical whether a host stops at events or not. `h` is the length of the whole step and
+/// `passed` the elapsed time, s; `inputs` are tau_cmd, tau_ext and g_axial during the step; `time` and `x` are time and
+/// states at the event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoppedStep {
     start: State,
@@ -77,10 +77,10 @@ pub struct StoppedStep {
 }
 
 impl StoppedStep {
-    /// Number of words of a saved step.
+    /// Number of 64-bit words of a saved step.
     pub const WORDS: usize = State::WORDS + 6 + STATES;
 
-    /// Returns the stopped step as words, for saving.
+    /// Returns the stopped step as 64-bit words, from which [`StoppedStep::from_words`] restores it.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let (start, rest) = words.split_at_mut(State::WORDS);
@@ -93,7 +93,7 @@ impl StoppedStep {
         words
     }
 
-    /// Reads a stopped step from words; `None` if they are not valid.
+    /// Restores a stopped step from the words of [`StoppedStep::to_words`]; `None` if they are not valid.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<StoppedStep> {
         let (start, rest) = words.split_first_chunk()?;
         let mut numbers = [0.0; 6 + STATES];
@@ -112,8 +112,8 @@ impl StoppedStep {
         })
     }
 
-    /// Returns true if a step of length `h` from the current state continues the stopped step: it has the
-    /// same end and the same inputs.
+    /// Returns true if a step of length `h` from the present state continues the stopped step, because it has the same end
+    /// and the same inputs.
     fn is_continued_by(&self, state: &State, inputs: &Inputs, h: f64, resolution: f64) -> bool {
         let left = self.h - self.passed;
         let is_same = |a: f64, b: f64| (a - b).abs() <= resolution.max(rounding(self.h));
@@ -131,7 +131,7 @@ fn rounding(h: f64) -> f64 {
 }
 
 impl Plant {
-    /// Returns all problems of the combined parameters that do not depend on the initial motion.
+    /// Returns a message for each invalid combination of parameters, apart from those that depend on the initial motion.
     pub fn problems(p: &Parameters) -> Vec<String> {
         let mut problems = Law::problems(&p.friction);
         problems.extend(p.wheel.problems());
@@ -139,12 +139,12 @@ impl Plant {
         problems
     }
 
-    /// Creates a plant at the start of its motion, at `start_time` (s), with the inputs that act then.
+    /// Creates a plant at the start of its motion, at `start_time` (s), with the values that the inputs have then.
     /// `tolerance` is the allowed relative error of rates and angles.
     ///
     /// # Errors
-    /// Lists all problems of combined parameters. The caller must check the ranges of single
-    /// parameters.
+    /// If combinations of parameters are invalid, returns the messages of all problems. The caller must have checked the
+    /// ranges of single parameters.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,
@@ -195,14 +195,14 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Lists where parameters and specific force are outside the known range of the models, one sentence
-    /// each.
+    /// Returns a warning, one sentence each, for every parameter and for the specific force if it is outside the known
+    /// range of the models.
     pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
         tank::warnings(p, inputs.g_axial.value)
     }
 
-    /// Creates a plant that continues from a saved state of a plant with the same parameters, which pass
-    /// [`Plant::problems`].
+    /// Creates a plant that continues from the saved state `state`. [`Plant::problems`] must find no problem with the
+    /// parameters, and the state must belong to a plant with the same parameters.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
         Plant::with_state(p, *state, tolerance)
     }
@@ -214,7 +214,7 @@ impl Plant {
         for (wave, pendulum) in wave.iter_mut().zip(calculated.pendulums(p)) {
             *wave = pendulum.wave;
         }
-        // Without restoring force at the start the damping refers to 1 m/s2.
+        // If nothing restores the liquid at the start, the damping ratio refers to 1 m/s2.
         let mut used = calculated.mass.iter().zip(&calculated.centring).filter(|(m, _)| **m > 0.0);
         let restored =
             state.start_g > 0.0 || used.clone().count() > 0 && used.all(|(_, a)| *a > 0.0);
@@ -257,7 +257,7 @@ impl Plant {
         &self.calculated
     }
 
-    /// Returns the state, for saving.
+    /// Returns the complete state, for saving.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -267,20 +267,20 @@ impl Plant {
         self.state = *state;
     }
 
-    /// Returns the step that has stopped at an event, for saving.
+    /// Returns the step that has stopped at an event, if any, for saving.
     pub fn stopped(&self) -> Option<&StoppedStep> {
         self.stopped.as_ref()
     }
 
-    /// Restores a stopped step that was saved.
+    /// Restores a saved step that has stopped at an event.
     pub fn set_stopped(&mut self, stopped: Option<StoppedStep>) {
         self.stopped = stopped;
     }
 
-    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps.
+    /// Advances by exactly `h` > 0 seconds, during which the inputs follow their ramps.
     ///
     /// # Errors
-    /// See [`StepError`]; the plant is unchanged.
+    /// See [`StepError`]; the plant is then unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         let before = self.state;
         let done = self.advance(inputs, h, f64::INFINITY);
@@ -290,12 +290,12 @@ impl Plant {
         done.map(|_| ())
     }
 
-    /// Advances as [`Plant::step`] does, but stops at the first event: the hub sticks or slips, the wheel
-    /// reaches a limit, or the gyro takes a sample. A step from there to the same end with the same inputs
-    /// continues as if it had not stopped.
+    /// Advances as [`Plant::step`] does, but stops at the first event: the hub sticks or slips, the wheel reaches a
+    /// limit, or the gyro takes a sample. If the next step has the same end and the same inputs, it continues as if the
+    /// step had not stopped.
     ///
     /// # Errors
-    /// The same as for [`Plant::step`].
+    /// As [`Plant::step`].
     pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
         let (before, stopped) = (self.state, self.stopped.take());
         let (mut length, mut passed, mut begun) = (h, -1.0, 0.0);
@@ -319,7 +319,7 @@ impl Plant {
             if passed >= length {
                 return Ok(StepEnd::EventAtEnd);
             }
-            // No step remains if the event is at the end to rounding.
+            // If the event is at the end of the step except for rounding, no step remains.
             if length - passed > self.resolution.max(rounding(length)) {
                 break;
             }
@@ -331,9 +331,8 @@ impl Plant {
         Ok(StepEnd::Event(passed - begun))
     }
 
-    /// Advances as [`Plant::step`] does, but an error leaves the state unusable, and the step stops at the
-    /// first event later than `passed` seconds after its start. Returns the time of that event after the
-    /// start, s.
+    /// Advances as [`Plant::step`] does, but if an error is returned the state is invalid. The step stops at the first event
+    /// later than `passed` seconds after its start. Returns the time of this event, s after the start of the step.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -349,7 +348,7 @@ impl Plant {
         let (mut t, mut steps, mut stopped) = (0.0, self.motion.steps(), None);
         let mut level = None;
         while t < h {
-            // A piece of zero length takes no step of the integrator but counts as one.
+            // A piece of zero length takes no step of the integrator, but counts as one step.
             steps.add_steps(1, begin + t)?;
             let speed = state.x[x::WHEEL_SPEED];
             let command = wheel::command_after(inputs.tau_cmd, t, level);
@@ -373,7 +372,7 @@ impl Plant {
             }
             state.x[x::WHEEL_SPEED] = speed;
             t = if length == h - t { h } else { t + length };
-            // The wheel's torque changes here.
+            // At this time the wheel's torque changes its slope.
             if stopped.is_some() || t < h && t > passed {
                 stopped = Some(t);
                 break;
@@ -388,7 +387,7 @@ impl Plant {
         if !state.axial.is_finite() {
             return Err(StepError::NotFinite { time: state.time });
         }
-        // The end of a step matches an instant of the gyro only to rounding.
+        // The end of a step matches a sampling time of the gyro only to rounding.
         while self.imu.enabled && reached >= h && self.takes_sample() {
             steps.add_steps(1, begin + h)?;
             stopped = Some(h).filter(|_| passed < f64::INFINITY);
@@ -396,9 +395,9 @@ impl Plant {
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
-    /// Returns the work of changes of g_axial since the start, J, including the current one. A jump does the
-    /// work of g_axial's change times the liquid's mass times height. For a host that integrates itself, the
-    /// work since its last accepted step comes from Hermite's rule, with g_axial linear in time.
+    /// Returns the work of all changes of g_axial since the start, J, including the present change. A jump does the work of
+    /// g_axial's change times the liquid's mass times height. If a host integrates the states itself, the work since its
+    /// last accepted step is computed by Hermite's rule, for a g_axial that is linear in time.
     pub(crate) fn work_axial(&mut self, inputs: &Inputs) -> f64 {
         let last = self.state.axial;
         let change = inputs.g_axial.value - last.g;
@@ -409,9 +408,8 @@ impl Plant {
         self.work_axial_at(change, self.height())
     }
 
-    /// Computes the work of changes of g_axial, J, as [`Plant::work_axial`] returns it. `change` is
-    /// g_axial's change since the last accepted step; the array holds the liquid's mass times
-    /// height and its rate.
+    /// Returns the work of all changes of g_axial, J, as [`Plant::work_axial`] does. `change` is the change of g_axial since
+    /// the last accepted step; the array contains the liquid's mass times height and the rate of this product.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
         let c = T::constant;
@@ -455,9 +453,9 @@ impl Plant {
         self.evaluate_ranges(&outputs)
     }
 
-    /// Gives the hub the contact for the current inputs, and returns the previous one for
-    /// [`Plant::revert_contact`]. Torque that has changed since the last step may already have broken the hub
-    /// away, or may undo a break-away of this instant.
+    /// Sets the contact that belongs to the present inputs, and returns the previous contact for
+    /// [`Plant::revert_contact`]. A torque that has changed since the last step may have broken the hub away, or may
+    /// cancel a break-away at this instant.
     pub fn apply_present_contact(&mut self, inputs: &Inputs) -> Contact {
         let before = self.state.contact;
         if self.omega() == 0.0 {

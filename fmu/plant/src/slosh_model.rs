@@ -1,5 +1,5 @@
-//! The slosh models, and the properties of each model that the rest of the plant uses. The series of their modes are
-//! in `slosh/`.
+//! The slosh models, and the properties of each model on which the rest of the plant depends. The power series of the
+//! modes are in `slosh/`.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -18,10 +18,10 @@ macro_rules! models {
             /// All models in the order of their numbers.
             pub const ALL: [SloshModel; [$($number),+].len()] = [$(SloshModel::$name),+];
 
-            /// Values of `slosh.model` with their descriptions, in the order of their numbers.
+            /// Values of `slosh.model` with their descriptions, in the order of the models' numbers.
             pub const ITEMS: [(&str, &str); SloshModel::ALL.len()] = [$(($item, $description)),+];
 
-            /// Returns the model's value of `slosh.model`.
+            /// Returns the value of `slosh.model` for this model.
             pub const fn name(self) -> &'static str {
                 SloshModel::ITEMS[self as usize - 1].0
             }
@@ -51,8 +51,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns the largest amplitude for which the slosh model is defined: an angle, rad, or for
-    /// `liquid` a displacement over the pendulum length.
+    /// Returns the largest amplitude for which the slosh model is defined: an angle, rad, or for `liquid` a displacement
+    /// divided by the pendulum length.
     pub(crate) fn largest_amplitude(self) -> f64 {
         match self {
             SloshModel::Frozen
@@ -63,8 +63,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns the relative shifts of omega^2 per squared angle, in planar and in circular motion, of a mode
-    /// with the coefficients s and kappa; `None` for a motion that the model does not have.
+    /// Returns the relative change of omega^2 per squared angle, in planar and in circular motion, of a mode with the
+    /// coefficients s and kappa; `None` for a motion that the model does not have.
     pub(crate) fn shifts(self, s: f64, kappa: f64) -> [Option<f64>; 2] {
         match self {
             SloshModel::Frozen | SloshModel::Linear => [Some(0.0), None],
@@ -74,10 +74,9 @@ impl SloshModel {
         }
     }
 
-    /// Returns the factor F of the squared frequency and the factor M of the slosh mass
-    /// (`leaning.rs`) of a pendulum that hangs obliquely on a tilted bench. s and kappa are its
-    /// large-wave coefficients, `slope` is the tangent of the tilt, and `n2` the square of the tilt
-    /// direction's tangential component.
+    /// Returns the factors F of the squared frequency and M of the slosh mass (`leaning.rs`) for a pendulum that hangs
+    /// obliquely on a tilted bench. s and kappa are the pendulum's large-wave coefficients, `slope` is the tangent of the
+    /// tilt angle, and `n2` the squared tangential component of the tilt direction.
     pub(crate) fn oblique(self, slope: f64, n2: f64, (s, kappa): (f64, f64)) -> Oblique {
         let s2 = slope * slope;
         match self {
@@ -101,8 +100,8 @@ impl SloshModel {
     }
 }
 
-/// Returns the displacement u at which a nonlinear spring balances the slope s, that is, the solution of u (1 + H u^2)
-/// = s, by Newton's method. For a softening spring it is the solution nearest to 0, if one exists.
+/// Returns the displacement u at which a nonlinear spring is in equilibrium on the slope s: the solution of u (1 + H u^2) =
+/// s, by Newton's method. For a softening spring it is the solution nearest to 0, if one exists.
 fn rest(spring: f64, slope: f64) -> f64 {
     let mut u = if spring > 0.0 { slope } else { 0.0 };
     for _ in 0..60 {

@@ -1,5 +1,4 @@
-//! The plant's state and the indices of its parts. Only this file declares continuous states and
-//! event indicators.
+//! The plant's state and the indices of its parts. Continuous states and event indicators are defined only in this file.
 
 use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
@@ -8,10 +7,9 @@ use taylor::integrator::{MAX_MAGNITUDE, add_time};
 use crate::contact::Contact;
 use crate::imu::{FLICKERS, Gyro};
 
-/// Indices of the continuous states in x: hub angle `THETA`, rad, and rate `OMEGA`, rad/s; `WORK` of
-/// tau_actuator and tau_ext and dissipated `HEAT` since the start, J; `STUCK_TIME`, s; absolute rate
-/// `WHEEL_SPEED` of the rotor, rad/s; deflection `BRISTLE` of LuGre friction, rad. A new state is a new
-/// constant before [`x::SLOSH`].
+/// Indices of the continuous states in x: hub angle `THETA`, rad, and rate `OMEGA`, rad/s; `WORK` of tau_actuator and
+/// tau_ext, and dissipated `HEAT`, both since the start, J; `STUCK_TIME`, s; rate `WHEEL_SPEED` of the rotor relative to
+/// inertial axes, rad/s; deflection `BRISTLE` of LuGre friction, rad. The index of a new state must be below [`x::SLOSH`].
 #[allow(missing_docs)]
 pub mod x {
     use crate::parameters::MODES;
@@ -23,8 +21,8 @@ pub mod x {
     pub const STUCK_TIME: usize = 4;
     pub const WHEEL_SPEED: usize = 5;
     pub const BRISTLE: usize = 6;
-    /// First of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, … Their unit depends
-    /// on the slosh model. Unused modes stay at 0.
+    /// Index of the first slosh coordinate: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, and so on. The unit depends on
+    /// the slosh model. Coordinates of unused modes are 0.
     pub const SLOSH: usize = 7;
     pub const COUNT: usize = SLOSH + 4 * MODES;
 }
@@ -32,9 +30,9 @@ pub mod x {
 /// Number of continuous states.
 pub const STATES: usize = x::COUNT;
 
-/// Indices of the event indicators: functions that are positive between events and cross zero at them. The
-/// hub comes to rest or, stuck, breaks away; the command passes a torque limit of the wheel or changes its
-/// sign; the rotor reaches its highest or lowest speed.
+/// Indices of the event indicators, which are positive between events and cross zero at events: the hub comes to rest or, if
+/// it is stuck, breaks away; the torque command passes a torque limit of the wheel or changes its sign; the rotor reaches
+/// its highest or lowest speed.
 #[allow(missing_docs)]
 pub mod indicator {
     pub const REST: usize = 0;
@@ -58,8 +56,7 @@ pub(crate) struct Ranges {
     pub limited_by: LimitedBy,
 }
 
-/// State of the plant that is saved and restored. Together with parameters and inputs it determines the motion that
-/// follows.
+/// Complete state of the plant. Together with parameters and inputs it determines all further motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
@@ -68,18 +65,18 @@ pub struct State {
     pub(crate) ranges: Ranges,
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
-    /// Time since the start, s, and its rounding error. It is the sum of the steps' lengths, because a host's
-    /// clock may be off by rounding, may drift, or start at 1e9 s.
+    /// Time since the start, s, and its rounding error. It is the sum of the lengths of all steps, because a host's clock
+    /// may have rounding errors, may drift, or may start at 1e9 s.
     pub(crate) elapsed: [f64; 2],
-    /// Specific force g_axial at the start, m/s2, for which the slosh damping is given.
+    /// Specific force g_axial at the start, m/s2, to which the slosh damping ratio refers.
     pub(crate) start_g: f64,
     pub(crate) axial: Axial,
     pub(crate) gyro: Gyro,
 }
 
-/// Work done by a changing g_axial since the start, J, and the g_axial, m/s2, up to which this work
-/// is known. `accepted` holds the last accepted step of a host that integrates itself. It is empty
-/// after a step that the plant has integrated, because g_axial then changes only at an instant.
+/// Work done by a changing g_axial since the start, J, and the value of g_axial, m/s2, up to which this work is known.
+/// `accepted` contains the last accepted step of a host that integrates the states itself. It is empty after a step that the
+/// plant has integrated, because g_axial then changes only at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
     pub work: f64,
@@ -87,8 +84,8 @@ pub(crate) struct Axial {
     pub accepted: Option<Accepted>,
 }
 
-/// The liquid at the end of a step that a Model Exchange host has accepted: mass times height, kg
-/// m, and the rate of this product.
+/// The liquid at the end of a step that a Model Exchange host has accepted: its mass times height, kg m, and the
+/// rate of this product.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Accepted {
     pub time: f64,
@@ -104,12 +101,12 @@ impl Axial {
 }
 
 impl State {
-    /// Number of words of a saved state.
+    /// Number of 64-bit words of a saved state.
     pub const WORDS: usize = 2 + Self::REALS;
 
     const REALS: usize = 13 + FLICKERS + STATES;
 
-    /// Returns the state as words, for saving.
+    /// Returns the state as 64-bit words, from which [`State::from_words`] restores it.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let discrete = [
@@ -146,7 +143,7 @@ impl State {
         words
     }
 
-    /// Reads a state from words; `None` if they are not a valid state.
+    /// Restores a state from the words of [`State::to_words`]; `None` if they are not a valid state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let contact = match (words[0] >> 32) as u8 as i8 {
             -1 => Contact::Backward,
@@ -181,7 +178,7 @@ impl State {
         ] = *head;
         let finite = reals.iter().all(|real| real.is_finite()) && flags < 4;
         let accepted = Accepted { time: accepted_time, mass_height, rate };
-        // Beyond this number the instants of the samples cannot be separated.
+        // Double precision cannot distinguish the times of samples beyond this number.
         let countable = words[1] <= 1 << f64::MANTISSA_DIGITS;
         (finite && countable).then_some(State {
             time,
@@ -205,8 +202,8 @@ impl State {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Moves the clock to `t`, s, after `begin`. `begin` holds the host's time, s, and the time
-    /// since the start with its rounding error, s.
+    /// Sets the clock to `t`, s, after `begin`, which contains the host's time, s, and the time since the start with
+    /// its rounding error, s.
     pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
         let (time, elapsed) = begin;
         self.time = time + t;

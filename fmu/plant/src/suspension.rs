@@ -1,12 +1,12 @@
-//! The suspension line of the hub, a torsion spring with damping about the bearing axis:
+//! The suspension line of the hub is a torsion spring with damping about the bearing axis:
 //!
 //! ```text
 //! tau_s = -k (theta - theta_0) - c w,      energy k (theta - theta_0)^2/2,   dissipation c w^2
 //! ```
 //!
-//! A stuck hub does not move: the bearing holds the spring's torque, too.
+//! A stuck hub does not move, because the bearing also holds the torque of the spring.
 //!
-//! Source: section 8.4.4 of Rubaga's thesis mentions the line; its torque is modelled as a linear torsion spring.
+//! Source: Rubaga's thesis, section 8.4.4, mentions the line; modelling its torque as a linear torsion spring is our choice.
 
 use taylor::number::Number;
 use taylor::series::{constant, number};
@@ -38,8 +38,8 @@ impl Suspension {
         self.c * hub.omega2[n]
     }
 
-    /// Returns the torque tau_s of the suspension line (N m) and the energy of its spring (J) at the start of an
-    /// expansion.
+    /// Returns the torque tau_s of the suspension line (N m) and the energy of its spring (J) at the start of an expansion,
+    /// or their directional derivatives.
     pub fn present<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let [turned, w]: [T; 2] = [number(&hub.theta), number(&hub.omega)];
         let turned = turned - T::constant(self.theta_0);

@@ -1,16 +1,15 @@
-//! Pendulums that represent the liquid: of an upright cylinder from its dimensions, of any tank
-//! from a table.
+//! Pendulums that represent the liquid: for an upright cylinder from its dimensions, for any other tank from a table.
 //!
-//! Modal masses and lengths (`formulas::cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106 and Dodge
-//! (2000), with the exact zeros of J1'. Damping: `formulas::damping`. Capillarity with a flat surface and a free
-//! contact line, exact in the cylinder: omega_n^2 = g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths are
-//! geometry. Capillarity acts as a centring stiffness k_n, which is equivalent to a g larger by
+//! Modal masses and lengths (`formulas::cylinder`): Rubaga's thesis, Table 4.1, which agrees with Abramson, NASA SP-106, and
+//! Dodge (2000), with the exact zeros of J1'. Damping: `formulas::damping`. Capillarity, for a flat surface with a free
+//! contact line, is exact in the cylinder: omega_n^2 = g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths depend
+//! only on the geometry. Capillarity acts as a centring stiffness k_n, which is equivalent to an increase of g by
 //!
 //! ```text
 //! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
 //! ```
 //!
-//! On a tilted bench the cylinder's surface is tilted: `leaning.rs`. A table is used as given.
+//! On a tilted bench the cylinder's surface is tilted, see `leaning.rs`. Modes from a table do not change with the tilt.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -27,11 +26,11 @@ use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::slosh_model::SloshModel;
 
-/// Values calculated from the parameters; 0 for unused modes. `m_liq` and `m_0` are the masses of the whole
-/// and of the rigid liquid, kg, and `bond` is the Bond number rho g R^2 / sigma. Each mode has the pendulum's
-/// mass, kg, and length, m (on a tilted bench the values of oblique pendulums with the same frequencies), its natural
-/// frequency, Hz (on an upright bench sqrt((g + a)/l) / 2 pi), its damping ratio, and the increase of g
-/// equivalent to the centring stiffness, a_n, m/s2.
+/// Values calculated from the parameters; 0 for unused modes. `m_liq` and `m_0` are the masses of the whole liquid and
+/// of the rigid liquid, kg, and `bond` is the Bond number rho g R^2/sigma. For each mode there are the pendulum's mass,
+/// kg, and length, m (on a tilted bench, those of an oblique pendulum with the same frequency), the natural frequency,
+/// Hz (on an upright bench sqrt((g + a)/l)/(2 pi)), the damping ratio, and the increase a_n of g that is equivalent to
+/// the centring stiffness, m/s2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Calculated {
@@ -101,7 +100,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     }
     let omega2 = |n: usize| table.g_ref / length(n) + table.k[n] / table.mass[n];
     for n in 1..modes {
-        // The modes of each direction have their own order.
+        // The modes along each direction have their own order.
         let same = |m: &usize| table.direction[*m] == table.direction[n];
         let Some(before) = (0..n).rev().find(same).filter(|m| omega2(n) < omega2(*m)) else {
             continue;
@@ -114,7 +113,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         ));
     }
     let sum = table.most_along_one(modes);
-    // In a table written in decimals the fixed mass may be below 0 by its last digit.
+    // If a table is written in decimals, the fixed mass may be negative by its last digit.
     if sum > table.m_liq * (1.0 + 1e-9) {
         problems.push(format!(
             "the masses of slosh.table add up to {sum} kg along one direction (allowed: up to slosh.table.m_liq = {} kg)",
@@ -137,8 +136,8 @@ impl ModeTable {
         self.direction[..modes].iter().any(|direction| *direction != 0.0)
     }
 
-    /// Returns the largest sum of modal masses along one direction, kg. It is the larger eigenvalue of the sum of m n
-    /// n^T over the modes, where m is the modal mass and n the direction of a mode.
+    /// Returns the largest sum of modal masses along one direction, kg. It is the larger eigenvalue of the sum of m n n^T
+    /// over the modes, where m is the mass of a mode and n its direction.
     fn most_along_one(&self, modes: usize) -> f64 {
         if self.direction[..modes].iter().all(|direction| *direction == self.direction[0]) {
             return self.mass[..modes].iter().sum();
@@ -151,8 +150,8 @@ impl ModeTable {
         sum / 2.0 + libm::hypot(half, cross)
     }
 
-    /// Returns the smallest inertia of the liquid at the distance r in the model `planar`, kg m2: m_0 r^2 and
-    /// of each mode the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
+    /// Returns the smallest inertia of the liquid in the model `planar`, kg m2, for a tank at the distance r from the axis:
+    /// m_0 r^2 plus, for each mode, the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
     fn least_inertia(&self, modes: usize, r: f64) -> f64 {
         let of_mode = |n: usize| {
             let ([n_x, n_t], l) = (self.direction_components(n), self.pendulum_length(n));
@@ -210,8 +209,8 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     if geometry && slosh.capillarity && bond < LOW_BOND {
         warnings.push(format!(
             "slosh.capillarity = true at the Bond number {bond:.3}: the frequencies are valid for a flat surface whose contact line \
-             moves freely. For other contact angles set slosh.table.k. The modal masses are those of a flat surface, because the \
-             masses under a curved meniscus are unknown"
+             moves freely. For other contact angles set slosh.table.k. The modal masses are the modal masses under a flat surface, \
+             because those under a curved meniscus are unknown"
         ));
     }
     warnings
@@ -248,8 +247,8 @@ impl Slosh {
     }
 }
 
-/// Refuses the model `liquid` if the inertia of a mode falls with the amplitude, because the kinetic energy
-/// of hub and liquid would then be indefinite at amplitudes that depend on the hub.
+/// Returns messages if the slosh model is `liquid` and the inertia of a mode falls with the amplitude (s <= 0), because the
+/// kinetic energy of hub and liquid would then be indefinite at amplitudes that depend on the hub.
 fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     let (fill, slosh) = (2.0 * p.tank.h / p.tank.d, p.slosh);
     let falling =
@@ -268,8 +267,8 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     })
 }
 
-/// Fill h/R below which waves are shallow: there the large-wave coefficient s turns negative, and s and kappa grow
-/// without bound.
+/// Fill h/R below which waves are shallow: s (the large-wave coefficient of inertia) becomes negative, and s and
+/// kappa grow without bound.
 const SHALLOW: f64 = 0.4;
 
 fn third_order_warning(fill: f64) -> Option<String> {
@@ -307,7 +306,7 @@ fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
     let steepness = p.slosh.breaking(0, first.wave, p.tank.d / 2.0).steepness * largest;
     (onset >= steepness).then(|| {
         format!(
-            "slosh.zeta_breaking hardly acts on mode 1: its steepness reaches {steepness:.3} at an amplitude of \
+            "slosh.zeta_breaking has almost no effect on mode 1: the steepness of its wave reaches {steepness:.3} at an amplitude of \
              {largest:.3}, the end of the model's range, and slosh.breaking_steepness is {onset}"
         )
     })
@@ -320,9 +319,9 @@ const LOW_BOND: f64 = 100.0;
 impl Calculated {
     /// Calculates the modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation covers the first mode. Each higher mode has the same multiple of its own laminar layer
-    /// (`formulas::damping`). Without restoring force (g = 0, no centring stiffness) there is no frequency.
-    /// The damping ratio has no meaning there and is reported as 0.
+    /// The correlation gives the damping ratio of the first mode. The damping ratio of each higher mode has the same ratio
+    /// to its own laminar layer (`formulas::damping`). Without restoring force (g = 0 and no centring stiffness) there is no
+    /// frequency; the damping ratio then has no meaning and is returned as 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;
@@ -336,7 +335,7 @@ impl Calculated {
         let modes = if slosh.model == SloshModel::Frozen { 0 } else { slosh.modes.min(MODES) };
         let leaning = Leaning::from_parameters(p);
         for n in 0..modes {
-            // Of an upright pendulum of the mode's frequency; an oblique one has another length.
+            // An upright pendulum with the mode's frequency; an oblique pendulum has another length.
             let upright;
             match slosh.source {
                 SloshSource::Geometry => {
@@ -365,7 +364,7 @@ impl Calculated {
                 _ if restoring <= 0.0 => 0.0,
                 (SloshSource::Table, _) => slosh.table.zeta[n],
                 (_, true) if n == 0 => damping::cylinder(radius, tank.h, fluid.nu, restoring),
-                // The same multiple of its own laminar layer as the first mode.
+                // The ratio to the mode's own laminar layer is the same as in the first mode.
                 (_, true) => {
                     let mode = |n: usize| {
                         let g = g + all.centring[n];
@@ -377,15 +376,15 @@ impl Calculated {
             };
             all.m_0 -= all.mass[n];
         }
-        // Along one direction it is below 0 at most by the last digit of a table.
+        // Along one direction m_0 is negative at most by the last digit of a table.
         if slosh.source == SloshSource::Table && !slosh.table.is_askew(modes) {
             all.m_0 = f64::max(all.m_0, 0.0);
         }
         all
     }
 
-    /// Returns the pendulums in use. Their viscous coefficients c = 2 zeta omega_n m belong to the `g` of
-    /// [`Calculated::new`]; `damping.rs` has them at other values.
+    /// Returns the pendulums in use. Their viscous drag coefficients c = 2 zeta omega_n m belong to the `g` of
+    /// [`Calculated::new`]; `damping.rs` computes them at other values of g.
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
         let (r, slosh, p) = (p.tank.r, p.slosh, *p);

@@ -1,9 +1,8 @@
 //! The reaction wheel that turns a torque command into torque on the hub.
 //!
-//! The rotor takes the reaction, I_w W' = -tau, with W its absolute rate. The torque is limited to
-//! tau_max. At a speed limit the wheel gives only torque that brings W back (thesis Table 5.4). W
-//! follows from the command alone, so a step with a linear command is cut into pieces with linear
-//! torque before the hub's motion is known.
+//! The rotor takes up the reaction, I_w W' = -tau, where W is its rate relative to inertial axes. The torque is limited to
+//! tau_max. At a speed limit the wheel gives only torque that brings W back (Rubaga's thesis, Table 5.4). W depends only on
+//! the command, so that a step with a linear command is cut into pieces with linear torque before the hub's motion is known.
 
 use alloc::format;
 use alloc::string::String;
@@ -13,9 +12,8 @@ use alloc::vec::Vec;
 use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
-/// A part of a step along which the wheel's torque is linear in time: its length, s, the rotor's
-/// speed at its end, rad/s, and the level, a torque limit or zero, that the torque command passes
-/// at its end.
+/// A part of a step during which the wheel's torque is linear in time: its length, s, the rotor's speed at its end, rad/s,
+/// and the level (a torque limit or zero) that the torque command passes at its end.
 pub(crate) struct Piece {
     pub length: f64,
     pub torque: Ramp,
@@ -23,9 +21,9 @@ pub(crate) struct Piece {
     pub passed: Option<f64>,
 }
 
-/// Returns the torque command after `t`, s, when it has just reached the level `passed`, a torque
-/// limit or zero. Rounding may leave the command one unit in the last place before this level. It
-/// would then pass the level again after no time, and again, so it is set to the level.
+/// Returns the torque command after `t`, s. If it has just reached the level `passed` (a torque limit or zero), it is set to
+/// exactly this level. Otherwise rounding might leave it one unit in the last place before the level, so that it would pass
+/// the level again and again without advancing in time.
 pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp {
     let now = command.shifted(t);
     match passed {
@@ -46,8 +44,8 @@ impl Wheel {
         )]
     }
 
-    /// Returns the torque on the hub, N m, at a command and rotor speed, and its slope from now on. The slope
-    /// of a command at a limit decides whether it is within or beyond the limit.
+    /// Returns the torque on the hub, N m, and its slope, for a rotor speed and a torque command. If the command equals a
+    /// limit, its slope decides whether it is within or beyond the limit.
     pub(crate) fn torque(&self, speed: f64, command: Ramp) -> Ramp {
         let Ramp { value, slope } = command;
         if !self.enabled {
@@ -73,7 +71,7 @@ impl Wheel {
             let speed = speed - torque.integral(h) / self.inertia;
             return Piece { length: h, torque, speed, passed: None };
         }
-        // The command passes one of its limits, or zero.
+        // The torque command passes one of its limits, or zero.
         let (mut length, mut passed) = (h, None);
         if command.slope != 0.0 {
             for level in [-self.tau_max, 0.0, self.tau_max] {
@@ -83,8 +81,8 @@ impl Wheel {
                 }
             }
         }
-        // The rotor reaches a speed limit. Within a piece the torque keeps its sign, so this is the
-        // only root of a t + b t^2/2 = (speed - limit) I_w ahead.
+        // The rotor reaches a speed limit. Since the torque keeps its sign within a piece, this is the only root of a t + b
+        // t^2/2 = (speed - limit) I_w ahead.
         let end = speed - torque.integral(length) / self.inertia;
         let limit = end.max(self.speed_min).min(self.speed_max);
         if limit != end {
@@ -111,13 +109,16 @@ mod tests {
             impulse += piece.torque.integral(piece.length);
             (speed, t, pieces) = (piece.speed, t + piece.length, pieces + 1);
             passed = piece.passed.or(passed);
-            assert!(pieces < 10, "a linear command has few pieces: {command:?} at {t}");
+            assert!(
+                pieces < 10,
+                "a linear command must give fewer than ten pieces: {command:?} at {t}"
+            );
         }
         (impulse, speed, pieces)
     }
 
-    /// A torque command passes each limit of the wheel once although times are rounded. Otherwise
-    /// parts of a step with no length would follow each other until the step is refused.
+    /// A torque command passes each limit of the wheel only once although times are rounded. Otherwise parts of a step
+    /// without length would follow each other until the step is refused.
     #[test]
     fn a_torque_command_passes_each_limit_once_despite_rounding() {
         let mut rng = fastrand::Rng::with_seed(1);
@@ -133,8 +134,7 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
-    /// A wheel whose rotor has reached its lowest or highest speed, under a torque command that is
-    /// constant or rises from 0.
+    /// The rotor has reached its lowest or highest speed, and the torque command is constant or rises from 0.
     #[test]
     fn a_wheel_at_a_speed_limit_gives_only_torque_that_leads_away_from_the_limit() {
         let w = wheel();
@@ -222,7 +222,8 @@ mod tests {
     fn an_integration_piece_ends_where_the_command_passes_a_limit_or_zero() {
         let w = Wheel { inertia: 1.0, ..wheel() }; // far from its speed limits
         let next = |command: Ramp| w.next(w.speed_0, command, 10.0).length;
-        // From -0.5 N m at 0.1 N m/s: to -0.26 in 2.4 s, on to 0 in 2.6 s, on to 0.26.
+        // The command starts at -0.5 N m and rises by 0.1 N m/s: to -0.26 N m in 2.4 s, to 0 in another 2.6 s, and
+        // to 0.26 N m.
         for (from, length) in [(-0.5, 2.4), (-0.26, 2.6), (0.0, 2.6)] {
             assert!((next(ramp(from, 0.1)) - length).abs() < 1e-12, "{from}");
             assert!((next(ramp(-from, -0.1)) - length).abs() < 1e-12, "{from}");
@@ -230,8 +231,8 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// The rotor reaches its speed limit at the time t that follows from the impulse,
-    /// I_w (W_0 - W) = a t + b t^2/2, with a constant torque a and on a ramp a + b t.
+    /// The rotor reaches its speed limit at the time t at which the impulse of the torque is a t + b t^2/2 = I_w (W_0 - W),
+    /// for a constant torque a and for a ramp a + b t.
     #[test]
     fn the_rotor_reaches_its_speed_limit_at_the_time_that_the_impulse_of_the_torque_gives() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };
@@ -247,7 +248,7 @@ mod tests {
             assert_eq!((torque, speed), (command, limit));
             let turned = command.integral(length) / w.inertia;
             assert!((w.speed_0 - turned - limit).abs() < 1e-12, "{command:?} {length}");
-            // Before the limit the torque alone determines the rotor's speed.
+            // Before the limit only the torque determines the rotor's speed.
             let Piece { length: all, speed: before, .. } = w.next(w.speed_0, command, length / 2.0);
             assert_eq!(all, length / 2.0);
             let turned = command.integral(length / 2.0) / w.inertia;
@@ -261,7 +262,7 @@ mod tests {
         let w = Wheel { enabled: false, ..wheel() };
         let command = ramp(5.0, -1.0);
         assert_eq!(w.torque(1e6, command), command);
-        // 5 N m falling by 1 N m/s over 2 s: 8 N m s.
+        // A torque of 5 N m that falls by 1 N m/s over 2 s has an impulse of 8 N m s.
         let Piece { length, torque, speed, .. } = w.next(100.0, command, 2.0);
         assert_eq!((length, torque), (2.0, command));
         assert!((speed - (100.0 - 8.0 / w.inertia)).abs() < 1e-9);

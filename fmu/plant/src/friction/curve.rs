@@ -8,9 +8,8 @@ use taylor::series::{self, Series, ZERO};
 
 use crate::parameters::Friction;
 
-/// Ratio of the hub's rate to the Stribeck speed w_s up to which the excess over Coulomb friction
-/// is above 1e-4 of its value d at rest. Every usual tolerance then sees the terms of its power
-/// series.
+/// Ratio of the hub's rate to the Stribeck speed w_s up to which the excess over Coulomb friction is above 1e-4 of its value
+/// d at rest. Up to this rate the terms of its power series are visible at every usual tolerance.
 const VISIBLE: f64 = 3.0;
 
 /// Ratio of the rate to the Stribeck speed w_s above which the excess d exp(-(w/w_s)^2) is below 1e-12 d, so that it counts as 0.
@@ -35,9 +34,9 @@ impl StribeckCurve {
     /// Estimates the time, s, over which the power series of the dry friction torque T_C converges reliably, from the
     /// hub's rate w and its derivatives w' and w''.
     ///
-    /// Far from rest exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, but they grow before
-    /// they decay. Over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve
-    /// is still flat at the end, or the terms decay from order 5 on.
+    /// If the hub is far from rest, exp(-v^2) with v = w/w_s is so small that its terms are below any tolerance, but they
+    /// grow before they decay. Over dv the term of order n is (2 v dv)^n/n!, which is largest at n = 2 v dv. The limit is
+    /// chosen so that either the curve is still flat at the end, or the terms decay from order 5 on.
     pub fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] =
             [omega[0], omega[1], omega[2]].map(|w| w.abs() * libm::sqrt(self.inv_omega_s2));

@@ -1,10 +1,10 @@
-//! The directional factor B of dry friction (thesis 5.4):
+//! The directional factor B of dry friction, which multiplies Stribeck's curve (Rubaga's thesis, section 5.4):
 //!
 //! ```text
 //! B+-(theta) = 1 +- eta + sum over h = 1, 2 of a_h+- cos(h theta) + b_h+- sin(h theta),
 //! ```
 //!
-//! with + while the hub turns forwards, - backwards.
+//! with + while the hub turns forwards and - while it turns backwards.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -15,7 +15,7 @@ use taylor::series::{self, Series, ZERO};
 use crate::contact::Contact;
 use crate::parameters::Friction;
 
-/// The factor B+-(theta) in one direction: its mean and the coefficients of cos theta, sin theta, cos 2
+/// The factor B+-(theta) for one direction of rotation: its mean, and the coefficients of cos theta, sin theta, cos 2
 /// theta, sin 2 theta.
 #[derive(Clone, Copy, Debug)]
 struct OneWay {
@@ -44,7 +44,7 @@ impl OneWay {
         let angle = |j: usize| core::f64::consts::TAU * j as f64 / POINTS as f64;
         let lowest =
             (0..POINTS).map(|j| self.coefficient_at(angle(j))).fold(f64::INFINITY, f64::min);
-        // Between two points B falls below both by at most |B''| (spacing/2)^2 / 2.
+        // Between two points B is lower than at the nearer point by at most |B''| (spacing/2)^2 / 2.
         let [a1, b1, a2, b2] = self.harmonics.map(f64::abs);
         let bend = a1 + b1 + 4.0 * (a2 + b2);
         lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
@@ -58,9 +58,9 @@ impl OneWay {
     }
 }
 
-/// The factor B of both directions, with the series of the angle's harmonics. `trig` holds cos and sin of
-/// theta and of 2 theta in the order of `OneWay::harmonics`, if B depends on the angle; `angles_d` are theta'
-/// and 2 theta'.
+/// The factor B of both directions of rotation, with the power series of the harmonics of the angle. If B depends on
+/// the angle, `trig` contains cos and sin of theta and of 2 theta in the order of `OneWay::harmonics`. `angles_d` are
+/// theta' and 2 theta'.
 #[derive(Clone, Debug)]
 pub struct DirectionalFactor {
     forward: OneWay,
@@ -78,8 +78,8 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Returns one message for each reason why the parameters are not acceptable. Dry friction must
-    /// not drive the hub at any angle, so B must be positive.
+    /// Returns a message for each invalid parameter. B must be positive at every angle, because otherwise dry friction
+    /// would drive the hub.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
@@ -155,8 +155,8 @@ mod tests {
 
     use super::*;
 
-    /// Friction factor 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a hub at rest and for a hub that
-    /// turns.
+    /// The expected friction factor is 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a hub at rest and for
+    /// a hub that turns.
     #[test]
     fn each_harmonic_of_the_friction_over_the_angle_has_the_documented_sign() {
         let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };
@@ -172,7 +172,7 @@ mod tests {
                 series[0] = x;
                 series
             });
-            // Rounding of five terms.
+            // The tolerance is for rounding errors of five terms.
             assert!((one.coefficient_at(theta) - expected).abs() < 1e-15, "{theta}");
             assert!((one.coefficient(0, &series) - expected).abs() < 1e-15, "{theta}");
         }
@@ -187,7 +187,7 @@ mod tests {
             for harmonics in [[-c, -s, 0.0, 0.0], [0.0, 0.0, -c2, -s2]] {
                 let one = OneWay { mean: 1.5, harmonics };
                 let below = 0.5 - one.lowest();
-                // Rounding.
+                // The lower tolerance is for rounding errors.
                 assert!((-1e-15..2e-6).contains(&below), "{place} {harmonics:?} {below:e}");
             }
         }

@@ -20,16 +20,15 @@
 //! sigma_1 (g_max - g_min) <= b g_min,     g_min = c B_min, g_max = (c + d) B_max
 //! ```
 //!
-//! (the passivity condition of Barabanov and Ortega, IEEE Transactions on Automatic Control 45
-//! (2000) 830-832). Larger sigma_1 are refused.
+//! (the passivity condition of Barabanov and Ortega, IEEE Transactions on Automatic Control 45 (2000) 830-832). Parameters
+//! with a larger sigma_1 are refused.
 //!
-//! |w| is not smooth. The contact gives its sign, and w = 0 is located as an event. The law does
-//! not stick: a hub under a torque below g_max creeps to a deflection and stays there.
+//! |w| is not smooth at w = 0, which is therefore located as an event; the contact stores the sign of w. With this law the
+//! hub does not stick: under a torque below g_max it creeps to a deflection and stays there.
 //!
-//! Choose this law if presliding motion, frictional lag, or a break-away torque that depends on the
-//! torque rate matters. While sliding, z follows w within g/(sigma_0 |w|) seconds. The integrator
-//! resolves this time, so its steps have this length. For large sigma_0 the law approaches the
-//! set-valued one, at increasing cost.
+//! Choose this law if presliding motion, frictional lag, or a break-away torque that depends on the torque rate matters.
+//! While the hub slides, z follows w within g/(sigma_0 |w|) seconds. The integrator resolves this time, so that its steps
+//! are about as long. For large sigma_0 the law approaches the set-valued law `stribeck`, at increasing cost.
 
 use alloc::format;
 use alloc::string::String;
@@ -89,7 +88,7 @@ impl FrictionLaw for Lugre {
             )];
         }
         let (g_min, g_max) = bounds(p);
-        // A factor B <= 0 is reported separately.
+        // Other checks report a factor B <= 0.
         let gives_energy = p.sigma1 * (g_max - g_min) > p.b * g_min * (1.0 + 1e-12);
         if g_min <= 0.0 || !gives_energy {
             return Vec::new();
@@ -109,7 +108,7 @@ impl FrictionLaw for Lugre {
         self.z[n] = z;
     }
 
-    // One copy for all slosh models.
+    // This function does not depend on the slosh model, so that the compiled code contains one copy of it.
     #[inline(never)]
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64 {
         self.curve.expand(n, &hub.omega2);
@@ -142,14 +141,13 @@ impl FrictionLaw for Lugre {
         [*z] = series::values([&self.z], n, t);
     }
 
-    /// Returns coefficient n of the bristles' deflection over the largest deflection. The error of
-    /// the friction torque then has the same tolerance as under dry friction.
+    /// Returns coefficient n of the bristles' deflection, divided by the largest deflection. The error of the friction
+    /// torque is then within the same tolerance as under dry friction.
     fn coefficient_norm(&self, n: usize) -> f64 {
         self.z[n].abs() * self.inv_deflection
     }
 
-    /// Returns the contact that follows from the net torque together with the bristle's torque -sigma_0 z,
-    /// which also acts at rest.
+    /// Returns the contact that follows from the net torque and the bristles' torque -sigma_0 z, which also acts at rest.
     fn contact_at_rest(&self, [net, slope]: [f64; 2], _: f64, before: Contact) -> Contact {
         let torque = net - self.sigma0 * self.z[0];
         match if torque != 0.0 { torque } else { slope } {

@@ -19,17 +19,17 @@ use crate::hub::HubMotion;
 use crate::parameters::{Friction, FrictionModel};
 use directional::DirectionalFactor;
 
-/// A friction law as a set of power series in time. It may have one state of its own, for example the
-/// deflection of bristles, and may switch at w = 0.
+/// A friction law as a set of power series in time. A law may have one continuous state of its own, for example the
+/// deflection of bristles, and may change its formula at w = 0.
 pub trait FrictionLaw {
-    /// True if the law switches at w = 0, so that this instant must be located. Otherwise the contact is
-    /// always [`Contact::Forward`].
+    /// True if the law changes its formula at w = 0, so that this instant must be located. If false, the
+    /// contact is always [`Contact::Forward`].
     const SWITCHES_AT_REST: bool = false;
 
     const STICKS: bool = false;
 
-    /// Number of successive negligible terms of the power series after which the search for its order ends. A law
-    /// whose terms vanish by symmetry needs more than the usual two.
+    /// Number of successive negligible terms of the power series that end the search for its order. A law whose terms vanish
+    /// by symmetry needs more than the usual two.
     const NEGLIGIBLE_TERMS: usize = 2;
 
     fn new(p: &Friction) -> Self;
@@ -38,8 +38,8 @@ pub trait FrictionLaw {
         Vec::new()
     }
 
-    /// Sets coefficient n of the series of the law's own state, for example the deflection of the
-    /// bristles: coefficient 0 is its value, coefficient 1 its direction for a partial derivative.
+    /// Sets coefficient n of the series of the law's own state, for example the deflection of the bristles. Coefficient 0 is
+    /// the value of the state, and coefficient 1 its change for a directional derivative.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
     /// Returns coefficient n of the friction torque tau_f while the hub is not stuck. It follows from the coefficients
@@ -63,8 +63,8 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Advances the law's own state z, for example the deflection of the bristles, by `t` seconds
-    /// with its series up to order n.
+    /// Advances the law's own state z, for example the deflection of the bristles, by `t` seconds, from its series
+    /// up to order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
     #[inline(always)]
@@ -84,19 +84,18 @@ pub trait FrictionLaw {
         (0.0, 0.0)
     }
 
-    /// Returns the contact of a hub at w = 0 that had the contact `before`. `net` is the torque without
-    /// friction and, unless the law sticks, its rate, with the hub held.
+    /// Returns the contact of a hub at w = 0 whose previous contact is `before`. `net` is the torque on the hub without
+    /// friction, and, if the law does not stick, its rate while the hub is held.
     fn contact_at_rest(&self, _net: [f64; 2], _theta: f64, _before: Contact) -> Contact {
         Contact::Forward
     }
 }
 
-/// Passes a call on to the friction law that the plant uses. There is one for every
-/// [`FrictionModel`]; the compiler reports a missing one.
+/// Defines an enumeration of all friction laws and passes each call on to the law that the plant uses. The compiler reports
+/// a missing law, because there must be one for every [`FrictionModel`].
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
-        /// The friction law in use, with the functions of [`FrictionLaw`]. The plant has one law, which is stored together
-        /// with all other series on the heap.
+        /// The friction law that the plant uses, with the functions of [`FrictionLaw`].
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
         pub enum Law {

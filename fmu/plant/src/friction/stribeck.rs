@@ -1,15 +1,15 @@
-//! Stribeck's curve as a set-valued law (thesis eq. 5.1 and 5.4):
+//! Stribeck's curve as a set-valued friction law (Rubaga's thesis, eq. 5.1 and 5.4):
 //!
 //! ```text
 //! tau_f = -b w - sgn(w) T_C(w) B(theta)        w != 0
 //! -(c + d) B+ <= tau_f <= (c + d) B-            w = 0
 //! ```
 //!
-//! At rest the bearing holds any torque within these limits, and the hub is exactly stuck.
+//! At rest the bearing holds any torque within these limits, and the hub sticks exactly.
 //!
-//! Choose this law for a bearing with dry friction if the hub may come to rest or reverse. Stick
-//! and slip are located as events, which is exact and fast. The hub does not move at all while
-//! stuck. For presliding motion use a law with bristles.
+//! Choose this law for a bearing with dry friction if the hub may come to rest or reverse. Transitions between stick and
+//! slip are located as events, which is exact and fast. A stuck hub does not move at all. For presliding motion use a
+//! law with bristles (`lugre.rs`).
 
 use taylor::series::{self, Series, ZERO};
 
@@ -29,7 +29,7 @@ pub struct Stribeck {
 }
 
 impl Stribeck {
-    // One copy for all slosh models.
+    // This function does not depend on the slosh model, so that the compiled code contains one copy of it.
     #[inline(never)]
     fn dry_by_angle(&mut self, n: usize, contact: Contact, theta: &Series) -> f64 {
         self.factor.expand(n, theta);
@@ -72,7 +72,7 @@ impl FrictionLaw for Stribeck {
 
     fn contact_at_rest(&self, [net, _]: [f64; 2], theta: f64, before: Contact) -> Contact {
         let (against_backward, against_forward) = self.holding_torques(theta);
-        // A hub that has just broken away is at the limit, to rounding.
+        // The torque on a hub that has just broken away equals the limit, except for rounding errors.
         let limit = |hold: f64, from: Contact| {
             if before == from { hold * (1.0 - 1e-12) } else { hold }
         };

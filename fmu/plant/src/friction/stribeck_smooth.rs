@@ -1,14 +1,14 @@
-//! Stribeck's curve with its jump at rest smoothed, T = tanh(w/eps) for sgn(w):
+//! Stribeck's curve, in which T = tanh(w/eps) replaces sgn(w), so that it has no jump at rest:
 //!
 //! ```text
 //! tau_f = -b w - T_C(w) T [(B+ + B-)/2 + T (B+ - B-)/2]
 //! ```
 //!
-//! The blend of the two directions never drives the hub.
+//! This combination of the factors B+ and B- of both directions never drives the hub.
 //!
-//! Choose this law only to reproduce results with a smoothed sign. The hub creeps where it should
-//! be at rest, and each reversal within eps takes steps of about eps/|w'| seconds. It takes far
-//! more steps than the set-valued law that it approximates.
+//! Choose this law only to reproduce results of models with a smoothed sign function. The hub creeps where it should be at
+//! rest, and each reversal within eps takes steps of about eps/|w'| seconds. This law needs far more steps than the
+//! set-valued law `stribeck`, which it approximates.
 
 use taylor::series::{self, Series, ZERO};
 
@@ -55,7 +55,7 @@ impl FrictionLaw for StribeckSmooth {
         }
     }
 
-    // One copy for all slosh models.
+    // This function does not depend on the slosh model, so that the compiled code contains one copy of it.
     #[inline(never)]
     fn torque(&mut self, n: usize, _: Contact, hub: &HubMotion) -> f64 {
         self.curve.expand(n, &hub.omega2);
@@ -73,9 +73,9 @@ impl FrictionLaw for StribeckSmooth {
         -self.b * hub.omega[n] - series::mul(n, &self.curve.torque, &self.sign)
     }
 
-    /// Estimates the time, s, over which the series of the friction torque converges reliably: the time to half the
-    /// distance to the nearest poles of tanh(v), which are sqrt(v^2 + (pi/2)^2) away from v = w/eps, where w is the
-    /// hub's rate. Away from 0 tanh is so flat that its coefficients do not show the poles. T_C has a limit of its own.
+    /// Estimates the time, s, over which the series of the friction torque converges reliably. The nearest poles of tanh(v),
+    /// v = w/eps with the hub's rate w, are at the distance sqrt(v^2 + (pi/2)^2), of which half is used, because tanh is so
+    /// flat away from 0 that its coefficients do not show the poles. T_C has a limit of its own.
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;

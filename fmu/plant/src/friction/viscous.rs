@@ -1,7 +1,7 @@
-//! Viscous friction, tau_f = -b w, and a bearing without friction.
+//! Viscous friction, tau_f = -b w, and a bearing without friction (b = 0).
 //!
-//! Choose them for an air or magnetic bearing, or for a comparison with linear theory. With the
-//! linear slosh model everything in the plant is then linear except the wheel.
+//! Choose these laws for an air bearing or a magnetic bearing, or for a comparison with linear theory. With the slosh model
+//! `linear` everything in the plant is then linear, except the wheel.
 
 use super::FrictionLaw;
 use crate::contact::Contact;

@@ -1,5 +1,5 @@
-//! Linear planar pendulum. al in rad is the angle along the direction n = (n_x, n_t), radial and tangential, in which the
-//! slosh mass moves, q = al n. By default the direction is the tangent, q_x = 0.
+//! Slosh model `linear`: linear planar pendulums. al is the angle, rad, along the direction n = (n_x, n_t), radial and
+//! tangential, in which the slosh mass moves, so that q = al n. By default the direction is the tangent, q_x = 0.
 //!
 //! ```text
 //! T   = r (m g al + c l al'),   no share of J beyond the hub's I0
@@ -11,21 +11,20 @@
 //! ```text
 //! E = m (r w + l al')^2/2 + m g l al^2/2,  H = m r (r w + l al')
 //! ```
-//! On a tilted bench, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and -m (e_x
-//! r + e_y l al) to E.
+//! On a tilted bench, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and -m (e_x r + e_y l al) to E.
 //!
-//! For another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t, and the
-//! slosh mass is at (r + u n_x, u n_t). Its kinetic energy to second order is m [(r_t w + u')^2 + (r_x w)^2]/2. Lagrange's
-//! equations are
+//! For another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t,
+//! and the slosh mass is at (r + u n_x, u n_t). Its kinetic energy to second order is m [(r_t w + u')^2 + (r_x
+//! w)^2]/2. Lagrange's equations are
 //! ```text
 //! J   = m r_x^2,   T = r_t (m g al + c l al') - m (r_x + u)(e_x n_t - e_y n_x)
 //! al'' = -(c/m) al' - (g/l) al - (r_t/l) w' + (e_x n_x + e_y n_t)/l
 //! H = m (r^2 w + r_t u')
 //! ```
 //!
-//! A hub that only turns moves a radial mode (n_t = 0) only by terms of second order, r w^2 and 2 w u', which are in
-//! `planar.rs`. In the linear model the tilt of the bench moves such a mode, and its mass moves on the circle of radius
-//! r.
+//! The rotation of the hub moves a radial mode (n_t = 0) only by terms of second order, r w^2 and 2 w u', which only
+//! `planar.rs` contains. In the linear model only the tilt of the bench moves this mode, and its mass moves on the
+//! circle of radius r.
 
 use alloc::string::String;
 
@@ -66,7 +65,7 @@ impl SloshMode for Linear {
         }
         self.g_al[n] = self.p.weight(n, ramp, &self.al);
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
-        // without variation the mode moves along the tangent
+        // If nothing varies, the mode moves along the tangent.
         let arm = if ramp { r_t } else { r };
         let mut t = arm * (m * self.g_al[n] + c * l * self.drag[n]);
         let mut j = 0.0;
@@ -97,8 +96,8 @@ impl SloshMode for Linear {
         self.al_d[0].abs() + self.p.omega_n * self.al[0].abs()
     }
 
-    /// Returns coefficient n of the slosh mass times its height above rest, kg m: m l al^2/2, where al is its angle. On
-    /// a tilted bench m times the height of the slosh mass in the hub's frame is added.
+    /// Returns coefficient n of the slosh mass times its height above rest, kg m: m l al^2/2, where al is its angle. On a
+    /// tilted bench, m times the height of the slosh mass in the hub's frame is added.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;

@@ -1,15 +1,14 @@
-//! Mechanical models of the liquid: the interface of a slosh mode to hub and integrator, and the
-//! models that implement it. This file lists all models; each has its own file.
+//! Mechanical models of the liquid: the interface of a slosh mode to hub and integrator, and the models that implement it.
+//! Each model has its own file; this file lists all models.
 //!
-//! A mode's coordinates are `q = [q_x, q_y, q_x', q_y']`, x radial (outwards), y tangential
-//! (towards +theta), measured in the hub's frame. Each model defines q in its own file. All modes
-//! act on the hub through
+//! A mode's coordinates are `q = [q_x, q_y, q_x', q_y']` in the hub's frame, with x radial (outwards) and y tangential
+//! (towards +theta). The file of each model defines q. All modes act on the hub through
 //!
 //! ```text
 //! J w' = tau + tau_f + T,      q'' = B + A w'
 //! ```
 //!
-//! where J, T, B and A do not contain w' (w the hub's rate).
+//! where w is the hub's rate, and J, T, B and A do not contain w'.
 
 mod linear;
 mod planar;
@@ -31,8 +30,7 @@ use planar::Planar;
 use spherical::Spherical;
 use third_order::ThirdOrder;
 
-/// Defines those functions of [`SloshMode`] that are alike in all models that store their pendulum
-/// in the field `p`.
+/// Defines the functions of [`SloshMode`] that are the same in all models that store their pendulum in the field `p`.
 macro_rules! own_pendulum {
     () => {
         fn pendulum(&self) -> &Pendulum {
@@ -46,8 +44,8 @@ macro_rules! own_pendulum {
 }
 use own_pendulum;
 
-/// Functions of [`SloshMode`] of a model with one angle `al` along the direction of its pendulum `p`, the rates `al_d`
-/// and `al_dd`, and `drag`, the rate at which its damping acts.
+/// Defines functions of [`SloshMode`] for a model with one angle `al` along the direction of its pendulum `p`, its
+/// derivatives `al_d` and `al_dd`, and the rate `drag` on which the damping acts.
 macro_rules! one_angle {
     () => {
         own_pendulum!();
@@ -151,8 +149,8 @@ pub struct HubReaction {
     pub t: f64,
 }
 
-/// Displacement of a mode as angles with sin(angle) = displacement / l, radial and tangential, rad, and their
-/// rates, rad/s.
+/// Displacement of a mode as radial and tangential angles with sin(angle) = displacement/l, rad, and the rates
+/// of these angles, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles<T = f64> {
     pub angle: [T; 2],
@@ -168,29 +166,29 @@ impl<T: Number> Angles<T> {
 
 /// One slosh mode as a set of power series in time.
 ///
-/// Functions over [`Number`] hold at the start of an expansion: they return the value, or the derivative
-/// along the seeded direction. `ramp` is true if g changes along the expansion.
+/// Functions that are generic over [`Number`] apply to the start of an expansion: they return a value, or its directional
+/// derivative. `ramp` is true if g changes along the expansion.
 pub trait SloshMode {
-    /// True to compile steps with a single mode and constant g with the sums of every order written out:
-    /// twice as fast, 40 to 100 KB of code.
+    /// True if steps with a single mode and constant g are compiled with the sums of every order written out, which is twice
+    /// as fast and takes 40 to 100 KB of code.
     const UNROLLED: bool = false;
     const MOVES_INERTIA: bool = true;
     fn new(pendulum: &Pendulum) -> Self;
-    /// Returns the reason, if any, why the motion cannot start with these parameters.
+    /// Returns the reason why the motion cannot start with these parameters, if any.
     fn start_problem(&self, _init: &Init) -> Option<String> {
         None
     }
     fn pendulum(&self) -> &Pendulum;
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Returns the squares of slosh angle, rad2, and its rate, rad2/s2, at the start of the
-    /// expansion. In the model `ThirdOrder`, displacement over length takes the place of the angle.
+    /// Returns the squares of slosh angle, rad2, and its rate, rad2/s2, at the start of the expansion. In the model
+    /// `ThirdOrder`, displacement divided by length replaces the angle.
     fn amplitude2<T: Number>(&self) -> [T; 2];
     fn coordinates(&self, at: &Angles) -> [f64; 4];
     fn angles<T: Number>(&self) -> Angles<T>;
-    /// Sets the coordinates at the start of the expansion; w must be known to order 0.
+    /// Sets the coordinates at the start of the expansion. Coefficient 0 of the hub's rate w must be known.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
-    /// Sets the direction of a partial derivative as coefficient 1 of the coordinates; w must be known to
-    /// order 1.
+    /// Sets coefficient 1 of the coordinates to their change `dq` for a directional derivative. Coefficients 0 and 1 of the
+    /// hub's rate w must be known.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
     fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
     /// Returns coefficient n of the inertia J and of the torque T with which the mode acts on the hub (see the module's
@@ -201,8 +199,7 @@ pub trait SloshMode {
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
     fn error_scale(&self) -> f64;
     fn coefficient_norm(&self, n: usize) -> f64;
-    /// Returns coefficient n of the power that the mode dissipates, W. `hub_reaction` must have
-    /// computed this order.
+    /// Returns coefficient n of the power that the mode dissipates, W. `hub_reaction` must have computed order n.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
     /// Returns coefficient n of the slosh mass times its height above rest (kg m), which is the potential energy
     /// divided by g.
@@ -211,8 +208,8 @@ pub trait SloshMode {
     /// from their series up to order n. `varies` is true if g, drag or weight change along the expansion; otherwise the
     /// modes move along the tangent.
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
-    /// Returns the slosh mass times its height above rest, kg m, which is the potential energy over
-    /// g, and the rate of this product.
+    /// Returns the slosh mass times its height above rest, kg m, which is the potential energy divided by g, and the
+    /// rate of this product.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
     /// Returns the force of the slosh mass on the tank, N, radial and tangential.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
@@ -221,7 +218,7 @@ pub trait SloshMode {
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
     /// Returns the angular momentum of the slosh mass about the bearing axis, kg m2/s.
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns the reason, if any, why the slosh model is not valid at these coordinates of a mode.
+    /// Returns the reason why the slosh model is not valid at these coordinates of a mode, if any.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

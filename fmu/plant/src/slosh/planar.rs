@@ -1,6 +1,6 @@
-//! Nonlinear planar pendulum: the slosh mass swings in one plane, by default the tangential one, with centripetal terms and
-//! a changing inertia. al in rad is the angle along the plane's direction n = (n_x, n_t), q = al n. With s = sin al, c_ =
-//! cos al, and the slosh mass at (r, l s, -l c_) in the hub's frame:
+//! Slosh model `planar`: the slosh mass is a nonlinear pendulum in one plane, by default the tangential plane, with
+//! centripetal terms and a changing inertia. al is the angle, rad, along the plane's direction n = (n_x, n_t), so that q =
+//! al n. With s = sin al, c_ = cos al, and the slosh mass at (r, l s, -l c_) in the hub's frame:
 //!
 //! ```text
 //! p    = g s + (c/m) l al' - l w^2 s c_          (restoring specific force)
@@ -11,8 +11,8 @@
 //! H = m [(r^2 + l^2 s^2) w + r l c_ al']
 //! ```
 //!
-//! These are Lagrange's equations for this slosh mass on the hub, to first order the linear model. On a tilted bench,
-//! gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and -m (e_x r + e_y l s) to E.
+//! These are Lagrange's equations for this slosh mass on the hub; to first order they are the linear model. On a tilted
+//! bench, gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and -m (e_x r + e_y l s) to E.
 //!
 //! For another direction than the tangent (a box with modes along both axes), u = l s, r_x = r n_x, r_t = r n_t, and the
 //! slosh mass is at (r + u n_x, u n_t, -l c_). Lagrange's equations of
@@ -28,7 +28,7 @@
 //! H = m [(r^2 + u^2 + 2 r_x u) w + r_t l c_ al']
 //! ```
 //!
-//! A radial slosh mass (n_t = 0) does not feel the hub's angular acceleration. The centrifugal term w^2 (r + u) moves it
+//! The hub's angular acceleration does not move a radial slosh mass (n_t = 0). The centrifugal term w^2 (r + u) moves it
 //! outwards, and it rotates with the hub at r + u, so that its motion accelerates and decelerates the hub (2 w u').
 
 use alloc::string::String;

@@ -1,14 +1,14 @@
-//! Spherical (conical) pendulum with stereographic coordinates. The slosh mass's direction from the hinge, a unit vector in
-//! the hub's frame, is
+//! Slosh model `spherical`: a spherical (conical) pendulum in stereographic coordinates. The slosh mass's direction from the
+//! hinge, a unit vector in the hub's frame, is
 //!
 //! ```text
 //! p = (k xi_1, k xi_2, 1 - k),   k = 2/(1 + |xi|^2),   q = xi
 //! ```
 //!
-//! Rest is xi = 0; only the slosh mass straight up is singular. The motion is expanded in p and in v, the slosh mass's
-//! velocity relative to the hinge over l in inertial axes. In these variables Newton's law has few products and no
-//! quotient. With R the quarter turn (a, b) -> (-b, a) of the horizontal part, e_x outwards, e_y along +theta, e_z up:
-//!
+//! At rest xi = 0; only the direction straight up is singular. The motion is expanded in p and in v, the slosh mass's
+//! velocity relative to the hinge divided by l, both relative to inertial axes. In these variables Newton's law has few
+//! products and no quotient. R rotates the horizontal part by a quarter turn, (a, b) -> (-b, a); e_x points outwards, e_y
+//! along +theta, and e_z up:
 //! ```text
 //! p' = v - w R p
 //! v' = -w R v - L p + (r/l) (w^2 e_x - w' e_y) - (g/l) e_z - (c/m) p'
@@ -29,8 +29,8 @@
 //! H = m [ (r + l p_x) (l v_y + r w) - l p_y l v_x ]
 //! ```
 //!
-//! Checked against Lagrange's equations for xi (below), against another formulation of the hub's
-//! acceleration (tests/plant/rotary.rs) and against a pendulum in angles (Basilisk).
+//! tests/plant/rotary.rs checks these equations against another formulation of the hub's acceleration. They were also
+//! checked against Lagrange's equations for xi (below) and against a pendulum in angles (Basilisk).
 
 use alloc::format;
 use alloc::string::String;
@@ -59,9 +59,8 @@ pub struct Spherical {
     dir: Vector2,
     dir_z: Series,
     dir_d: Vector2,
-    /// The rate p' of the slosh mass's direction times the drag coefficient over its value at the
-    /// start of the expansion: the horizontal part with exchanged components, and then the upward
-    /// component.
+    /// The rate p' of the slosh mass's direction times the drag coefficient, which is divided by its value at the start of
+    /// the expansion: the horizontal part with its components exchanged, and then the upward component.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,
@@ -132,7 +131,7 @@ impl Spherical {
 
 impl SloshMode for Spherical {
     const UNROLLED: bool = true;
-    // J is that at the start of the expansion; T includes its change.
+    // The value of J at the start of the expansion is used; T includes the change of J.
     const MOVES_INERTIA: bool = false;
 
     fn new(p: &Pendulum) -> Self {
@@ -250,7 +249,7 @@ impl SloshMode for Spherical {
                 inv_l * (mul_part(n, e_x, &self.dir, 0) + mul_part(n, e_y, &self.dir, 1));
         }
         let [plus, minus] = component_products(n, &self.dir, &self.drag_swapped);
-        // L and L p without the terms in the newest w', which J represents.
+        // L and L p without the terms that contain w' of the newest order, which J represents.
         let y_0 = self.dir[0][1];
         self.tension[n] = self.tension_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
         self.pulled = scale_head(n, &self.tension, &self.dir);
@@ -319,9 +318,8 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the coordinates xi and their rates from the direction p of the slosh mass, by xi = p/k and k xi' = p' +
-    /// v_z xi. The factor k = 1 - p_z comes from
-    /// |p| = 1 if the slosh mass is above the horizontal.
+    /// Computes the coordinates xi and their rates from the direction p of the slosh mass, by xi = p/k and k xi' = p' + v_z
+    /// xi. If the slosh mass is above the horizontal, k = 1 - p_z is computed from |p| = 1.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
@@ -347,8 +345,8 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// Returns the torque about the bearing axis: of the tension, which acts at the hinge, and of
-    /// the drag, which acts at the slosh mass.
+    /// Returns the torque about the bearing axis: the moment of the tension, which acts at the hinge, and of the drag, which
+    /// acts at the slosh mass.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
@@ -370,9 +368,9 @@ impl SloshMode for Spherical {
     }
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
-        // |xi| = 1e3 is a bob within 0.12 degrees of straight up.
+        // |xi| = 1e3 is a direction within 0.12 degrees of straight up.
         let up = q[0] * q[0] + q[1] * q[1] > 1e6;
-        up.then_some("its bob stands straight up, where no pendulum represents a liquid")
+        up.then_some("its slosh mass is straight up, where no pendulum represents a liquid")
     }
 }
 
@@ -441,12 +439,12 @@ mod tests {
             mode.accelerate(0, false, &hub);
             let expected = lagrange(&p, q, w, w_d, g);
             let [.., x_dd, y_dd] = mode.derivatives(0, &hub);
-            // The terms are up to k |v|^2 |xi|, 1e4, and half of them are computed as 1/k, 20,
-            // times smaller ones.
+            // The terms are as large as k |v|^2 |xi|, 1e4, and half of them are computed from terms that are
+            // 1/k, 20, times smaller.
             let size = 1.0 + expected[0].abs().max(expected[1].abs()) + 1e3;
             assert!((x_dd - expected[0]).abs() < 1e-13 * size, "{x_dd} {}", expected[0]);
             assert!((y_dd - expected[1]).abs() < 1e-13 * size, "{y_dd} {}", expected[1]);
-            // Back to the coordinates.
+            // The conversion back gives the same coordinates.
             let back = mode.coordinates_at(ORDER, 0.0, w, false);
             for (a, b) in back.iter().zip(q) {
                 assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{a} {b}");

@@ -1,8 +1,8 @@
-//! A mode to third order in its amplitude: a mass on the paraboloid z = |q|^2/(2 l) with a quartic spring, whose
-//! coefficients s and kappa give the liquid's shifts of frequency in planar and in circular motion
+//! Slosh model `liquid`: a mode to third order in its amplitude. It is a mass on the paraboloid z = |q|^2/(2 l) with a
+//! quartic spring. The coefficients s and kappa give the liquid's shifts of frequency in planar and in circular motion
 //! (`formulas::third_order`). q = (x, y) is the position of the slosh mass relative to the hinge, m, in the hub's frame.
-//! With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the hub's Coriolis and centrifugal accelerations a = (2 w y' + w^2 (r +
-//! x), -2 w x' + w^2 y):
+//! With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the hub's Coriolis and centrifugal accelerations a = (2 w y' + w^2 (r + x),
+//! -2 w x' + w^2 y):
 //!
 //! ```text
 //! mu   = [ q.a + |q'|^2 + g (l/s) (1 + h |q|^2) ] / N
@@ -13,9 +13,8 @@
 //! dissipated power c (|q'|^2 + s z'^2),  z' = q.q'/l
 //! ```
 //!
-//! These are Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2. On a
-//! tilted bench, gravity across the axis, e, adds to a, and -m e.(r + x, y) adds to E. For small q a pendulum is the case
-//! s = kappa = 1.
+//! These are Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2. On a tilted bench, gravity
+//! across the axis, e, is added to a, and -m e.(r + x, y) to E. For small q a pendulum corresponds to s = kappa = 1.
 
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
@@ -184,7 +183,7 @@ impl SloshMode for ThirdOrder {
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         self.rise[n] = mul(n, x, x_d) + mul(n, y, y_d);
         if ramp {
-            // q.(d q') = d (q.q')
+            // This uses q.(d q') = d (q.q'), where d is the drag coefficient.
             self.drag_rise[n] = mul(n, x, &self.drag[0]) + mul(n, y, &self.drag[1]);
         }
         let power = if ramp {
@@ -273,8 +272,8 @@ impl SloshMode for ThirdOrder {
 mod tests {
     use super::*;
 
-    /// The range ends at a displacement of one length. A softening spring ends it where a tenth of its
-    /// stiffness is left.
+    /// The range of the model ends at a displacement of one length, or where a tenth of the stiffness of a softening spring
+    /// remains.
     #[test]
     fn the_third_order_model_ends_at_a_displacement_of_one_length_or_at_a_tenth_of_its_stiffness() {
         let outside = |spring: f64, q: [f64; 2]| {

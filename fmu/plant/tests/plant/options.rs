@@ -440,7 +440,11 @@ fn warnings_name_breaking_parameters_without_effect() {
     for (model, onset, what) in [
         (SloshModel::Liquid, 0.0, "smallest wave"),
         (SloshModel::Liquid, 1.54, ""),
-        (SloshModel::Liquid, 1.55, "hardly acts on mode 1: its steepness reaches 1.541 at"),
+        (
+            SloshModel::Liquid,
+            1.55,
+            "has almost no effect on mode 1: the steepness of its wave reaches 1.541 at",
+        ),
         (SloshModel::Spherical, 1.55, ""),
         (SloshModel::Spherical, 2.43, "steepness reaches 2.420 at an amplitude of 1.571"),
         (SloshModel::Frozen, 0.0, ""),
