@@ -1,10 +1,10 @@
-//! Laws that hold for every model, parameter and input: energy, momentum, limits.
+//! Tests of laws that hold for every slosh model, parameter and input: energy, momentum, and limiting cases.
 
 use super::common::{FRICTION, SLOSH, anywhere, bench, has_rim};
 use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
 
-/// Tolerance of all runs here. The plant's errors are two to three decades below the tolerance, so
-/// bounds of 1e-8 leave a margin. A wrong term would still show as a part of the energy throughput.
+/// Tolerance of the solver in these tests. The errors of the plant are two to three decades below the tolerance, so that
+/// bounds of 1e-8 leave a margin, while a wrong term would be a visible fraction of the energy throughput.
 const TOLERANCE: f64 = 1e-9;
 
 fn plant(p: &plant::Parameters, inputs: &Inputs) -> Plant {
@@ -40,7 +40,7 @@ fn energy_balances_for_every_model_friction_and_damping() {
         for friction in FRICTION {
             for _ in 0..25 {
                 let p = anywhere(&mut rng, slosh, friction);
-                // Torque that would turn the hub by a fraction of a turn per s^2.
+                // The torque gives the hub an angular acceleration of about 1 rad/s2.
                 let torque = p.hub.inertia;
                 let mut inputs = Inputs::default();
                 let mut plant = plant(&p, &inputs);
@@ -64,8 +64,7 @@ fn energy_balances_for_every_model_friction_and_damping() {
 
 #[test]
 fn the_dissipated_power_equals_the_rate_at_which_energy_is_lost() {
-    // Central difference of the energy over 2 ms against the power: its error is
-    // (2 pi f h)^2/6 of the power's change, some 1e-4.
+    // The central difference of the energy over 2 ms has the error (2 pi f h)^2/6 of the power's change, about 1e-4.
     for slosh in SLOSH {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.init.omega, p.init.slosh_angle, p.init.slosh_rate_radial) = (0.1, 0.2, 1.0);
@@ -97,7 +96,7 @@ fn momentum_is_constant_without_torque_and_friction() {
                     break;
                 }
                 let now = plant.outputs(&inputs);
-                // The hub's own share shows the size of what is exchanged.
+                // The hub's part of the momentum shows how much momentum is exchanged.
                 largest = largest.max((now.omega * p.hub.inertia).abs());
                 change = change.max((now.momentum - first.momentum).abs());
             }
@@ -137,14 +136,14 @@ fn energy_never_grows_without_torque() {
                         break;
                     }
                     let now = plant.outputs(&inputs);
-                    // Rounding of the energy itself and the step's own error.
+                    // The tolerance is for rounding of the energy and the error of the step.
                     assert!(now.energy <= last.energy + 1e-11 * first.energy, "{p:?}");
                     assert!(now.power_dissipated >= 0.0, "{p:?}");
                     assert!(now.heat >= last.heat - 1e-13 * first.energy, "{p:?}");
                     last = now;
                 }
                 let damped = slosh != SloshModel::Frozen || friction != FrictionModel::None;
-                // A mode of `liquid` may reach its rim in the first step.
+                // A mode of the model `liquid` may reach the end of its range in the first step.
                 if damped && first.energy > 0.0 && plant.time() > 0.0 {
                     assert!(last.heat > 0.0, "damping dissipates energy: {p:?}");
                 }
@@ -171,8 +170,8 @@ fn hub_equation_holds_between_the_outputs() {
                 let terms = [o.tau_actuator, inputs.tau_ext.value, o.tau_friction, o.tau_fluid];
                 let size = terms.iter().map(|t| t.abs()).sum::<f64>();
                 let rest = p.hub.inertia * o.omega_dot - terms.iter().sum::<f64>();
-                // The liquid's torque is built from forces, independently of omega_dot's
-                // own formula: rounding of a heavy liquid on a light hub is left.
+                // The liquid's torque is computed from forces, and not by the formula of omega_dot. The tolerance is for
+                // rounding errors with a heavy liquid on a light hub.
                 assert!(rest.abs() <= 1e-11 * size, "{slosh:?} {friction:?} {rest:e} {size:e}");
             }
         }
@@ -182,7 +181,7 @@ fn hub_equation_holds_between_the_outputs() {
 #[test]
 fn a_stuck_hub_is_exactly_at_rest() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
-    // 1 mrad pulls with 1.7 mN m, together 3.7 mN m of the 5.9 mN m that hold.
+    // A slosh angle of 1 mrad exerts 1.7 mN m. The total is 3.7 mN m, and the bearing holds up to 5.9 mN m.
     p.init.slosh_angle = 0.001;
     let inputs = Inputs { tau_cmd: Ramp::held(0.002), ..Inputs::default() };
     let mut plant = plant(&p, &inputs);
@@ -190,7 +189,7 @@ fn a_stuck_hub_is_exactly_at_rest() {
         plant.step(&inputs, 0.02).unwrap();
         let o = plant.outputs(&inputs);
         assert!(o.discrete.stuck && o.omega == 0.0 && o.omega_dot == 0.0 && o.theta == 0.0);
-        assert!(o.slosh_rate != 0.0, "the liquid goes on moving");
+        assert!(o.slosh_rate != 0.0, "the liquid must still move");
     }
 }
 
@@ -204,7 +203,7 @@ fn trajectory_does_not_depend_on_the_communication_step() {
             p.init.slosh_angle_radial = 0.1;
             let mut runs = Vec::new();
             for cut in 0..3 {
-                // The same input signal: a ramp of torque over 10 s.
+                // The torque is the same in all runs: a ramp over 10 s.
                 let ramp = Ramp { value: -0.02, slope: 0.004 };
                 let mut inputs = Inputs { tau_cmd: ramp, ..Inputs::default() };
                 let mut plant = plant(&p, &inputs);
@@ -223,12 +222,12 @@ fn trajectory_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// If the motion is halved, the difference of each nonlinear slosh model from the linear model falls to a quarter
-/// relative to the motion.
+/// If the amplitude of the motion is halved, the relative difference of each nonlinear slosh model from the linear model
+/// falls to a quarter.
 #[test]
 fn nonlinear_models_approach_the_linear_one_quadratically() {
-    // Largest difference from the linear model against the motion's size: halving
-    // the amplitude must quarter it (a cubic term in planar, quadratic in spherical).
+    // Halving the amplitude must quarter the largest difference from the linear model, relative to the size of the motion.
+    // The difference is a cubic term.
     for slosh in SLOSH {
         if matches!(slosh, SloshModel::Frozen | SloshModel::Linear) {
             continue;
@@ -266,7 +265,7 @@ fn a_bench_with_liquid_of_vanishing_mass_moves_as_a_bench_with_rigid_liquid() {
     };
     for slosh in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
         let frozen = run(SloshModel::Frozen, 1e-3);
-        // 2 mg of water on 0.32 kg m2: the pendulum's share is 1e-7 of the inertia.
+        // 2 mg of water on 0.32 kg m2: the inertia of the pendulum is 1e-7 of the hub's inertia.
         assert!((run(slosh, 1e-3) / frozen - 1.0).abs() < 1e-6, "{slosh:?}");
     }
 }
@@ -281,15 +280,15 @@ fn friction_that_would_drive_the_hub_is_refused() {
     };
     assert_eq!(refused(0.5, [0.4, 0.0, 0.0, 0.0]), None);
     assert_eq!(refused(-0.5, [0.3, 0.0, 0.0, 0.1]), None);
-    // 1 - 0.5 - 0.4 sqrt(2) < 0
+    // The lowest factor of dry friction is 1 - 0.5 - 0.4 sqrt(2) < 0.
     let problems = refused(-0.5, [0.4, 0.4, 0.0, 0.0]).unwrap();
     assert!(problems[0].contains("friction.asymmetry"), "{problems:?}");
-    assert_eq!(refused(1.1, [0.0; 4]).unwrap().len(), 1, "only backwards is below 0");
+    assert_eq!(refused(1.1, [0.0; 4]).unwrap().len(), 1, "only the backward factor is below 0");
 }
 
 #[test]
 fn a_bearing_with_a_preferential_direction_holds_less_torque_in_that_direction() {
-    // Breaks away at (c + d)(1 -+ eta): 4.737 and 7.105 mN m.
+    // The hub breaks away at (c + d)(1 -+ eta): 4.737 and 7.105 mN m.
     let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
     p.friction.asymmetry = -0.2;
     let stuck = |torque: f64| {
@@ -304,7 +303,7 @@ fn a_bearing_with_a_preferential_direction_holds_less_torque_in_that_direction()
 fn hub_liquid_and_wheel_together_keep_their_momentum() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.wheel.enabled = true;
-    // Saturates: torque limit at first, then the rotor's lowest speed.
+    // The wheel saturates: first it reaches its torque limit, then the lowest speed of the rotor.
     let inputs = Inputs { tau_cmd: Ramp { value: 0.5, slope: -0.05 }, ..Inputs::default() };
     let mut plant = plant(&p, &inputs);
     let total = |o: Outputs| o.momentum + p.wheel.inertia * o.wheel_speed;
@@ -312,11 +311,11 @@ fn hub_liquid_and_wheel_together_keep_their_momentum() {
     plant.step(&inputs, 20.0).unwrap();
     let last = plant.outputs(&inputs);
     assert!((total(last) - first).abs() < 1e-11, "{:e}", total(last) - first);
-    assert!(last.wheel_speed > p.wheel.speed_min, "the reversed command speeds it up again");
+    assert!(last.wheel_speed > p.wheel.speed_min, "the reversed command must speed up the rotor");
 }
 
-/// The axial acceleration falls to 0, so that nothing restores the liquid. All results stay finite; only a slosh
-/// model with a rim may end the run, when the liquid drifts over the rim.
+/// The axial acceleration falls to 0, so that nothing restores the liquid. All results stay finite. In a slosh model with a
+/// largest displacement, the run may end with an error when the liquid drifts beyond it.
 #[test]
 fn without_gravity_results_stay_finite_or_the_liquid_drifts_over_the_rim() {
     for slosh in SLOSH {
@@ -329,7 +328,7 @@ fn without_gravity_results_stay_finite_or_the_liquid_drifts_over_the_rim() {
         inputs.g_axial = Ramp::held(0.0);
         for _ in 0..10 {
             if plant.step(&inputs, 0.1).is_err() {
-                assert!(has_rim(slosh), "the others have no rim to drift over");
+                assert!(has_rim(slosh), "this model has no largest displacement");
                 break;
             }
         }
@@ -355,17 +354,16 @@ fn gyro_readings_are_equal_for_any_communication_step() {
         plant.outputs(&inputs)
     };
     let first = reading(0.02);
-    assert!((first.omega_imu - first.omega).abs() > 0.0, "it is a sample with noise");
+    assert!((first.omega_imu - first.omega).abs() > 0.0, "the reading must contain noise");
     for cut in [0.005, 0.0137, 0.4] {
-        // Equal noise; the rate itself differs within the tolerance, at most one step of
-        // the quantisation.
+        // The noise is equal. The rate itself differs within the tolerance, by at most one quantisation step.
         assert!((reading(cut).omega_imu - first.omega_imu).abs() < 1.1e-6, "{cut}");
     }
 }
 
-/// Random steps in the default test, fewer without `--release`. `.ci/run --nightly` makes 20,000, and
-/// `HUBSLOSH_RANDOM_STEPS=1000000` a million in some 25 minutes; `HUBSLOSH_RANDOM_SEED` starts elsewhere, to share them among
-/// processes.
+/// Number of random steps in the test, which is smaller without `--release`. `.ci/run --nightly` sets HUBSLOSH_RANDOM_STEPS
+/// to 20,000; a million steps take some 25 minutes. `HUBSLOSH_RANDOM_SEED` sets the first seed, so that several processes
+/// can share the steps.
 const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 1_000 };
 
 #[test]
@@ -378,11 +376,11 @@ fn random_steps_give_finite_results_or_a_clear_error() {
     while done < count {
         let slosh = SLOSH[rng.usize(0..SLOSH.len())];
         let friction = FRICTION[rng.usize(0..FRICTION.len())];
-        // Half of the plants are the bench, which 100 N m throws about at 310 rad/s2; a
-        // smaller plant gets no more than that.
+        // Half of the plants are the bench, which a torque of 100 N m accelerates by 310 rad/s2. A smaller plant gets a
+        // torque that does not accelerate it more.
         let mut p =
             if rng.bool() { bench(slosh, friction) } else { anywhere(&mut rng, slosh, friction) };
-        // Any number of modes, few more often: ten spherical ones take their time.
+        // The number of modes is random, and usually small, because ten spherical modes are slow.
         p.slosh.modes = 1 + (rng.f64().powi(4) * plant::MODES as f64) as usize;
         p.wheel.enabled = rng.u8(..) < 32;
         p.imu.enabled = rng.u8(..) < 32;
@@ -426,7 +424,7 @@ fn random_steps_give_finite_results_or_a_clear_error() {
                 Err(error) => {
                     refused += 1;
                     assert!(error.to_string().len() > 20);
-                    assert_eq!(*plant.state(), before, "a refused step leaves the state");
+                    assert_eq!(*plant.state(), before, "a refused step must not change the state");
                     break;
                 }
             }

@@ -1,5 +1,5 @@
-//! A specific force along the tank's axis that changes while the plant runs: damping follows
-//! it, and the work it does is in the energy balance.
+//! Tests of a specific force along the tank's axis that changes while the plant runs: the damping follows it, and the work
+//! that it does is in the energy balance.
 
 use plant::{
     FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, STATES, SloshModel, Solver, x,
@@ -21,7 +21,7 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// The specific force over 4 s: ramps, a jump up, one ramp to 0 and one from 0.
+/// The specific force over 4 s: ramps, a jump upwards, a ramp to 0 and a ramp from 0.
 const PIECES: [(Ramp, f64); 7] = [
     (Ramp { value: 9.81, slope: -3.0 }, 1.0),
     (Ramp { value: 6.81, slope: 0.0 }, 0.5),
@@ -73,7 +73,7 @@ fn energy_balances_with_the_work_of_a_changing_g() {
                         + (now.work_axial - last.work_axial).abs();
                     axial += (now.work_axial - last.work_axial).abs();
                     let balance = now.energy - first.energy - now.work - now.work_axial + now.heat;
-                    // The integrator's tolerance; a missing term shows as a share of the whole.
+                    // The tolerance is that of the integrator; a missing term would be a visible fraction of the throughput.
                     assert!(
                         balance.abs() < 1e-8 * throughput,
                         "{slosh:?} {friction:?} {balance:e}"
@@ -86,8 +86,8 @@ fn energy_balances_with_the_work_of_a_changing_g() {
     }
 }
 
-/// A jump of g does the work of mass times height of hub and liquid. The energy uses gravity's components across the
-/// axis, and both give the same result, also for the derivatives.
+/// A jump of g does the work of the change of g times mass times height of hub and liquid. The energy is computed from the
+/// components of gravity across the axis. Both give the same result, and so do their derivatives.
 #[test]
 fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
     for slosh in SloshModel::ALL {
@@ -103,7 +103,7 @@ fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
         });
         for (value, other) in before.iter().zip(&after) {
             let residual = other.energy - value.energy - (other.work_axial - value.work_axial);
-            // Rounding of energies and powers of 0.1 to 1 J, W.
+            // The tolerance is for rounding of energies of 0.1 to 1 J and powers of 0.1 to 1 W.
             assert!(residual.abs() < 1e-14, "{slosh:?} {residual:e}");
         }
     }
@@ -118,10 +118,10 @@ fn motion_under_ramps_does_not_depend_on_the_communication_step() {
             p.slosh.zeta = 0.05;
             let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
             let [a, b] = [coarse.last().unwrap(), fine.last().unwrap()];
-            // Rates of 2 rad/s at the tolerance.
+            // The tolerance is for rates of 2 rad/s at the tolerance of the solver.
             assert!((a.omega - b.omega).abs() < 1e-9, "{slosh:?} {}", a.omega - b.omega);
             assert!((a.slosh_rate - b.slosh_rate).abs() < 2e-9, "{slosh:?}");
-            // Energies of 0.1 J at the tolerance.
+            // The tolerance is for energies of 0.1 J at the tolerance of the solver.
             assert!((a.work_axial - b.work_axial).abs() < 1e-10, "{slosh:?}");
         }
     }
@@ -133,7 +133,7 @@ fn motion_under_ramps_does_not_depend_on_the_communication_step() {
 fn damping_follows_its_formula_while_g_ramps_through_zero() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.2);
-    p.hub.inertia = 1e9; // does not move
+    p.hub.inertia = 1e9; // so large that the hub does not move
     p.init.omega = 0.0;
     let down = Inputs { g_axial: Ramp { value: 4.0, slope: -4.0 }, ..Inputs::default() };
     let up = Inputs { g_axial: Ramp { value: 0.0, slope: 4.0 }, ..Inputs::default() };
@@ -142,7 +142,7 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
     plant.step(&down, 1.0).unwrap();
     plant.step(&up, 1.0).unwrap();
     let x = plant.continuous_states();
-    // c/m = 2 zeta sqrt(g/l) at any g
+    // c/m is 2 zeta sqrt(g/l) at any g.
     let pull = |t: f64, al: f64, rate: f64| {
         let g = 4.0 * (t - 1.0).abs();
         -2.0 * 0.2 * (g / length).sqrt() * rate - g / length * al
@@ -161,7 +161,7 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
         al += h / 6.0 * (k1.0 + 2.0 * (k2.0 + k3.0) + k4.0);
         rate += h / 6.0 * (k1.1 + 2.0 * (k2.1 + k3.1) + k4.1);
     }
-    // The root's kink at g = 0 leaves Runge-Kutta h^(3/2) = 9e-8 of the drag there.
+    // At g = 0 the root has a kink, where the Runge-Kutta method has an error of h^(3/2) = 9e-8 of the drag.
     assert!((x[x::SLOSH + 1] - al).abs() < 2e-8, "{} {al}", x[x::SLOSH + 1]);
     assert!((x[x::SLOSH + 3] - rate).abs() < 2e-7, "{} {rate}", x[x::SLOSH + 3]);
 }
@@ -170,13 +170,14 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
 fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::None);
-        // 20 halvings to a millionth, 34 growths by half from there, and the motion's own.
+        // The limit allows 20 halvings of g to a millionth, 34 growths by half from there, and the steps that the motion
+        // needs.
         p.solver = Solver { max_steps: 100 };
         let inputs = |value, slope| Inputs { g_axial: Ramp { value, slope }, ..Inputs::default() };
         let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, -98.1), 0.1).unwrap();
         plant.step(&inputs(0.0, 98.1), 0.1).unwrap();
-        // And where the clock's rounding makes the end of the ramp.
+        // The steps are also limited if the end of the ramp is inexact because of the rounding of the clock.
         let (slope, h) = (-9.81 / 0.3, 0.3);
         let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.1, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, slope), h).unwrap();
@@ -184,7 +185,7 @@ fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     }
 }
 
-/// Measures the damping ratio from the logarithmic decrement of the free tangential motion with the hub held.
+/// Returns the damping ratio from the logarithmic decrement of the free tangential motion, while the hub is held.
 fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
     let length = plant.calculated().length[0];
@@ -192,7 +193,7 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
         let ramp = Ramp { value: g_start, slope: g - g_start };
         plant.step(&Inputs { g_axial: ramp, ..Inputs::default() }, 1.0).unwrap();
     }
-    // Peaks of the energy per g, every half period, over ten periods.
+    // The energy divided by g has peaks in every half period; ten periods are evaluated.
     let period = core::f64::consts::TAU / (g / length).sqrt();
     let amplitude2 = |plant: &Plant| {
         let x = plant.continuous_states();
@@ -206,8 +207,8 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * core::f64::consts::TAU * 10.0)
 }
 
-/// The measured damping ratio after g falls from 9.81 to 1, 0.1 or 0.01 m/s² equals the damping ratio of a run that starts
-/// at this g.
+/// After g has fallen from 9.81 to 1, 0.1 or 0.01 m/s², the measured damping ratio equals that of a run that
+/// starts at this g.
 #[test]
 fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
     for correlation in [true, false] {
@@ -220,7 +221,7 @@ fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
             assert!((changed / started - 1.0).abs() < 0.01, "{g}: {changed} {started}");
             let plant = Plant::new(&p, &inputs_with_gravity(g), 0.0, TOLERANCE).unwrap();
             let zeta = plant.calculated().damping[0];
-            // Energy and its peaks differ by zeta^2.
+            // The definitions of the ratio by energy and by its peaks differ by zeta^2.
             assert!((started / zeta - 1.0).abs() < 0.01, "{g}: {started} {zeta}");
             let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
             let [shown, _] = plant.damping_ratio(0, &inputs_with_gravity(g));
@@ -230,8 +231,8 @@ fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
     }
 }
 
-/// A plant that starts without axial acceleration dissipates nothing. When 1 m/s² acts later, it has the damping
-/// ratio of a plant that starts at 1 m/s².
+/// A plant that starts without axial acceleration dissipates nothing. If 1 m/s² acts later, its damping ratio is that of a
+/// plant that starts at 1 m/s².
 #[test]
 fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
     for correlation in [true, false] {
@@ -254,7 +255,7 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.init.slosh_rate = 1.0;
         let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
-        // Somewhere else than where the work was booked last.
+        // g differs from its value at the last accepted step, up to which the work is known.
         let (g, step) = (0.02, 1e-6);
         let (none, du) = ([0.0; STATES], [0.0, 0.0, 1.0]);
         let slopes = plant.directional_derivative(&inputs_with_gravity(g), &none, &du);
@@ -263,7 +264,7 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
             [g + step, g - step].map(|g| plant.derivatives(&inputs_with_gravity(g)));
         for i in 0..STATES {
             let difference = (above[i] - below[i]) / (2.0 * step);
-            // The square of 5e-5 of g, times the power's third derivative.
+            // The error is the square of 5e-5 of g, times the third derivative of the power.
             assert!((slopes[i] - difference).abs() < 1e-7 * (1.0 + difference.abs()), "{i}");
         }
         let ratio = |g: f64| plant.damping_ratio(0, &inputs_with_gravity(g))[0];
@@ -288,7 +289,7 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
             let got = get(&outputs);
             assert!((got - difference).abs() < 1e-6 * (1e-3 + difference.abs()), "{slosh:?} {n}");
         }
-        // Without specific force there is no derivative; a finite one is given.
+        // Without specific force the derivative does not exist; a finite number is returned.
         let at_zero = plant.directional_derivative(&inputs_with_gravity(0.0), &none, &du);
         assert!(at_zero.iter().all(|x| x.is_finite()));
         let at_zero = plant.output_derivatives(&inputs_with_gravity(0.0), &none, &du);
@@ -296,8 +297,8 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
     }
 }
 
-/// Simulates as a Model Exchange host does, with fixed steps of Runge-Kutta 4, and returns the residual of
-/// the energy balance over the work of g.
+/// Simulates a Model Exchange host with fixed steps of Runge-Kutta 4. Returns the residual of the energy balance, divided by
+/// the work of g.
 fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g(0.0)), 0.0, TOLERANCE).unwrap();
     let energy = plant.outputs_held(&inputs_with_gravity(g(0.0))).energy;
@@ -320,7 +321,7 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
         plant.accept_step(&inputs_with_gravity(g(t + h))).unwrap();
     }
     let o = plant.outputs_held(&inputs_with_gravity(g(2.0)));
-    // A jump at an instant: exact.
+    // The work of a jump at an instant is exact.
     let jumped = inputs_with_gravity(g(2.0) + 3.0);
     let after = plant.outputs_held(&jumped);
     let jump = after.energy - o.energy - (after.work_axial - o.work_axial);
@@ -330,15 +331,16 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     ((o.energy - energy - o.work - o.work_axial + o.heat) / o.work_axial).abs()
 }
 
-/// In a Model Exchange host the residual of the energy balance falls with the host's step size to the order of its
-/// integrator, because trial evaluations do not change `work_axial`.
+/// In a Model Exchange host the residual of the energy balance falls with the host's step size, with the order of its
+/// integrator, because trial evaluations of the integrator do not change `work_axial`.
 #[test]
 fn work_of_a_changing_g_is_added_at_accepted_steps_only() {
     for (slosh, tilt) in SLOSHING.into_iter().flat_map(|slosh| [(slosh, 0.0), (slosh, 0.1)]) {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (tilt, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (4.0 * tilt, 2.0);
-        // A line: fourth order, as the host's integrator. A sine: second order.
+        // If g is linear in time, the residual is of fourth order, as the host's integrator; for a sine it is of second
+        // order.
         for (order, g) in [
             (4, (|t: f64| 9.0 - 3.0 * t) as fn(f64) -> f64),
             (2, |t: f64| 9.0 + 2.0 * libm::sin(5.0 * t)),

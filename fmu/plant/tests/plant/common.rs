@@ -25,15 +25,15 @@ pub fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-/// Returns a plant anywhere in the allowed range: sizes from a toy to a launcher's stage, any fill, one to
-/// ten modes, any damping and friction, a start in motion.
+/// Returns a random plant from the whole allowed range: sizes from a small model to a launcher's stage, any fill, one to ten
+/// modes, any damping and friction, and a motion at the start.
 pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(slosh, friction);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     p.tank.d = 10f64.powf(between(-1.5, 0.5));
     p.tank.h = p.tank.d * 10f64.powf(between(-1.5, 0.5));
     if slosh == SloshModel::Liquid {
-        // Neither shallow nor next to a secondary resonance, where it warns.
+        // The fill is neither shallow nor next to a secondary resonance, where the plant issues a warning.
         p.tank.h = p.tank.d
             * if between(0.0, 1.0) < 0.5 { between(0.22, 0.37) } else { between(0.6, 3.0) };
     }
@@ -48,7 +48,7 @@ pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionMo
     p.friction.d = torque * between(0.0, 0.1);
     p.friction.omega_s = between(0.01, 0.5);
     p.friction.eps = 10f64.powf(between(-4.0, -1.0));
-    // Bristles that deflect by 10 mrad, without damping of their own: passive with any friction.
+    // The bristles deflect by 10 mrad and have no damping of their own, so that they are passive with any friction.
     p.friction.sigma0 = 100.0 * (p.friction.c + p.friction.d);
     p.friction.sigma1 = 0.0;
     p.friction.asymmetry = between(-0.3, 0.3);

@@ -1,4 +1,4 @@
-//! Damping as it is measured: the decay of free oscillations, the hub held by its inertia.
+//! Damping as it is measured: the decay of free oscillations, while the inertia of the hub keeps it from moving.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// Returns a hub without friction that does not move, because the liquid has 2 kg and the hub 1e9 kg m2.
+/// Returns a hub without friction that does not move, because the liquid has 2 kg and the hub has 1e9 kg m2.
 fn held(model: SloshModel) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -18,8 +18,8 @@ fn held(model: SloshModel) -> Parameters {
     p
 }
 
-/// Returns the damping ratio of a small free oscillation at `g` after a start at `g_start`. It is the logarithmic decrement
-/// over ten periods of omega = sqrt((g + a)/l), between zeros of the angle.
+/// Returns the damping ratio of a small free oscillation at `g` in a plant that has started at `g_start`. It is computed
+/// from the logarithmic decrement over ten periods of omega = sqrt((g + a)/l), between zeros of the angle.
 fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
     let amplitude2 = |plant: &Plant| {
@@ -31,12 +31,12 @@ fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     for _ in 0..10 {
         plant.step(&inputs_with_gravity(g), TAU / omega).unwrap();
     }
-    // Of a' = -zeta omega a for small zeta; its square enters relatively, 1e-4 at zeta = 0.01.
+    // This follows from a' = -zeta omega a for small zeta; the relative error is zeta^2, 1e-4 at zeta = 0.01.
     -(amplitude2(&plant) / before).ln() / (2.0 * TAU * 10.0)
 }
 
-/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency, and with it the damping of a laminar layer,
-/// reach a finite limit. Without it they continue as g^(1/2) and g^(-1/4).
+/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency, and with it the damping
+/// of a laminar layer, reach a finite limit. Without capillarity they follow g^(1/2) and g^(-1/4).
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for capillarity in [true, false] {
@@ -48,7 +48,7 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
             let calculated =
                 *Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap().calculated();
             let (zeta, l) = (calculated.damping[0], calculated.length[0]);
-            // sigma xi^2/(rho R^2)
+            // Increase of g that is equivalent to capillarity: sigma xi^2/(rho R^2).
             let a = if capillarity {
                 0.07213 * (1.8411837813 / 0.0815_f64).powi(2) / 1000.0
             } else {
@@ -61,7 +61,7 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
                     _ => (omega(9.81) / omega(g)).sqrt(),
                 };
                 let measured = zeta_of_decay(&p, 9.81, g, omega(g));
-                // (1 %); where zeta is large, 0.16 at 1e-6 m/s2, its square is.
+                // The tolerance is 1 %, or zeta squared where zeta is large (0.16 at 1e-6 m/s2).
                 let off = measured / (zeta * ratio) - 1.0;
                 assert!(
                     off.abs() < 3e-4 + (zeta * ratio).powi(2),
@@ -72,9 +72,9 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
     }
 }
 
-/// A given damping ratio holds at the specific force at which the motion starts. If the motion starts without gravity, the
-/// ratio also holds with capillarity, which restores the liquid; without capillarity nothing restores the liquid there, and
-/// the ratio holds at 1 m/s2.
+/// A damping ratio that is given as a parameter applies at the specific force at which the motion starts. In a start
+/// without gravity it applies, too, if capillarity restores the liquid; otherwise nothing restores the liquid, and the
+/// ratio applies at 1 m/s2.
 #[test]
 fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
     let mut p = held(SloshModel::Linear);
@@ -113,9 +113,9 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     found
 }
 
-/// The damping ratio found from each decrement is zeta + zeta_A A up to an amplitude of 0.3 rad. The nonlinear models also
-/// change the decrement by themselves, of the order of A^2/16 for a pendulum, which the tolerance includes: 0.8 % measured,
-/// but 5e-5 for the linear model.
+/// The damping ratio that follows from each decrement is zeta + zeta_A A, up to an amplitude of 0.3 rad. In the nonlinear
+/// models the decrement also depends on the amplitude by itself, by about A^2/16 for a pendulum. The measured difference is
+/// 0.8 %, which the tolerance includes, but 5e-5 for the linear model.
 #[test]
 fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -138,7 +138,7 @@ fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     }
 }
 
-/// Steepness per angle of mode 1 in an upright cylinder, k a/A = (xi_1/R) 2 R/(xi_1^2 - 1).
+/// Steepness of mode 1 in an upright cylinder divided by the slosh angle, k a/A = (xi_1/R) 2 R/(xi_1^2 - 1).
 const STEEPNESS: f64 = 2.0 * 1.8411837813 / (1.8411837813 * 1.8411837813 - 1.0);
 
 /// Above the onset of breaking the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A, with the solution 1/A =
@@ -165,9 +165,9 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     }
 }
 
-/// The damping ratio found from each decrement is zeta + zeta_b max(0, k a - s_b). The tested steepness is 0.1 away from
-/// the onset s_b, where the rounded corner changes zeta by 1 %. In a nonlinear model the amplitude varies within a period
-/// by the share A^2/16, as for a pendulum.
+/// The damping ratio that follows from each decrement is zeta + zeta_b max(0, k a - s_b). The tested steepness is 0.1 away
+/// from the onset s_b, where the rounded corner changes zeta by 1 %. In a nonlinear model the amplitude varies within a
+/// period by the relative amount A^2/16, as for a pendulum.
 #[test]
 fn breaking_adds_damping_above_the_steepness_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -193,8 +193,8 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
     }
 }
 
-/// Without any other damping, the dissipated power is the power of breaking waves only, from far above the onset to rest;
-/// it is never negative.
+/// Without other damping, the dissipated power is the power of breaking waves, from far above the onset to rest.
+/// It is never negative.
 #[test]
 fn breaking_waves_only_dissipate_energy() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -218,8 +218,8 @@ fn breaking_waves_only_dissipate_energy() {
     }
 }
 
-/// The constant A_0 = 1e-4 rad in the formula leaves a minimum of the amplitude-dependent damping, 1e-4 zeta_A, which is
-/// tested without other damping.
+/// Because of the constant A_0 = 1e-4 rad, the amplitude-dependent damping ratio of a vanishing wave is 1e-4 zeta_A instead
+/// of 0. This is tested without other damping.
 #[test]
 fn a_vanishing_amplitude_leaves_the_viscous_damping() {
     let mut p = held(SloshModel::Linear);
@@ -230,8 +230,8 @@ fn a_vanishing_amplitude_leaves_the_viscous_damping() {
     assert!((measured - zeta - 1e-4).abs() < 2e-8, "{measured} {zeta}");
 }
 
-/// The amplitude A is the angle in the tangential plane, for `zeta_amplitude` and for a ring baffle. Its sine would be 6 %
-/// less at the tested angle.
+/// For `zeta_amplitude` and for a ring baffle, the amplitude A is the slosh angle in the tangential plane. The sine of the
+/// angle would be 6 % smaller at the tested angle.
 #[test]
 fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
     for (zeta_a, width) in [(0.05, 0.0), (0.0, 0.01)] {
@@ -243,7 +243,7 @@ fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
             plant.step(&inputs_with_gravity(9.81), 2.0).unwrap();
             plant.outputs(&inputs_with_gravity(9.81)).heat
         });
-        // The series of the angle is 2e-8 off at 0.6 rad.
+        // The series of the angle has an error of 2e-8 at 0.6 rad.
         let off = dissipated[0] / dissipated[1] - 1.0;
         assert!(off.abs() < 1e-7, "{zeta_a} {width}: {dissipated:?} {off:e}");
     }

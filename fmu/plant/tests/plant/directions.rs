@@ -1,4 +1,4 @@
-//! Modes along other directions than the tangent: a box with modes along both axes.
+//! Tests of modes along other directions than the tangent, as in a box with modes along both axes.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -6,11 +6,10 @@ use super::common::bench;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
 const G: f64 = 9.81;
-/// Tolerance of the balances, relative to the energy throughput: the rounding errors of some
-/// thousand steps.
+/// Tolerance of the balances, relative to the energy throughput. It allows for the rounding errors of some thousand steps.
 const TOLERANCE: f64 = 1e-13;
 
-/// Returns 5 kg of liquid with a mode along the tangent, one askew and one along the radius.
+/// Returns 5 kg of liquid with one mode along the tangent, one in an oblique direction and one along the radius.
 fn askew(model: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(model, friction);
     (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 3);
@@ -30,7 +29,7 @@ fn plant(p: &Parameters) -> Plant {
 
 const MODELS: [SloshModel; 2] = [SloshModel::Linear, SloshModel::Planar];
 
-/// Checks |E(t) - E(0) - work + heat| over the energy throughput, on a tilted bench with damping and every friction law.
+/// On a tilted bench with damping and every friction law, E(t) - E(0) - work + heat is 0 relative to the energy throughput.
 #[test]
 fn energy_balances_along_any_direction() {
     for model in MODELS {
@@ -71,10 +70,10 @@ fn damping_of_modes_in_any_direction_does_not_change_momentum() {
     }
 }
 
-/// Newton's equations of hub and slosh masses with the guides' forces as unknowns, by Runge-Kutta: x = theta, w, then al
-/// and al' of each mode. A slosh mass at P = (r + l s n_x, l s n_t, -l c) in the hub's frame has a = P'' + 2 w x P' + w' x
-/// P + w x (w x P). Gravity, drag along its path and the guide's force N across the path act on it; -N and minus the drag
-/// act on the hub.
+/// Newton's equations of hub and slosh masses, in which the forces of the guides are unknowns, integrated by Runge-Kutta.
+/// The states are theta and w, then al and al' of each mode. A slosh mass at P = (r + l s n_x, l s n_t, -l c) in the hub's
+/// frame has the acceleration P'' + 2 w x P' + w' x P + w x (w x P). Gravity, drag along its path and the guide's force N
+/// across the path act on it; -N and minus the drag act on the hub.
 struct Newton<'a> {
     p: &'a Parameters,
     drag: Vec<f64>,
@@ -131,7 +130,8 @@ impl Newton<'_> {
                 (row[j], row[count]) = (with - without, -without);
             }
         }
-        // The hub's row is full, each bob's has two places: by elimination of the bobs.
+        // The row of the hub is full, and the row of each slosh mass has two elements, so that the slosh masses are
+        // eliminated first.
         let (hub, bobs) = rows.split_first_mut().unwrap();
         for (n, bob) in bobs.iter().enumerate() {
             let factor = hub[1 + n] / bob[1 + n];
@@ -157,8 +157,8 @@ impl Newton<'_> {
     }
 }
 
-/// The independent motion is integrated by Runge-Kutta in steps of 0.1 ms; at 14 rad/s its error is (14e-4)^4/120 per
-/// radian, 1e-12 after three seconds. Angles reach 40 degrees.
+/// The independent motion is integrated by Runge-Kutta in steps of 0.1 ms. At 14 rad/s its error is (14e-4)^4/120 per
+/// radian, 1e-12 after three seconds. The slosh angles reach 40 degrees.
 #[test]
 fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
     for tilt in [0.0, 0.1] {
@@ -193,8 +193,8 @@ fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
     }
 }
 
-/// Returns the inertia J of hub and liquid about the axis, with one mode along the radius at the angle be,
-/// and its first two derivatives.
+/// Returns the inertia J of hub and liquid about the axis if one mode along the radius is at the angle be, and its first two
+/// derivatives with respect to be.
 fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     let (m, l, r) = (p.slosh.table.mass[0], p.slosh.table.length[0], p.tank.r);
     let m_0 = p.slosh.table.m_liq - m;
@@ -204,10 +204,10 @@ fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     [value, 2.0 * m * x * l * c, 2.0 * m * l * (l * c * c - x * s)]
 }
 
-/// The pendulum of a radial mode on a hub that rotates at w has the angle be at equilibrium: g tan(be) = w^2 (r + l sin
-/// be). Small oscillations about this angle, at constant angular momentum H = J(be) w, have the effective potential V =
-/// H^2/(2 J) + m g l (1 - cos be), where J is the total inertia about the hub's axis, so that Omega^2 = V''/(m l^2). For a
-/// hub so heavy that w is constant, Omega^2 is g/(l cos be) - w^2 cos^2 be.
+/// On a hub that rotates at w, the pendulum of a radial mode is in equilibrium at the angle be with g tan(be) = w^2 (r + l
+/// sin be). Small oscillations about this angle, at constant angular momentum H = J(be) w, have the effective potential V =
+/// H^2/(2 J) + m g l (1 - cos be), where J is the total inertia about the hub's axis, so that Omega^2 = V''/(m l^2). If the
+/// hub is so heavy that w is constant, Omega^2 = g/(l cos be) - w^2 cos^2 be.
 #[test]
 fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     for (hub, shift) in [(0.1, 1.0), (1e6, -1.0)] {
@@ -228,7 +228,7 @@ fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
         let o = still.outputs(&inputs);
         assert!((o.slosh_angle_radial - be).abs() < 1e-11, "{} {be}", o.slosh_angle_radial);
         assert!(be > 0.19 && o.slosh_angle.abs() < 1e-15);
-        // The liquid pulls outwards with all of its mass, each part from where it is.
+        // The whole liquid exerts a centrifugal force; each part contributes according to its distance from the axis.
         let thrown = w * w * (0.5 * r + 1.5 * (r + l * be.sin()));
         assert!((o.f_radial - thrown).abs() < 1e-9, "{} {thrown}", o.f_radial);
 
@@ -237,13 +237,14 @@ fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
         let stiffness =
             1.5 * G * l * be.cos() + momentum * momentum * (j_d * j_d / j - j_dd / 2.0) / (j * j);
         let omega = (stiffness / 1.5).sqrt() / l;
-        // A heavy hub's rate stays: centrifugal force softens; a light hub's falls as the bob moves out, which stiffens.
+        // The rate of a heavy hub is constant, so that the centrifugal force lowers the frequency. The rate of a light hub
+        // falls when the slosh mass moves outwards, which raises the frequency.
         let (no_coupling, soft) = (G / (l * be.cos()), be.cos() * be.cos() * w * w);
         assert!((omega * omega - no_coupling) * shift > 0.0, "{omega}");
         if hub > 1.0 {
             assert!((omega * omega - no_coupling + soft).abs() < 1e-4 * soft);
         }
-        // 1e-4 rad: the frequency is off by its square.
+        // The amplitude is 1e-4 rad; the relative error of the frequency is its square.
         p.init.slosh_rate_radial = 1e-4 * omega;
         let mut swings = plant(&p);
         let (mut crossings, mut before) = (Vec::new(), (0.0, 1.0));
@@ -264,7 +265,7 @@ fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
 }
 
 /// A liquid with the same modes in all directions has no preferred axes: in linear theory two equal modes at right angles
-/// move the hub like one mode along the tangent.
+/// have the same effect on the hub as one mode along the tangent.
 #[test]
 fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
     let run = |directions: &[f64]| -> Vec<Outputs> {
@@ -285,7 +286,7 @@ fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
             })
             .collect()
     };
-    // Along the radius a mode is moved by the lean alone, which turns the hub, too.
+    // Only the tilt of the bench moves a mode along the radius, which also exerts a torque on the hub.
     for (one, two) in run(&[0.0, FRAC_PI_2]).iter().zip(run(&[0.4 - FRAC_PI_2, 0.4])) {
         assert!((one.omega - two.omega).abs() < 1e-11, "{} {}", one.omega, two.omega);
         assert!((one.energy - two.energy).abs() < 1e-11);
@@ -293,8 +294,8 @@ fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
     }
 }
 
-/// `slosh.table.direction` is allowed only for the slosh models `linear` and `planar`; the modal masses in one direction
-/// must not exceed the mass of liquid.
+/// `slosh.table.direction` is allowed only for the slosh models `linear` and `planar`, and the sum of the modal masses along
+/// one direction must not exceed the mass of liquid.
 #[test]
 fn directions_of_modes_are_refused_for_models_without_them() {
     let refused = |change: fn(&mut Parameters)| {
@@ -305,10 +306,11 @@ fn directions_of_modes_are_refused_for_models_without_them() {
     assert_eq!(refused(|_| {}), None);
     let spherical = refused(|p| p.slosh.model = SloshModel::Spherical).unwrap();
     assert!(spherical.starts_with("slosh.table.direction[2]"), "{spherical}");
-    // Along the radius 2.5 kg and the askew mode's share fit into 5 kg, 4.9 kg and that share do not.
+    // Along the radius the liquid of 5 kg may have a mode of 2.5 kg and a part of the oblique mode, but not 4.9
+    // kg and this part.
     let heavy = refused(|p| p.slosh.table.mass[2] = 4.9).unwrap();
     assert!(heavy.contains("along one direction"), "{heavy}");
-    // Both directions together may have more than the liquid.
+    // Along both directions together, the modal masses may exceed the mass of liquid.
     assert_eq!(refused(|p| p.slosh.table.mass[..3].copy_from_slice(&[4.0, 0.1, 4.0])), None);
     let light = refused(|p| {
         p.hub.inertia = 1e-9;
@@ -317,8 +319,8 @@ fn directions_of_modes_are_refused_for_models_without_them() {
     assert!(light.unwrap().contains("most unfavourable directions"));
 }
 
-/// Mode 1 moves only along its direction. A start in this direction gives exactly the outputs that were set; any other
-/// start is refused, and the message gives a start that is accepted.
+/// Mode 1 moves only along its direction. If it starts along this direction, the outputs equal the initial values exactly.
+/// Any other start is refused, with a message that contains a valid start.
 #[test]
 fn a_start_is_along_the_direction_of_mode_1_or_refused() {
     for model in MODELS {
@@ -341,7 +343,8 @@ fn a_start_is_along_the_direction_of_mode_1_or_refused() {
             for (got, set) in got.iter().zip(set) {
                 assert!((got - set).abs() < 1e-15, "{model:?} {direction}: {got} {set}");
             }
-            // off it by a thousandth, and what earlier versions took for a part along the direction
+            // The start is a thousandth away from the direction, or is one that earlier versions accepted by taking only its
+            // part along the direction.
             for (tangential, radial) in
                 [(0.3 * cos + 3e-4 * sin, 0.3 * sin - 3e-4 * cos), (0.3 * (cos + sin), 0.0)]
             {
@@ -364,7 +367,8 @@ fn a_start_is_along_the_direction_of_mode_1_or_refused() {
     }
 }
 
-/// The slosh models `linear` and `planar` move only tangentially, unless a mode has a direction with a radial component.
+/// In the slosh models `linear` and `planar` a mode whose direction has no radial component moves only tangentially. A radial
+/// initial angle then has no effect, and a warning says so.
 #[test]
 fn a_radial_initial_angle_without_effect_brings_a_warning() {
     for (model, direction, warned) in [

@@ -1,14 +1,13 @@
-//! The thesis's errors that would change the model, each pinned by a test that fails
-//! with the printed form. The entries are explained in
-//! `book/errata.md`.
+//! Errors of Rubaga's thesis that would change the model. For each there is a test that fails with the printed equation.
+//! `book/errata.md` explains the errors.
 
 use std::f64::consts::{PI, TAU};
 
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel, x};
 
-/// Returns the matrices of the plant's linear model by directional derivatives: rows theta'', al'' against
-/// theta, theta', al, al' and the torque.
+/// Returns the matrices of the plant's linear model, computed by directional derivatives: the derivatives of theta'' and
+/// al'' with respect to theta, theta', al and al', and with respect to the torque.
 fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
     let mut p =
         bench(SloshModel::Linear, if b { FrictionModel::Viscous } else { FrictionModel::None });
@@ -31,7 +30,7 @@ fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
 }
 
 fn gain(system: &([[f64; 4]; 4], [f64; 4]), f: f64) -> f64 {
-    // Without theta, which nothing depends on: three complex equations by Cramer's rule.
+    // Nothing depends on theta, so that three complex equations remain, which Cramer's rule solves.
     let (a, b) = system;
     type C = (f64, f64);
     let mul = |x: C, y: C| (x.0 * y.0 - x.1 * y.1, x.0 * y.1 + x.1 * y.0);
@@ -66,13 +65,13 @@ fn extremum(system: &([[f64; 4]; 4], [f64; 4]), low: f64, high: f64, sign: f64) 
 
 #[test]
 fn errata_a1_a2_the_resonance_lies_above_the_antiresonance() {
-    // Exact transfer function of the corrected equations (17-digit roots of its slope).
-    // With the printed sign of 4.29 the resonance lies below the antiresonance (2.2255, 2.0326 Hz).
+    // The reference is the exact transfer function of the corrected equations, with 17-digit roots of its slope. With the
+    // printed sign of equation 4.29 the resonance would lie below the antiresonance (2.2255, 2.0326 Hz).
     for (h, antiresonance, resonance) in
         [(0.10, 2.3431981124, 2.4566022092), (0.05, 2.1329468189, 2.2306922246)]
     {
         let system = linear_system(h, true);
-        // A golden section on a smooth extremum finds it to the root of rounding.
+        // A golden-section search finds a smooth extremum only to the square root of the rounding error.
         assert!(
             (extremum(&system, antiresonance - 0.05, antiresonance + 0.05, -1.0) - antiresonance)
                 .abs()
@@ -94,8 +93,8 @@ fn errata_a1_energy_and_momentum_of_released_liquid_do_not_grow() {
     p.init.slosh_angle = 0.1;
     let inputs = Inputs::default();
     let mut plant = Plant::new(&p, &inputs, 0.0, 1e-10).unwrap();
-    // m g l al^2/2; the printed sign lets it rise by 22 % and makes 0.024 N m s of
-    // angular momentum from nothing.
+    // The energy at the start is m g l al^2/2. With the printed sign it would rise by 22 %, and an angular momentum of 0.024
+    // N m s would arise from nothing.
     assert!((plant.outputs(&inputs).energy - 1.678_281_5e-3).abs() < 1e-9);
     for _ in 0..1000 {
         plant.step(&inputs, 0.02).unwrap();
@@ -107,8 +106,8 @@ fn errata_a1_energy_and_momentum_of_released_liquid_do_not_grow() {
 
 #[test]
 fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
-    // Quasi-static acceleration: F = -m_liq r w'. The printed D = sum m_i - m_0 leaves
-    // the modal masses out (-1.33 instead of -2.09 kg at 10 cm).
+    // In quasi-static acceleration F = -m_liq r w'. The printed D = sum m_i - m_0 leaves the modal masses out, which gives
+    // -1.33 instead of -2.09 kg at 10 cm.
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 0.5;
@@ -118,7 +117,7 @@ fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
     inputs.tau_cmd = Ramp::held(0.1);
     let o = plant.outputs(&inputs);
     let mass = -o.f_tangential / (p.tank.r * o.omega_dot);
-    // The ramp's own lag: 2 zeta / (omega_n t) = 7e-4 of the modal mass.
+    // The delay because of the ramp is 2 zeta/(omega_n t) = 7e-4 of the modal mass.
     assert!((mass / plant.calculated().m_liq - 1.0).abs() < 1e-3, "{mass}");
 }
 
@@ -139,18 +138,18 @@ fn errata_a4_friction_opposes_the_motion() {
 
 #[test]
 fn errata_a6_a7_a8_the_transfer_function_has_two_zeros_three_poles_and_the_gain_one_over_b() {
-    // The printed 6.7 has a third zero at s = 0, so no steady rate under a torque.
+    // The printed equation 6.7 has a third zero at s = 0, so that a constant torque would cause no steady rate.
     let system = linear_system(0.10, true);
     assert!((gain(&system, 1e-9) * 0.03793 - 1.0).abs() < 1e-9);
-    // Three poles and two zeros: above all of them 1/(I0 s).
+    // With three poles and two zeros, the transfer function at high frequencies is 1/(I0 s).
     let i0 = 0.322414 + 1.330_431_108_5 * 0.225 * 0.225;
     assert!((gain(&system, 1e4) * i0 * TAU * 1e4 - 1.0).abs() < 1e-6);
 }
 
 #[test]
 fn errata_a9_the_frequency_of_circular_motion_rises_with_amplitude() {
-    // On a hub too heavy to move: w^2 = (g/l)/cos(angle) exactly, so the frequency grows
-    // by A^2/4, A = sin(angle). The operator printed in 2.20 would soften it.
+    // On a hub that is too heavy to move, w^2 = (g/l)/cos(angle) exactly, so that the frequency grows by A^2/4 with A =
+    // sin(angle). With the operator that is printed in equation 2.20 it would fall.
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 0.0;
@@ -160,12 +159,12 @@ fn errata_a9_the_frequency_of_circular_motion_rises_with_amplitude() {
     let angle: f64 = 0.4;
     let w = (9.81 / l / angle.cos()).sqrt();
     p.init.slosh_angle_radial = angle;
-    // y' = w l sin(angle) at y = 0, and the angle's rate is y'/l there.
+    // At y = 0 the rate is y' = w l sin(angle), and the rate of the angle is y'/l.
     p.init.slosh_rate = w * angle.sin();
     let mut plant = Plant::new(&p, &inputs, 0.0, 1e-12).unwrap();
     plant.step(&inputs, 10.0 * TAU / w).unwrap();
     let o = plant.outputs(&inputs);
-    assert!((o.slosh_angle_radial - angle).abs() < 1e-9, "back after ten turns");
+    assert!((o.slosh_angle_radial - angle).abs() < 1e-9, "not back after ten turns");
     assert!(o.slosh_angle.abs() < 1e-9);
 }
 
@@ -187,8 +186,8 @@ fn errata_a10_a11_a_displaced_bob_swings_at_the_root_of_g_over_l() {
 
 #[test]
 fn errata_b6_b7_b8_modes_have_the_exact_roots() {
-    // Thesis Table 4.1 recomputed with the exact zeros of J1', rho = 1000, g = 9.81, to
-    // the digits given. Its rounded roots make m_4 0.87 % high and f_10 0.13 % low.
+    // The expected values are those of Table 4.1 of the thesis, recomputed with the exact zeros of J1', rho = 1000 kg/m3 and
+    // g = 9.81 m/s2, to the digits given. The rounded roots of the thesis make m_4 0.87 % too high and f_10 0.13 % too low.
     for (h, m_liq, m1, l1, f1, m4, f10, zeta) in [
         (
             0.10,
@@ -228,7 +227,7 @@ fn errata_b6_b7_b8_modes_have_the_exact_roots() {
         for (got, want, digits) in all {
             assert!((got / want - 1.0).abs() < digits, "{got} {want}");
         }
-        // m_0 is what the modes that are kept leave.
+        // m_0 is the mass of the liquid minus the masses of the modes.
         assert!((c.m_0 + c.mass.iter().sum::<f64>() - c.m_liq).abs() < 1e-14 * c.m_liq);
     }
 }

@@ -1,4 +1,4 @@
-//! Event indicators and events of the plant in a host of Model Exchange, which integrates by itself.
+//! Tests of the event indicators and events of the plant in a Model Exchange host, which integrates the states itself.
 
 use super::common::bench;
 use plant::{
@@ -10,8 +10,8 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// At the limit of the static friction the hub is still held. Handling the event lets the hub turn, and afterwards no event
-/// is overdue.
+/// At the limit of the static friction the bearing still holds the hub. When the event has been handled, the hub turns, and
+/// no event is overdue.
 #[test]
 fn after_a_break_away_no_event_is_overdue() {
     let p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
@@ -26,14 +26,14 @@ fn after_a_break_away_no_event_is_overdue() {
         } else {
             [indicator::BREAK_AWAY_BACKWARD, indicator::BREAK_AWAY_FORWARD]
         };
-        // What is left of the hold to either side.
+        // These are the distances of the torque from the static friction in both directions.
         assert!((z[with] - 0.6 * limit).abs() < 1e-15 && (z[against] - 1.4 * limit).abs() < 1e-15);
         assert_eq!(z[indicator::REST], 1.0);
         plant.set_time(2.0, Some(2.0), 0.0);
-        assert!(!plant.take_event(&torque(sign * limit)).unwrap(), "no state has changed");
+        assert!(!plant.take_event(&torque(sign * limit)).unwrap(), "no state may change");
         assert_eq!(plant.last_contact(), (1, 2.0, sign as i32));
         assert!(!plant.is_event_overdue(&torque(sign * limit)));
-        // Turning: the rate in the direction of the contact.
+        // The hub turns: the indicator is its rate in the direction of the contact.
         let mut states = [0.0; STATES];
         states[x::OMEGA] = sign * 0.25;
         plant.set_continuous_states(&states);
@@ -41,14 +41,14 @@ fn after_a_break_away_no_event_is_overdue() {
         assert_eq!([z[indicator::REST], z[with], z[against]], [0.25, 1.0, 1.0]);
         states[x::OMEGA] = -sign * 1e-9;
         plant.set_continuous_states(&states);
-        assert!(plant.is_event_overdue(&torque(0.0)), "integrated past the stop");
-        assert!(plant.take_event(&torque(0.0)).unwrap(), "put at rest");
+        assert!(plant.is_event_overdue(&torque(0.0)), "the host has integrated past the stop");
+        assert!(plant.take_event(&torque(0.0)).unwrap(), "the hub must be set to rest");
         assert_eq!((plant.omega(), plant.last_contact().2), (0.0, 0));
     }
 }
 
 /// A hub with LuGre friction that is at rest, without torque and with undeflected bristles, keeps the direction of its last
-/// motion; a torque then determines the direction.
+/// motion as its contact. If a torque acts, the torque determines the direction.
 #[test]
 fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     let p = bench(SloshModel::Frozen, FrictionModel::Lugre);
@@ -61,9 +61,13 @@ fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
         plant.last_contact().2
     };
     assert_eq!(contact_under(&torque(0.0), -0.1), -1);
-    assert_eq!(contact_under(&torque(0.0), 0.0), -1, "nothing moves it");
+    assert_eq!(
+        contact_under(&torque(0.0), 0.0),
+        -1,
+        "without torque the direction must not change"
+    );
     assert_eq!(contact_under(&torque(1e-6), 0.0), 1);
-    assert_eq!(contact_under(&torque(0.0), 0.0), 1, "nothing moves it");
+    assert_eq!(contact_under(&torque(0.0), 0.0), 1, "without torque the direction must not change");
     assert_eq!(contact_under(&torque(-1e-6), 0.0), -1);
 }
 
@@ -80,7 +84,7 @@ fn indicators_of_the_wheel_are_distances_to_its_limits() {
     assert_eq!(z[indicator::TORQUE_SIGN], 0.1);
     assert_eq!(z[indicator::SPEED_MAX], p.wheel.speed_max - p.wheel.speed_0);
     assert_eq!(z[indicator::SPEED_MIN], p.wheel.speed_0 - p.wheel.speed_min);
-    // A host that has integrated past a limit is taken back to it.
+    // If a host has integrated past a speed limit, the event sets the rotor's speed to the limit.
     for (beyond, limit) in [
         (p.wheel.speed_max + 1e-6, p.wheel.speed_max),
         (p.wheel.speed_min - 1e-6, p.wheel.speed_min),
@@ -93,7 +97,7 @@ fn indicators_of_the_wheel_are_distances_to_its_limits() {
     }
 }
 
-/// Sample k is due at start + k/rate. An event up to a millionth of a sampling period early already takes the sample.
+/// Sample k is due at start + k/rate. An event that is early by at most a millionth of a sampling period takes the sample.
 #[test]
 fn the_gyros_samples_are_time_events() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -101,7 +105,7 @@ fn the_gyros_samples_are_time_events() {
     let next = |p: &plant::Parameters| Plant::new(p, &inputs, 3.0, 1e-9).unwrap().next_time_event();
     assert_eq!(next(&p), None);
     p.imu.enabled = true;
-    assert_eq!(next(&p), Some(3.0 + 1.0 / 50.0), "the first is taken at the start");
+    assert_eq!(next(&p), Some(3.0 + 1.0 / 50.0), "the first sample is taken at the start");
     let mut plant = Plant::new(&p, &inputs, 3.0, 1e-9).unwrap();
     plant.set_time(3.0 + 0.02 * (1.0 - 2e-6), Some(0.02 * (1.0 - 2e-6)), 0.0);
     plant.take_event(&inputs).unwrap();
@@ -112,11 +116,11 @@ fn the_gyros_samples_are_time_events() {
     plant.set_time(3.09, Some(0.09), 0.0);
     plant.take_event(&inputs).unwrap();
     let next = plant.next_time_event().unwrap();
-    assert!((next - 3.1).abs() < 1e-15, "all that are overdue");
+    assert!((next - 3.1).abs() < 1e-15, "all overdue samples must have been taken");
 }
 
-/// Computes the derivatives for each state alone, also where the outputs are strongly nonlinear. A direction 100 times as
-/// long gives derivatives 100 times as large, and they equal the change by a small step.
+/// The derivatives with respect to each state are also tested where the outputs are strongly nonlinear. If the direction is
+/// 100 times as long, the derivatives are 100 times as large, and they equal the change by a small step.
 #[test]
 fn output_derivatives_are_linear_in_each_direction() {
     for slosh in SloshModel::ALL {
@@ -138,7 +142,7 @@ fn output_derivatives_are_linear_in_each_direction() {
                 let size = 1.0 + a.abs();
                 assert!((100.0 * a - b).abs() < 1e-7 * size, "{slosh:?} {i} {n}: {a} {b}");
             }
-            // Energy along theta on a bench that leans: minus the moment of gravity.
+            // On a tilted bench the derivative of the energy by theta is minus the moment of gravity.
             if i == x::THETA && slosh == SloshModel::Frozen {
                 let (sin, _) = (0.4f64).sin_cos();
                 let moment = 0.5 + plant.calculated().m_0 * p.tank.r;
@@ -161,8 +165,8 @@ fn stops(plant: &mut Plant, inputs: &Inputs, end: f64) -> Vec<StepEnd> {
     }
 }
 
-/// Returns a hub with rigid liquid that a torque brakes against Coulomb friction, and the time I w/(tau + c)
-/// after which it comes to rest and is held.
+/// Returns a hub with rigid liquid that a torque brakes against Coulomb friction, and the time I w/(tau + c) after which the
+/// hub comes to rest and sticks.
 fn braked() -> (Parameters, f64) {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
     (p.friction.b, p.friction.d, p.init.omega) = (0.0, 0.0, 0.02);
@@ -185,14 +189,14 @@ fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
         let left = start + 2.0 * rest - plant.time();
         assert_eq!(plant.step_to_event(&torque(-0.001), left).unwrap(), StepEnd::End);
         assert_eq!(plant.time(), start + 2.0 * rest);
-        // An event beyond the step is none.
+        // An event after the end of the step does not stop the step.
         let mut plant = Plant::new(&p, &torque(-0.001), start, 1e-9).unwrap();
         let end = plant.step_to_event(&torque(-0.001), 0.9 * rest).unwrap();
         assert_eq!((end, plant.stopped()), (StepEnd::End, None));
     }
 }
 
-/// The rotor's speed changes by 1 rad/s per second and is below its smallest speed after a quarter of a second.
+/// The rotor's speed falls by 1 rad/s per second and reaches its lowest value after a quarter of a second.
 #[test]
 fn a_step_stops_where_the_wheel_s_torque_changes() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -203,7 +207,7 @@ fn a_step_stops_where_the_wheel_s_torque_changes() {
     let [StepEnd::Event(at), StepEnd::End] = stops(&mut plant, &inputs, 4.0)[..] else { panic!() };
     assert!((at - 0.25).abs() < 1e-12, "{at}");
     assert_eq!(plant.continuous_states()[x::WHEEL_SPEED], p.wheel.speed_min);
-    // A command that rises through 0 and the limit: 1 N m/s from -0.13, the wheel at most 0.26.
+    // The command rises by 1 N m/s from -0.13 N m, through 0 and the wheel's torque limit of 0.26 N m.
     p.wheel.speed_min = Parameters::default().wheel.speed_min;
     let ramp = Inputs { tau_cmd: Ramp { value: -0.13, slope: 1.0 }, ..Inputs::default() };
     let mut plant = Plant::new(&p, &ramp, 0.0, 1e-9).unwrap();
@@ -212,7 +216,7 @@ fn a_step_stops_where_the_wheel_s_torque_changes() {
     assert!((at - 0.13).abs() < 1e-12, "{at}");
 }
 
-/// Samples are due 0.02 s, 0.04 s, … after the start. The sample at the end of the step does not stop the step early.
+/// Samples are due 0.02 s, 0.04 s, … after the start. A sample at the end of the step does not stop the step early.
 #[test]
 fn a_step_stops_at_each_sample_of_the_gyro() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::Viscous);
@@ -228,13 +232,13 @@ fn a_step_stops_at_each_sample_of_the_gyro() {
     }
     assert_eq!((all[4], plant.time()), (StepEnd::EventAtEnd, 7.1));
     assert_eq!(plant.next_time_event(), Some(7.0 + 6.0 / 50.0));
-    // before the next one, and exactly to it but for rounding
+    // The next step ends before the next sample, and the one after it ends at the sample except for rounding.
     assert_eq!(plant.step_to_event(&inputs, 0.015).unwrap(), StepEnd::End);
     assert_eq!(plant.step_to_event(&inputs, 7.12 - plant.time()).unwrap(), StepEnd::EventAtEnd);
 }
 
-/// Covers stick and slip under a swinging liquid, a wheel that saturates, and samples of the gyro. Steps that stop at
-/// events and steps that do not give bit-identical results, for any number of stops.
+/// The motion includes stick and slip under oscillating liquid, a wheel that saturates, and samples of the gyro. Whether
+/// steps stop at events or not, and however often, the results are bit-identical.
 #[test]
 fn continuing_after_events_equals_one_whole_step() {
     for slosh in SloshModel::ALL {
@@ -249,7 +253,7 @@ fn continuing_after_events_equals_one_whole_step() {
         let all = stops(&mut stopped, &inputs, 2.015625);
         assert!(all.len() > 50, "{slosh:?}: {}", all.len());
         assert_eq!(whole.state().to_words(), stopped.state().to_words(), "{slosh:?}");
-        // saved at each event and resumed by another plant
+        // At each event the plant is saved and another plant resumes.
         let (mut saved, mut count) = (fresh(), 0);
         while saved.time() < 2.015625 {
             let (state, words) = (*saved.state(), saved.stopped().map(StoppedStep::to_words));
@@ -266,7 +270,8 @@ fn continuing_after_events_equals_one_whole_step() {
     }
 }
 
-/// A step to another end or with another torque is a new step from the present state, which finds its own events.
+/// If the step after a stop has another end or another torque, it is a new step from the present state, which
+/// finds its own events.
 #[test]
 fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -287,7 +292,7 @@ fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
         assert_eq!(plant.state().to_words(), fresh.state().to_words(), "{inputs_then:?} {h}");
         assert_eq!(plant.stopped(), fresh.stopped(), "{inputs_then:?} {h}");
     }
-    // The end may be off by what its computation rounds.
+    // The end of the step may differ by the rounding of its computation.
     let mut plant = Plant::new(&p, &inputs, 0.0, 1e-8).unwrap();
     let mut whole = plant.clone();
     whole.step(&inputs, 0.1).unwrap();
@@ -299,7 +304,7 @@ fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
     assert_eq!(plant.state().to_words(), whole.state().to_words());
 }
 
-/// The saved numbers must be finite, and the time of the stop must lie within the step.
+/// The saved numbers must be finite, and the time of the stop must be within the step.
 #[test]
 fn saved_data_that_is_not_a_stopped_step_is_refused() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
@@ -315,17 +320,17 @@ fn saved_data_that_is_not_a_stopped_step_is_refused() {
         StoppedStep::from_words(&words)
     };
     assert!(with(0, 0.1).is_some() && with(1, 0.0).is_some());
-    // the length, and how far it has come
+    // Invalid values of the length of the step and of the elapsed time:
     let bad = [(0, 0.01), (0, f64::INFINITY), (0, f64::NAN), (1, 0.1), (1, -1e-9), (1, f64::NAN)];
     assert!(bad.iter().all(|(n, x)| with(*n, *x).is_none()));
-    // each of the others
+    // Invalid values of each of the other numbers:
     for n in 2..6 + STATES {
         assert!(with(n, f64::NAN).is_none() && with(n, f64::INFINITY).is_none(), "{n}");
         assert!(with(n, 0.25).is_some(), "{n}");
     }
     let mut none = words;
     none[..first].fill(u64::MAX);
-    assert!(StoppedStep::from_words(&none).is_none(), "its start is not a state");
+    assert!(StoppedStep::from_words(&none).is_none(), "the start of the step is not a state");
 }
 
 #[test]

@@ -1,10 +1,11 @@
-//! Measures the frequency of a tank's free oscillation by simulation; the tests of `tests/physics` include this file too.
+//! Measurement of the frequency of a tank's free oscillation by simulation. The tests of `tests/physics`
+//! include this file, too.
 
 use std::f64::consts::TAU;
 
 use plant::{FrictionModel, Inputs, Parameters, Plant, SloshModel};
 
-/// Returns a hub that hardly moves (2 kg of liquid against 1e9 kg m2), without damping and friction.
+/// Returns a hub that hardly moves, because the liquid has 2 kg and the hub has 1e9 kg m2, without damping and friction.
 pub fn held(model: SloshModel, depth: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -14,9 +15,9 @@ pub fn held(model: SloshModel, depth: f64) -> Parameters {
     p
 }
 
-/// Returns the mean angular frequency, rad/s, of the slosh angle or, in a circular motion, of its direction. It comes
-/// from the instants at which the tangential angle rises through 0. Linear interpolation between samples `h` apart
-/// finds each instant to 1e-6 of a period for 1 ms, 4e-7 for 0.1 ms.
+/// Returns the mean angular frequency, rad/s, of the slosh angle or, in circular motion, of its direction. It is computed
+/// from the instants at which the tangential angle rises through 0. Linear interpolation between samples at intervals of `h`
+/// finds each instant to 1e-6 of a period for 1 ms, and to 4e-7 for 0.1 ms.
 fn frequency(p: &Parameters, h: f64) -> f64 {
     let inputs = Inputs::default();
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-11).unwrap();
@@ -37,9 +38,9 @@ pub fn shifts(model: SloshModel, depth: f64, h: f64) -> [f64; 2] {
     shifts_of(held(model, depth), h)
 }
 
-/// Measures the relative shift of omega^2 per squared slosh angle of planar and circular motion at 0.05 rad.
-/// The next order is 2.5e-3 (0.05 rad squared) of it, times numbers of order 1. The motion is sampled every
-/// `h` seconds.
+/// Returns the relative change of omega^2 per squared slosh angle of planar and of circular motion, measured at
+/// 0.05 rad. The next order is 2.5e-3 (0.05 rad squared) of this change, times numbers of order 1. The motion is
+/// sampled every `h` seconds.
 pub fn shifts_of(mut p: Parameters, h: f64) -> [f64; 2] {
     let amplitude: f64 = 0.05;
     let plant = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
@@ -47,7 +48,8 @@ pub fn shifts_of(mut p: Parameters, h: f64) -> [f64; 2] {
     let shift = |omega: f64| ((omega / linear).powi(2) - 1.0) / amplitude.powi(2);
     p.init.slosh_angle = amplitude.asin();
     let planar = shift(frequency(&p, h));
-    // Sine of the angle: displacement over length. A circle needs the rate of its own frequency.
+    // The sine of the angle is displacement divided by length. For motion on a circle the initial rate must belong to the
+    // frequency of this motion.
     p.init.slosh_angle = 0.0;
     p.init.slosh_angle_radial = amplitude.asin();
     let mut omega = linear;

@@ -1,11 +1,11 @@
-//! Forces, momentum and energy in the outputs follow from the positions of the masses: the slosh masses' positions come
-//! from the states, velocities and accelerations from differences of the positions.
+//! Forces, momentum and energy in the outputs agree with those computed from the positions of the masses: the positions of
+//! the slosh masses follow from the states, and their velocities and accelerations from differences of the positions.
 
 use super::common::bench;
 use plant::{Calculated, FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, x};
 
-/// Sampling interval, s. Differences of five points leave (omega h)^4/30 of a derivative: 2e-8 of the second
-/// mode's, at 25 rad/s.
+/// Sampling interval, s. Five-point differences have the error (omega h)^4/30 of a derivative, which is 2e-8 for the second
+/// mode at 25 rad/s.
 const H: f64 = 5e-4;
 
 const G: f64 = 9.81;
@@ -22,11 +22,11 @@ fn moving(slosh: SloshModel) -> Parameters {
     p
 }
 
-/// Places of the masses at an instant: the hub's angle, and for each slosh mass its position in the hub's frame with its height, m, and the
-/// height that determines its potential energy.
+/// Positions of the masses at an instant: the hub's angle, and for each slosh mass its position in the hub's frame.
 struct Place {
     theta: f64,
-    /// For each slosh mass: x from the axis, y, height that moves with it, height that gravity acts on.
+    /// For each slosh mass: x from the axis, y, the height that determines its vertical velocity, and the height that
+    /// determines its potential energy, m.
     bobs: Vec<[f64; 4]>,
 }
 
@@ -34,7 +34,7 @@ fn displaced(p: &Parameters, l: f64, first: bool, q: [f64; 2]) -> [f64; 4] {
     let [a, b] = q;
     match p.slosh.model {
         SloshModel::Frozen => [0.0; 4],
-        // No height of its own; the potential is that of a spring.
+        // The slosh mass has no height; its potential energy is that of a spring.
         SloshModel::Linear => [0.0, l * b, 0.0, l * b * b / 2.0],
         SloshModel::Planar => [0.0, l * b.sin(), l * (1.0 - b.cos()), l * (1.0 - b.cos())],
         SloshModel::Spherical => {
@@ -48,7 +48,7 @@ fn displaced(p: &Parameters, l: f64, first: bool, q: [f64; 2]) -> [f64; 4] {
                 if first { formulas::third_order::coefficients(fill) } else { (1.0, 1.0) };
             let spring = kappa / (2.0 * l * l);
             let q2 = a * a + b * b;
-            // s weighs the kinetic energy upwards.
+            // The coefficient s multiplies the kinetic energy of the vertical motion.
             let up = s.sqrt() * q2 / (2.0 * l);
             [a, b, up, (q2 / 2.0 + spring * q2 * q2 / 4.0) / l]
         }
@@ -74,8 +74,8 @@ fn derivatives(f: [f64; 5]) -> [f64; 2] {
     ]
 }
 
-/// Simulates five samples of a motion. Returns calculated parameters, the places of all masses at the samples,
-/// and the outputs at the middle one.
+/// Simulates five samples of a motion. Returns the calculated parameters, the positions of all masses at the samples, and
+/// the outputs at the middle sample.
 fn sampled(p: &Parameters) -> (Calculated, [Place; 5], Outputs) {
     let inputs = Inputs { tau_cmd: Ramp::held(0.3), ..Inputs::default() };
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-13).unwrap();
@@ -98,8 +98,8 @@ fn assert_near(got: f64, want: f64, size: f64, what: &str) {
     assert!((got - want).abs() < size, "{what}: {got} {want}");
 }
 
-/// Positions of hub and slosh masses at several times give velocities and accelerations by differences; forces, momentum
-/// and energy follow from Newton's law.
+/// Velocities and accelerations are computed by differences from the positions of hub and slosh masses at several times.
+/// Forces, momentum and energy then follow from Newton's law.
 #[test]
 fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
     for slosh in SloshModel::ALL {
@@ -112,7 +112,8 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
         let (e_y, e_x) = (p.bench.tilt_azimuth - now).sin_cos();
         let (e_x, e_y) = (lateral * e_x, lateral * e_y);
         let (i_0, m_0) = (known.m_0 * r * r + p.tank.own_inertia, known.m_0);
-        // Rigid liquid, and the hub's imbalance u, whose gravity alone counts: inertia has it.
+        // The rigid liquid, and the hub's imbalance u. Only the gravity torque of the imbalance is added, because
+        // `hub.inertia` contains its inertia.
         let (u_y, u_x) = p.hub.imbalance_angle.sin_cos();
         let (u_x, u_y) = (p.hub.imbalance * u_x, p.hub.imbalance * u_y);
         let mut force = [m_0 * (r * w * w + e_x), m_0 * (-r * wd + e_y)];
@@ -124,8 +125,8 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
             let [x, y, _, felt] = places[2].bobs[n];
             let ([x_d, x_dd], [y_d, y_dd], [up_d, _]) = (along(0), along(1), along(2));
             let linear = slosh == SloshModel::Linear;
-            // Velocity and acceleration as seen from outside; to first order tangentially in the
-            // linear model, whose bob moves along the tangent.
+            // Velocity and acceleration are relative to inertial axes. In the linear model the slosh mass moves along the
+            // tangent, so that only the tangential terms of first order are included.
             let velocity = if linear { [0.0, r * w + y_d] } else { [x_d - w * y, y_d + w * x] };
             let radial = x_dd - 2.0 * w * y_d - wd * y - w * w * x;
             let tangential =
@@ -137,7 +138,8 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
             let speed2 = velocity[0].powi(2) + velocity[1].powi(2) + up_d.powi(2);
             energy += m * (speed2 / 2.0 + G * felt - e_x * x - e_y * y);
         }
-        // Forces of 10 N and differences of accelerations of 100 m/s2 (second and third mode) to 1e-8.
+        // The tolerances are for forces of 10 N, and for differences of accelerations of 100 m/s2 (second and third mode)
+        // with an error of 1e-8.
         let what = format!("{slosh:?}");
         assert_near(o.omega, w, 1e-9, &what);
         assert_near(o.omega_dot, wd, 1e-6, &what);
@@ -145,11 +147,14 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
         assert_near(o.f_tangential, force[1], 1e-5, &format!("{what} tangential force"));
         assert_near(o.momentum, momentum, 1e-8, &format!("{what} momentum"));
         assert_near(o.energy, energy, 1e-8, &format!("{what} energy"));
-        assert!(force[0].abs() > 0.4 && force[1].abs() > 0.4, "neither is small: {what} {force:?}");
+        assert!(
+            force[0].abs() > 0.4 && force[1].abs() > 0.4,
+            "a force is too small: {what} {force:?}"
+        );
     }
 }
 
-/// The whole liquid is at rest in the rotating hub, so that its force is m_liq r w^2, outwards.
+/// All liquid is at rest relative to the rotating hub, so that its force on the hub is m_liq r w^2, outwards.
 #[test]
 fn liquid_that_turns_with_the_hub_pushes_outwards() {
     for slosh in SloshModel::ALL {
@@ -157,7 +162,8 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
         p.init.omega = 0.5;
         let o = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().outputs(&Inputs::default());
         let m_liq = 1000.0 * core::f64::consts::FRAC_PI_4 * 0.163 * 0.163 * 0.10;
-        // A spherical bob that hangs is pushed by the centrifugal force and pulls at nothing yet.
+        // The centrifugal force accelerates a spherical slosh mass that hangs under its hinge, so that it does not pull
+        // at the hinge yet.
         let pushed = match slosh {
             SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar => m_liq,
             _ => Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().calculated().m_0,
@@ -166,7 +172,7 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
     }
 }
 
-/// At the first instant of a torque step only the rigid part of the liquid accelerates with the hub.
+/// When a torque begins to act, at first only the rigid part of the liquid accelerates with the hub.
 #[test]
 fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
     for slosh in SloshModel::ALL {
@@ -175,7 +181,7 @@ fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
         let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
         let m_0 = plant.calculated().m_0;
         let o = plant.outputs(&inputs);
-        // Bobs at rest under their hinges transmit nothing sideways.
+        // Slosh masses at rest under their hinges exert no lateral force.
         let wd = 0.1 / (p.hub.inertia + m_0 * 0.225 * 0.225);
         assert_near(o.omega_dot, wd, 1e-14, &format!("{slosh:?}"));
         assert_near(o.f_tangential, -m_0 * 0.225 * wd, 1e-14, &format!("{slosh:?}"));
@@ -183,7 +189,8 @@ fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
     }
 }
 
-/// Sets angles and rates of the first mode in both directions, for every slosh model whatever its coordinates.
+/// In every slosh model the outputs at the start equal the initial angles and rates of the first mode in both directions,
+/// whatever the coordinates of the model.
 #[test]
 fn a_bench_starts_at_the_given_slosh_angles_and_rates() {
     for slosh in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -199,7 +206,7 @@ fn a_bench_starts_at_the_given_slosh_angles_and_rates() {
         let shown = [o.slosh_angle, o.slosh_rate, o.slosh_angle_radial, o.slosh_rate_radial];
         let given = [0.3, 1.5, p.init.slosh_angle_radial, p.init.slosh_rate_radial];
         for (shown, given) in shown.iter().zip(given) {
-            // Rounding of a few functions.
+            // The tolerance is for the rounding errors of a few functions.
             assert!((shown - given).abs() < 1e-14, "{slosh:?} {shown} {given}");
         }
     }

@@ -10,15 +10,15 @@ use crate::common::SLOSHING;
 
 const G: f64 = 9.81;
 
-/// Returns a tank of h/R = 1 without damping, on a hub that its liquid cannot move. Gravity across the axis
-/// has the slope `s` and the direction `beta`, from outwards to the tangent.
+/// Returns a tank of h/R = 1 without damping on a hub that its liquid cannot move. Gravity across the axis has the slope
+/// `s`, and `beta` is its direction, measured from outwards to the tangent.
 fn leaning(model: SloshModel, s: f64, beta: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
     p.tank.h = p.tank.d / 2.0;
     p.hub.inertia = 1e10;
     (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.0);
-    // a start angle of the hub turns both alike
+    // The start angle of the hub rotates hub and tilt alike, so that it has no effect.
     (p.bench.tilt, p.bench.tilt_azimuth, p.init.theta) = (s.atan(), beta + 0.3, 0.3);
     p
 }
@@ -39,7 +39,7 @@ fn rest(p: &Parameters) -> f64 {
         SloshModel::Spherical => return s / (1.0 + s * s).sqrt(),
         SloshModel::Liquid => third_order::coefficients(2.0 * p.tank.h / p.tank.d).1 / 2.0,
     };
-    // u (1 + H u^2) = s by halving
+    // Bisection solves u (1 + H u^2) = s.
     let (mut low, mut high) = (0.0, s);
     for _ in 0..60 {
         let u = (low + high) / 2.0;
@@ -52,17 +52,17 @@ fn hang(p: &mut Parameters, aside: f64) {
     let (sin, cos) = (p.bench.tilt_azimuth - p.init.theta).sin_cos();
     let u = rest(p);
     let [radial, along] = match p.slosh.model {
-        // The plane's own pull alone.
+        // Only the component of gravity in the plane of the pendulum displaces it.
         SloshModel::Planar => [0.0, (p.bench.tilt.tan() * sin).atan().sin()],
         _ => [u * cos, u * sin],
     };
-    // angles are those whose sines are the displacements; of the linear model themselves
+    // The sines of the slosh angles are the displacements, except in the linear model, whose angles are the displacements.
     let angle = |x: f64| if p.slosh.model == SloshModel::Linear { x } else { x.asin() };
     (p.init.slosh_angle, p.init.slosh_angle_radial) = (angle(along + aside), angle(radial));
 }
 
-/// Returns the frequency of a free oscillation of 1e-4 rad, Hz, from ten periods between zeros of the rate,
-/// interpolated between 400 samples per period (error by the sine's third power: 1e-7 of a period).
+/// Returns the frequency of a free oscillation of 1e-4 rad, Hz, from ten periods between zeros of the rate. Interpolation
+/// between 400 samples per period has an error of 1e-7 of a period.
 fn measured(p: &Parameters) -> f64 {
     let mut p = *p;
     hang(&mut p, 1e-4);
@@ -85,9 +85,9 @@ fn measured(p: &Parameters) -> f64 {
     10.0 / (zeros[10] - zeros[0])
 }
 
-/// Compares the relative change of Lambda by the tilt, along the slope and across it, at h/R = 1, with finite elements
-/// (`hubslosh.liquid_modes`, two meshes 2e-4 apart; `formulas::tilt` names the programs). The tolerance of the frequency is
-/// half the difference of the meshes plus the neglected second order, 1e-4 and 0.15 %.
+/// At h/R = 1, along the slope and across it, the relative change of Lambda (squared frequency) by the tilt agrees with
+/// finite elements (`hubslosh.liquid_modes`, two meshes whose results differ by 2e-4; `formulas::tilt` names the programs).
+/// The tolerance of the frequency is half the difference of the meshes plus the neglected second order, 1e-4 and 0.15 %.
 #[test]
 fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
     for (s, change, allowed) in
@@ -105,8 +105,8 @@ fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
     }
 }
 
-/// The frequency that the plant states and the frequency of a free decay agree to the square of the amplitude, 1e-4 rad,
-/// plus the measurement's error of 1e-7. Models with one direction are tested in a direction oblique to the slope.
+/// The frequency that the plant reports and the frequency of a free decay agree within the square of the amplitude, 1e-4
+/// rad, plus the measurement error of 1e-7. Models with one direction are tested in a direction oblique to the slope.
 #[test]
 fn the_stated_frequency_equals_that_of_a_free_decay() {
     for model in SLOSHING {
@@ -128,8 +128,9 @@ fn the_stated_frequency_equals_that_of_a_free_decay() {
     }
 }
 
-/// A torque immediately accelerates the hub and the mass that does not slosh: I + r^2 (m_liq - sum of m f), in every model.
-/// A planar slosh mass, which cannot move radially, adds its distance from the axis.
+/// When a torque begins to act, it accelerates the hub and the liquid that does not slosh, with the inertia I + r^2
+/// (m_liq - sum of m f) in every model. A planar slosh mass cannot move radially, so that it contributes by its distance
+/// from the axis as well.
 #[test]
 fn rigid_liquid_follows_the_hub() {
     for model in SLOSHING {
@@ -190,8 +191,7 @@ fn a_surface_that_reaches_the_bottom_is_refused_unless_the_liquid_is_rigid() {
     assert_eq!(refused(&leaning(SloshModel::Linear, 0.99, 0.0)), None);
 }
 
-/// In a leaning cylinder the frequencies across and along the tilt differ, but the spherical pendulum has only one
-/// frequency.
+/// In a tilted cylinder the frequencies across and along the slope differ, but a spherical pendulum has only one frequency.
 #[test]
 fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
     let warnings = |model, s| Plant::warnings(&leaning(model, s, 0.0), &inputs_with_torque(0.0));
@@ -200,7 +200,7 @@ fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
         assert!(said(model, 0.71, "exceeds 1 %") && !said(model, 0.69, "exceeds 1 %"));
         assert!(!said(model, 0.02, "bench.tilt"), "{:?}", warnings(model, 0.02));
     }
-    // sqrt(1 + 0.65 s^2) is 1 % at 0.176
+    // The difference sqrt(1 + 0.65 s^2) is 1 % at 0.176.
     assert!(
         said(SloshModel::Spherical, 0.19, "too high") && !said(SloshModel::Spherical, 0.16, "too")
     );

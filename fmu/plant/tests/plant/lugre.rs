@@ -1,5 +1,5 @@
-//! The LuGre law: passivity, pre-sliding loops and frictional lag as Canudas de Wit et al.
-//! (1995) show them, its limit of stiff bristles, its events.
+//! Tests of the LuGre friction law: passivity, presliding loops and frictional lag as Canudas de Wit et al. (1995) show
+//! them, the limit of stiff bristles, and events.
 
 use plant::{
     Friction, FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, STATES, SloshModel,
@@ -45,8 +45,11 @@ fn energy_balances_and_the_bearing_never_adds_energy() {
                 assert!(now.power_dissipated >= 0.0);
                 last = now;
             }
-            assert!(last.discrete.event_count > 10, "it has reversed");
-            assert!(last.heat > 0.1 * throughput, "friction has taken its share");
+            assert!(last.discrete.event_count > 10, "the hub must have reversed often");
+            assert!(
+                last.heat > 0.1 * throughput,
+                "friction must have dissipated a part of the energy"
+            );
         }
     }
 }
@@ -71,22 +74,23 @@ fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
             let omega = 10f64.powf(k as f64 / 20.0 - 5.0);
             for omega in [omega, -omega] {
                 let power = dissipation(&mut plant, &p.friction, omega, f64::from(j) / 50.0);
-                // Rounding of the terms that cancel.
+                // The tolerance is for rounding of terms that cancel.
                 assert!(power >= -1e-13 * omega * omega, "{omega} {j}: {power}");
                 least = least.min(power / (p.friction.b * omega * omega));
             }
         }
     }
-    assert!(least < 1e-3, "the condition is sharp: {least}");
+    assert!(least < 1e-3, "the passivity condition is not sharp: {least}");
     p.friction.sigma1 = limit * 1.001;
     let problems = Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).err().unwrap();
     assert!(problems.len() == 1 && problems[0].contains("friction.sigma1"), "{problems:?}");
-    // Without a Stribeck effect every sigma1 is passive; a direction of its own needs less.
+    // Without Stribeck effect every sigma1 is passive. With friction that depends on the direction, only
+    // smaller values are passive.
     p.friction.d = 0.0;
     p.friction.sigma1 = 10.0;
     Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).unwrap();
     p.friction.asymmetry = 0.5;
-    // b (1 - 0.5)/(1.5 - 0.5)
+    // The limit is b (1 - 0.5)/(1.5 - 0.5).
     assert!(Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).is_err());
     p.friction.sigma1 = p.friction.b / 2.0;
     Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).unwrap();
@@ -97,7 +101,7 @@ fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
 
 #[test]
 fn stiff_lugre_bristles_approach_the_set_valued_law() {
-    // A sine that the hub follows with stops: sliding, reversal, rest.
+    // The torque is a sine, which the hub follows with sliding, reversal and rest.
     let run = |model: FrictionModel, sigma0: f64| {
         let mut p = bench(SloshModel::Linear);
         p.friction.model = model;
@@ -117,8 +121,8 @@ fn stiff_lugre_bristles_approach_the_set_valued_law() {
         (squares.sum::<f64>() / 100.0).sqrt()
     };
     let differences = [1e3, 1e4, 1e5].map(difference);
-    // The lost motion is g/sigma_0, of first order. A stop leaves bristles and hub ringing with
-    // a rate that goes with sigma_0^(-1/2); it decays, so the order found lies between.
+    // The lost motion is g/sigma_0, of first order. After a stop, bristles and hub oscillate with a rate proportional to
+    // sigma_0^(-1/2), which decays, so that the measured order is between 1/2 and 1.
     for pair in differences.windows(2) {
         let order = (pair[0] / pair[1]).log10();
         assert!(order > 0.5, "{differences:?}");
@@ -126,8 +130,8 @@ fn stiff_lugre_bristles_approach_the_set_valued_law() {
     assert!(differences[2] < 2e-5, "{differences:?}");
 }
 
-/// Computes tau_f along a prescribed motion by Runge-Kutta 4 on the bristle alone; the hub's rate is set at
-/// every instant. Returns (rate, friction torque, dissipated power) after each step.
+/// Computes tau_f along a prescribed motion of the hub, with Runge-Kutta 4 for the bristles only. Returns (rate, friction
+/// torque, dissipated power) after each step.
 fn driven(
     p: &Parameters,
     omega: impl Fn(f64) -> f64,
@@ -161,7 +165,7 @@ fn driven(
 
 #[test]
 fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
-    // Slowly from rest: g stays c + d, and F = g (1 - exp(-sigma_0 x/g)).
+    // The hub moves slowly from rest: g stays c + d, so that F = g (1 - exp(-sigma_0 x/g)).
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma1 = 0.0;
     p.friction.b = 0.0;
@@ -170,19 +174,19 @@ fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
     for (k, (_, friction, _)) in all.iter().enumerate() {
         let x = rate * h * (k + 1) as f64;
         let dahl = G_MAX * (1.0 - (-p.friction.sigma0 * x / G_MAX).exp());
-        // (w/w_s)^2 = 1e-10 of d, and the step's (sigma_0 w h/g)^4/120.
+        // The errors are (w/w_s)^2 = 1e-10 of d, and (sigma_0 w h/g)^4/120 in each step.
         assert!((friction + dahl).abs() < 1e-9 * G_MAX, "{k}: {friction} {dahl}");
     }
 }
 
-/// Before a hub with LuGre friction slides, torque against deflection follows hysteresis loops, which are closed from
-/// the second cycle on.
+/// Before a hub with LuGre friction slides, its torque as a function of the deflection is a hysteresis loop, which is closed
+/// from the second cycle on.
 #[test]
 fn motion_before_sliding_runs_through_closed_loops() {
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma1 = 0.0;
     p.friction.b = 0.0;
-    // +-3 µrad, half of what g_max deflects; slowly, 0.1 rad/s of phase.
+    // The amplitude is 3 µrad, half of the deflection at g_max, and the phase advances slowly, by 0.1 rad/s.
     let (amplitude, frequency) = (3e-6, 0.1);
     let period = core::f64::consts::TAU / frequency;
     let steps = 4000;
@@ -190,16 +194,16 @@ fn motion_before_sliding_runs_through_closed_loops() {
     let rate = |t: f64| amplitude * frequency * libm::cos(frequency * t);
     let all = driven(&p, rate, h, 3 * steps);
     let cycle = |n: usize| &all[n * steps..(n + 1) * steps];
-    // Closed from the second on.
+    // The loop is closed from the second cycle on.
     let (second, third) = (cycle(1), cycle(2));
     let gap = second.iter().zip(third).map(|(a, b)| (a.1 - b.1).abs()).fold(0.0, f64::max);
     assert!(gap < 0.02 * G_MAX, "{gap}");
-    // The loop's area is what the bristles dissipate and positive: trapezoidal rule.
+    // The area of the loop, by the trapezoidal rule, is the energy that the bristles dissipate, and is positive.
     let area: f64 = third.iter().map(|(w, friction, _)| -w * friction * h).sum();
     let dissipated: f64 = third.iter().map(|(.., power)| power * h).sum();
     assert!(area > 0.05 * amplitude * G_MAX, "{area}");
     assert!((area / dissipated - 1.0).abs() < 0.02, "{area} {dissipated}");
-    // Never as much as sliding takes.
+    // The friction torque is always smaller than during sliding.
     assert!(third.iter().all(|(_, friction, _)| friction.abs() < 0.8 * G_MAX));
 }
 
@@ -207,29 +211,29 @@ fn motion_before_sliding_runs_through_closed_loops() {
 /// both at the mean rate. The rate oscillates with `frequency`, rad/s.
 fn lag(frequency: f64) -> f64 {
     let mut p = bench(SloshModel::Frozen);
-    // Stribeck's effect alone: within w_s, without viscous friction's share.
+    // Only the Stribeck effect is left: the rate is within w_s, and there is no viscous friction.
     (p.friction.b, p.friction.sigma1, p.friction.sigma0) = (0.0, 0.0, 10.0);
     let (mean, amplitude) = (0.08, 0.05);
     let rate = |t: f64| mean + amplitude * libm::sin(frequency * t);
     let steps = 20_000;
     let h = core::f64::consts::TAU / frequency / steps as f64;
     let all = driven(&p, rate, h, 2 * steps);
-    // sin = 0: up at the end of the first period, down half a period later.
+    // sin = 0: the rate rises at the end of the first period, and falls half a period later.
     -all[steps - 1].1 + all[steps - 1 + steps / 2].1
 }
 
 #[test]
 fn lugre_friction_lags_behind_the_rate_the_more_the_faster_the_rate_changes() {
     let [slow, middle, fast] = [1.0, 4.0, 16.0].map(lag);
-    // Larger while the rate grows than while it falls: Stribeck's curve falls with the rate.
+    // The friction is larger while the rate rises than while it falls, because Stribeck's curve falls with the rate.
     assert!(slow > 0.0 && middle > 2.0 * slow && fast > 2.0 * middle, "{slow} {middle} {fast}");
-    assert!(fast < 0.002423, "within the curve's own range");
+    assert!(fast < 0.002423, "the lag must be within the range of Stribeck's curve");
 }
 
 #[test]
 fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
-    // Canudas de Wit et al., figure 4; w_s as small as theirs, so that the hub passes it while
-    // the bristles still deflect.
+    // As in figure 4 of Canudas de Wit et al. w_s is as small as theirs, so that the rate passes w_s while the bristles
+    // still deflect.
     let break_away = |slope: f64| {
         let mut p = bench(SloshModel::Frozen);
         (p.friction.sigma0, p.friction.omega_s) = (10.0, 1e-3);
@@ -237,7 +241,7 @@ fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
         let mut inputs = torque(0.0);
         inputs.tau_cmd.slope = slope;
         let mut largest: f64 = 0.0;
-        // Ten times g_max/sigma_0.
+        // This is ten times the deflection g_max/sigma_0.
         while plant.continuous_states()[x::THETA] < 6e-3 {
             plant.step(&inputs, 1e-5 / slope).unwrap();
             inputs.tau_cmd.value += 1e-5;
@@ -249,10 +253,10 @@ fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
     let [slow, middle, fast] = [1e-4, 1e-3, 1e-2].map(break_away);
     assert!(slow < 1.001 * G_MAX && slow > 0.9 * G_MAX, "{slow}");
     assert!(middle < 0.95 * slow && fast < 0.95 * middle, "{slow} {middle} {fast}");
-    assert!(fast > 0.003498 * 0.99, "Coulomb's torque is left: {fast}");
+    assert!(fast > 0.003498 * 0.99, "the torque must not fall below Coulomb friction: {fast}");
 }
 
-/// A torque of 2 mN·m, less than the friction at break-away, turns a hub with LuGre friction by torque divided by bristle
+/// A torque of 2 mN·m, less than the break-away torque, turns a hub with LuGre friction by torque divided by bristle
 /// stiffness.
 #[test]
 fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
@@ -264,7 +268,7 @@ fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     assert!(o.omega.abs() < 1e-8, "{}", o.omega);
     assert!((o.tau_friction + 0.002).abs() < 1e-7, "{}", o.tau_friction);
     assert!((plant.continuous_states()[x::BRISTLE] - 0.002 / 200.0).abs() < 1e-9);
-    // At rest from the start on, with a torque that falls from 0: the right branch at once.
+    // The hub is at rest at first, under a torque that falls from 0: the contact has the right direction at once.
     let mut plant = Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).unwrap();
     let mut mirrored = plant.clone();
     let ramp = |slope| Inputs { tau_cmd: Ramp { value: 0.0, slope }, ..Inputs::default() };
@@ -275,8 +279,8 @@ fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
 
 #[test]
 fn step_length_follows_the_bristle_stiffness() {
-    // Sliding at 0.05 rad/s for 1 s with a relaxation time from 0.1 s to 0.1 ms. The number of
-    // internal steps grows with the stiffness, by at most about one per ten relaxation times.
+    // The hub slides at 0.05 rad/s for 1 s, with relaxation times from 0.1 s to 0.1 ms. The number of internal steps grows
+    // with the stiffness, by at most about one per ten relaxation times.
     for sigma0 in [1.0, 100.0, 10_000.0] {
         let mut p = bench(SloshModel::Frozen);
         p.friction.sigma0 = sigma0;
@@ -338,9 +342,9 @@ fn a_model_exchange_host_that_locates_reversals_reproduces_co_simulation() {
     }
     own.step(&inputs, end).unwrap();
     assert!(events > 3);
-    assert_eq!(plant.last_contact().0, own.last_contact().0, "as many reversals");
+    assert_eq!(plant.last_contact().0, own.last_contact().0, "the numbers of reversals differ");
     let (a, b): (Outputs, Outputs) = (plant.outputs(&inputs), own.outputs(&inputs));
-    // Runge-Kutta's (lambda h)^4 with lambda = sigma_0 w/g = 1000 1/s at most.
+    // The error of the Runge-Kutta method is (lambda h)^4 with lambda = sigma_0 w/g of at most 1000 1/s.
     assert!((a.omega - b.omega).abs() < 1e-8, "{} {}", a.omega, b.omega);
     assert!((a.heat - b.heat).abs() < 1e-8 && (a.energy - b.energy).abs() < 1e-8);
 }

@@ -1,5 +1,5 @@
-//! Tests of a tilted bench, a ring baffle, amplitude damping and capillarity. With each option, energy, momentum,
-//! derivatives and the independence of the communication step hold for every model.
+//! Tests of a tilted bench, a ring baffle, amplitude damping and capillarity. With each option and every slosh model, energy
+//! and momentum balance, derivatives are exact, and the motion does not depend on the communication step.
 
 use std::f64::consts::TAU;
 
@@ -84,7 +84,8 @@ fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
                         + (now.work_axial - last.work_axial).abs();
                     assert!(now.heat >= last.heat && now.power_dissipated >= 0.0);
                     let balance = now.energy - first.energy - now.work - now.work_axial + now.heat;
-                    // Ten times the integrator's tolerance; a missing term is a share of the whole.
+                    // The tolerance is ten times that of the integrator; a missing term would be a visible
+                    // fraction of the throughput.
                     assert!(
                         balance.abs() < 1e-8 * throughput,
                         "{slosh:?} {friction:?} {balance:e} {throughput}"
@@ -95,22 +96,23 @@ fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
     }
 }
 
-/// A leaning bench with baffle, capillarity, imbalance and breaking waves, in one step of 10 s or in steps of 3 ms.
+/// The bench is tilted and has a baffle, capillarity, imbalance and breaking waves. One step of 10 s gives the same motion
+/// as steps of 3 ms.
 #[test]
 fn motion_with_all_options_does_not_depend_on_the_communication_step() {
     for slosh in SloshModel::ALL {
         let p = everything(slosh, FrictionModel::Viscous);
         let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
         let [a, b] = [coarse.last().unwrap(), fine.last().unwrap()];
-        // Rates of 1 rad/s and energies of 0.1 J at the tolerance.
+        // The tolerance is for rates of 1 rad/s and energies of 0.1 J at the tolerance of the solver.
         assert!((a.omega - b.omega).abs() < 2e-9, "{slosh:?} {}", a.omega - b.omega);
         assert!((a.slosh_rate - b.slosh_rate).abs() < 2e-9, "{slosh:?}");
         assert!((a.work_axial - b.work_axial).abs() < 1e-9, "{slosh:?}");
     }
 }
 
-/// The rate of change of the angular momentum equals the moment of gravity on every mass at its place, by Simpson's rule
-/// over 1 ms, whose error is (2 pi f h)^4/180 of the torque, 1e-10.
+/// The derivative of the angular momentum equals the moment of gravity on all masses at their positions. It is compared by
+/// Simpson's rule over 1 ms, whose error is (2 pi f h)^4/180 of the torque, 1e-10.
 #[test]
 fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
     for slosh in SloshModel::ALL {
@@ -155,8 +157,8 @@ fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
     }
 }
 
-/// With rigid liquid, hub and liquid are a pendulum about the bearing: omega^2 = g tan(tilt) M/I with the static moment M
-/// of all masses.
+/// If the liquid is rigid, hub and liquid are one pendulum about the bearing: omega^2 = g tan(tilt) M/I with the static
+/// moment M of all masses.
 #[test]
 fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -169,7 +171,7 @@ fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
     let inertia = p.hub.inertia + m_0 * p.tank.r * p.tank.r;
     let omega = (9.81 * 0.1f64.tan() * moment / inertia).sqrt();
     plant.step(&inputs_with_gravity(9.81), TAU / omega / 3.0).unwrap();
-    // cos(120 degrees); a pendulum's period at 1 mrad is longer by 6e-8.
+    // The factor is cos(120 degrees). The period of a pendulum at 1 mrad is longer by 6e-8.
     let theta = plant.outputs(&inputs_with_gravity(9.81)).theta;
     assert!((theta / 1e-3 + 0.5).abs() < 1e-6, "{theta}");
 }
@@ -186,20 +188,21 @@ fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
             plant.step(&inputs_with_gravity(9.81), 1.0).unwrap();
         }
         let o = plant.outputs(&inputs_with_gravity(9.81));
-        // Downhill is theta = 0, and the bob hangs along gravity. In `liquid` (tangent of the
-        // slope, quartic spring) to the third order.
+        // Downhill is theta = 0, and the slosh mass hangs along gravity. In the model `liquid` its displacement (for the
+        // tangent of the slope, with the quartic spring) is exact to the third order.
         assert!(o.theta.abs() < 1e-9 && o.slosh_angle.abs() < 1e-9, "{slosh:?} {o:?}");
         let allowed = if slosh == SloshModel::Spherical { 1e-9 } else { 2e-5 };
         assert!((o.slosh_angle_radial - 0.02).abs() < allowed, "{slosh:?} {o:?}");
-        assert!(o.energy < 0.0, "below the upright bench's rest");
+        assert!(o.energy < 0.0, "the energy must be below that of the upright bench at rest");
     }
 }
 
-/// On a tilted bench the imbalance pulls at the hub; dry friction holds the hub as long as the torque of the
-/// imbalance is below the break-away torque.
+/// On a tilted bench gravity exerts a torque on the hub's imbalance. Dry friction holds the hub as long as this torque is
+/// below the break-away torque.
 #[test]
 fn dry_friction_holds_a_leaning_hub() {
-    // 9.81 tan(0.001) (0.3 + 2.087 0.225) N m = 7.5 mN m sin(phi): more than 5.9 mN m at 90 degrees.
+    // The torque is 9.81 tan(0.001) (0.3 + 2.087 0.225) N m sin(phi) = 7.5 mN m sin(phi). At 90 degrees it exceeds the
+    // break-away torque of 5.9 mN m.
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
     (p.bench.tilt, p.hub.imbalance) = (0.001, 0.3);
     (p.init.omega, p.init.slosh_angle) = (0.0, 0.0);
@@ -208,17 +211,17 @@ fn dry_friction_holds_a_leaning_hub() {
         plant(&p).outputs(&inputs_with_gravity(9.81)).discrete.stuck
     };
     assert!(stuck(0.0) && stuck(0.3));
-    p.init.slosh_angle = 0.001; // in equilibrium with the lateral part
+    p.init.slosh_angle = 0.001; // in equilibrium with gravity across the axis
     let mut moved = plant(&p);
     assert!(moved.outputs(&inputs_with_gravity(9.81)).discrete.stuck);
     p.bench.tilt_azimuth = TAU / 4.0;
     moved = plant(&p);
     assert!(!moved.outputs(&inputs_with_gravity(9.81)).discrete.stuck);
     moved.step(&inputs_with_gravity(9.81), 5.0).unwrap();
-    assert!(moved.outputs(&inputs_with_gravity(9.81)).theta > 0.01, "it turns downhill");
+    assert!(moved.outputs(&inputs_with_gravity(9.81)).theta > 0.01, "the hub must turn downhill");
 }
 
-/// Returns a hub that does not move, without viscous damping, with a ring d/R = w/R = 0.1.
+/// Returns a hub that does not move, without viscous damping, with a ring baffle of d/R = w/R = 0.1.
 fn ringed(slosh: SloshModel) -> Parameters {
     let mut p = bench(slosh, FrictionModel::None);
     p.hub.inertia = 1e9;
@@ -241,11 +244,12 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     p.init.slosh_angle = 0.1 / wave;
     let (found, within) = zeta(&p);
     assert!((found - 0.0468).abs() < 5e-5 && within, "{found}");
-    // A rate makes the same wave.
+    // A rate has the same effect as an angle, because it is part of the same wave.
     let omega = (9.81 / plant(&p).calculated().length[0]).sqrt();
     (p.init.slosh_angle, p.init.slosh_rate) = (0.0, 0.1 / wave * omega);
     assert!((zeta(&p).0 / found - 1.0).abs() < 1e-6);
-    // A wave of 0.07 R is too small, one of 0.12 R uncovers the ring, 0.2 R covers 0.36.
+    // A wave of 0.07 R is too small for the formula, a wave of 0.12 R uncovers the ring, and a ring of 0.2 R covers
+    // 0.36 of the cross-section.
     (p.init.slosh_angle, p.init.slosh_rate) = (0.07 / wave, 0.0);
     assert!(!zeta(&p).1);
     p.init.slosh_angle = 0.12 / wave;
@@ -261,9 +265,9 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     );
 }
 
-/// The amplitude obeys a' = -zeta(a) omega a with zeta = Z a^(1/2), so that a^(-1/2) grows by Z omega/2 per unit of time.
-/// The test starts at 0.2 rad and covers ten periods. The tolerance of 1 % contains the effect of the ring on the frequency
-/// and the cubic terms of the pendulum.
+/// The amplitude fulfils a' = -zeta(a) omega a with zeta = Z a^(1/2), so that a^(-1/2) grows at the rate Z omega/2. The test
+/// starts at 0.2 rad and covers ten periods. The tolerance of 1 % includes the effect of the ring on the frequency and the
+/// cubic terms of the pendulum.
 #[test]
 fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
     for slosh in sloshing() {
@@ -278,7 +282,7 @@ fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
         for _ in 0..1000 {
             plant.step(&inputs_with_gravity(9.81), time / 1000.0).unwrap();
             let now = plant.outputs(&inputs_with_gravity(9.81)).energy;
-            assert!(now <= energy * (1.0 + 1e-12), "{slosh:?}: a ring never drives");
+            assert!(now <= energy * (1.0 + 1e-12), "{slosh:?}: the ring added energy");
             energy = now;
         }
         let left = (energy / first.energy).sqrt();
@@ -312,13 +316,13 @@ fn capillarity_centres_the_liquid_down_to_weightlessness() {
             assert!((frequency * TAU / omega - 1.0).abs() < 1e-12, "{g} {frequency}");
             plant.step(&inputs_with_gravity(g), TAU / omega / 3.0).unwrap();
             let angle = plant.outputs(&inputs_with_gravity(g)).slosh_angle;
-            // cos(120 degrees), and the third order in 1 mrad.
+            // The factor is cos(120 degrees). The tolerance includes the third order at 1 mrad.
             assert!((angle / 1e-3 + 0.5).abs() < 1e-5, "{slosh:?} {g} {angle}");
         }
     }
 }
 
-/// The drag coefficient is c = 2 zeta m omega at every g: a given ratio zeta stays the same, and the ratio of the
+/// The drag coefficient is c = 2 zeta m omega at every g. A ratio zeta that is a parameter is constant, and the ratio of the
 /// correlation varies as omega^(-1/2).
 #[test]
 fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
@@ -342,12 +346,12 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
                     .frequency[n];
             let expected = if correlation { first[n] * ratio.powf(-0.5) } else { first[n] };
             assert!((last[n] / expected - 1.0).abs() < 1e-12, "{correlation} {n} {last:?}");
-            // A start without weight has the damping that is calculated for it.
+            // A start without weight has the damping ratio that is calculated for it.
             let started = weightless.damping_ratio(n, &inputs_with_gravity(0.0))[0];
             let calculated = weightless.calculated().damping[n];
             assert!((started / calculated - 1.0).abs() < 1e-14, "{started} {calculated}");
         }
-        // And it is the ratio of the motion: the envelope over a period.
+        // The damping ratio is also that of the motion, from the envelope over a period.
         let omega = TAU * weightless.calculated().frequency[0];
         let before = plant.outputs(&inputs_with_gravity(0.0)).energy;
         plant.step(&inputs_with_gravity(0.0), 2.0 * TAU / omega).unwrap();
@@ -357,7 +361,8 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     }
 }
 
-/// For example `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the warning says so.
+/// For example, `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the reason contains the name
+/// `slosh.zeta_from_correlation`.
 #[test]
 fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
     let why = |p: &Parameters, name: &str| p.overridden(name).unwrap_or_default();
@@ -371,7 +376,7 @@ fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
     assert!(why(&p, "tank.h").contains("slosh.source = table"));
     assert!(why(&p, "slosh.zeta").contains("slosh.source = table"));
     assert_eq!(why(&p, "slosh.table.mass"), "");
-    // Rigid liquid is a part that is switched off.
+    // Parameters of slosh modes have no reason if the liquid is rigid, because this part of the model is switched off.
     p.slosh.model = SloshModel::Frozen;
     assert_eq!(why(&p, "slosh.zeta"), "");
 }
@@ -388,8 +393,8 @@ fn warnings_name_low_bond_numbers() {
     assert!(Plant::warnings(&with, &inputs_with_gravity(9.81)).is_empty());
 }
 
-/// Expected torque, with tanh(w/eps) = 1: -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of the angle), for both
-/// Stribeck laws and both directions.
+/// The expected torque, with tanh(w/eps) = 1, is -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of the angle), for both
+/// Stribeck laws and both directions of rotation.
 #[test]
 fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
     for model in [FrictionModel::Stribeck, FrictionModel::StribeckSmooth] {
@@ -416,7 +421,7 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
                 (found / expected - 1.0).abs() < 1e-14,
                 "{model:?} {omega}: {found} {expected}"
             );
-            // and along a step: a millisecond on it has changed by less than 1e-3
+            // The torque is also expected within a step; in a millisecond it changes by less than 1e-3.
             plant.step(&inputs, 1e-3).unwrap();
             let m_liq = 1000.0 * std::f64::consts::PI / 4.0 * p.tank.d * p.tank.d * p.tank.h;
             let inertia = p.hub.inertia + m_liq * p.tank.r * p.tank.r;

@@ -1,4 +1,4 @@
-//! Ranges of validity, refusals, and their messages.
+//! Tests of ranges of validity, of refused parameters, and of the messages.
 
 use super::common::bench;
 use plant::{
@@ -9,10 +9,10 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// Height of the first mode's wave at the wall over the slosh angle, in tank radii: 2/(xi_1^2 - 1).
+/// Height of the first mode's wave at the wall divided by slosh angle and tank radius: 2/(xi_1^2 - 1).
 const WAVE: f64 = 2.0 / (1.841_183_781_340_659_5 * 1.841_183_781_340_659_5 - 1.0);
 
-/// By the thesis (2.3.5) slosh is linear for waves below 0.15 R and nonlinear above 0.25 R.
+/// By Rubaga's thesis (section 2.3.5) slosh is linear for waves below 0.15 R and nonlinear above 0.25 R.
 #[test]
 fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
     let regime = |ratio: f64| {
@@ -36,8 +36,8 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
     }
 }
 
-/// The law holds if the stroke of the liquid at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 times the width of the ring,
-/// and the ring stays covered by liquid.
+/// The damping law of the baffle is valid if the stroke of the liquid at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 times
+/// the width of the ring and the ring stays covered by liquid.
 #[test]
 fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
     let within = |width: f64, depth: f64, wave: f64| {
@@ -51,13 +51,13 @@ fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
         o.discrete.baffle_in_range
     };
     let left = (-1.84f64 * 0.03 / 0.0815).exp();
-    // The amplitude has a floor, 4e-4 of the wave where the range begins.
+    // The constant A_0 in the amplitude adds 4e-4 to a wave at the lower end of the range.
     let smallest = 0.64 * 0.008 / left;
     assert!(!within(0.008, 0.03, smallest * 0.998) && within(0.008, 0.03, smallest * 1.002));
     let largest = 6.4 * 0.002 / left;
     assert!(within(0.002, 0.03, largest * 0.998) && !within(0.002, 0.03, largest * 1.002));
     assert!(within(0.008, 0.02, 0.01999) && !within(0.008, 0.02, 0.02001), "covered");
-    // alpha = w/R (2 - w/R) = 0.25 at w/R = 1 - sqrt(0.75)
+    // alpha = w/R (2 - w/R) is 0.25 at w/R = 1 - sqrt(0.75).
     let widest = 0.0815 * (1.0 - 0.75f64.sqrt());
     assert!(within(widest * 0.999, 0.03, 0.025) && !within(widest * 1.001, 0.03, 0.025));
 }
@@ -67,7 +67,7 @@ fn warnings_name_formulas_outside_their_range() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     let warnings = |p: &Parameters, g: f64| Plant::warnings(p, &inputs_with_gravity(g));
     assert!(warnings(&p, 9.81).is_empty());
-    // 1000 0.0815^2 g/0.07213 = 92.1 g
+    // The Bond number is 1000 0.0815^2 g/0.07213 = 92.1 g.
     assert!(warnings(&p, 1.08).len() == 1 && warnings(&p, 1.09).is_empty(), "Bond number 100");
     let weightless = warnings(&p, 0.0);
     assert!(weightless[0].contains("nothing restores or damps slosh mode 1"), "{weightless:?}");
@@ -91,7 +91,7 @@ fn warnings_name_formulas_outside_their_range() {
     assert!(all.len() == 1 && all[0].contains("upright cylinder"), "{all:?}");
     p.baffle.width = 0.0;
     assert!(warnings(&p, 9.81).is_empty());
-    // Weightless, but centred.
+    // The tank is weightless, but a stiffness centres the liquid.
     p.slosh.table.k[0] = 1.0;
     assert!(warnings(&p, 0.0).is_empty());
 }
@@ -107,10 +107,10 @@ fn a_ring_wider_than_the_tank_or_below_its_bottom_is_refused() {
     assert_eq!(problems(|_| {}), 0);
     assert_eq!(problems(|p| p.baffle.width = 0.0815), 1);
     assert_eq!(problems(|p| p.baffle.depth = 0.1), 1);
-    assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "there is none");
+    assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "no baffle");
 }
 
-/// The masses in the table add up to the mass of the liquid if they differ from it by at most 1e-9.
+/// If the masses in the table differ from the mass of the liquid by at most 1e-9, the fixed mass is 0.
 #[test]
 fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -127,8 +127,8 @@ fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     assert!((plant.calculated().m_0 - 0.05).abs() < 1e-15);
 }
 
-/// The sum of the squared sines of the two start angles is the squared distance of the slosh mass from the vertical through
-/// its hinge, relative to the length; it must be less than 1.
+/// The sum of the squared sines of the two initial angles is the squared distance of the slosh mass from the vertical
+/// through its hinge, divided by the squared length. It must be less than 1.
 #[test]
 fn a_spherical_bob_starts_below_the_horizontal() {
     let refused = |radial: f64, tangential: f64| {
@@ -136,14 +136,14 @@ fn a_spherical_bob_starts_below_the_horizontal() {
         (p.init.slosh_angle_radial, p.init.slosh_angle) = (radial, tangential);
         Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9).is_err()
     };
-    // 45 degrees each are 90 together.
+    // 45 degrees in each direction together put the slosh mass at the horizontal.
     assert!(!refused(0.78, 0.78) && !refused(-0.78, 0.78) && refused(0.79, -0.79));
     assert!(!refused(1.55, 0.0) && refused(1.57, 0.0) && !refused(0.0, 1.55) && refused(0.0, 1.57));
     assert!(refused(0.9, 0.9), "beyond");
 }
 
-/// At h/R = 0.2 the coefficient s is -38.7, so that hub and liquid together would have no positive inertia at amplitudes
-/// that depend on the hub. Near the secondary resonances at 0.829 and 1.012 the coefficients are interpolated.
+/// At h/R = 0.2 the coefficient s is -38.7, so that the inertia of hub and liquid would not be positive at amplitudes that
+/// depend on the hub. Near the secondary resonances at 0.829 and 1.012 the coefficients are interpolated.
 #[test]
 fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     let said = |fill: f64, model: SloshModel| {
@@ -162,8 +162,8 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     }
 }
 
-/// For every reason the test has a plant that passes this limit, and one that is just within. The bench's cylinder has h/R
-/// = 1.227, with relative shifts of omega^2 by -0.429 and +0.367 times the squared angle.
+/// For every reason there is a plant just beyond the limit, and one just within it. The bench's cylinder has h/R = 1.227,
+/// with relative changes of omega^2 by -0.429 and +0.367 times the squared angle.
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {
@@ -180,7 +180,7 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     };
     let none_and_third = [LimitedBy::None, LimitedBy::ThirdOrder];
     for (model, limit) in [
-        // sqrt(2 0.00085/0.429), sqrt(2 0.00085/(0.429 - 0.125))
+        // The limits are sqrt(2 0.00085/0.429) and sqrt(2 0.00085/(0.429 - 0.125)).
         (SloshModel::Linear, 3.605),
         (SloshModel::Planar, 4.28),
         (SloshModel::Spherical, 4.28),
@@ -199,11 +199,11 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     };
     let rotary = [LimitedBy::None, LimitedBy::SecondaryResonance];
     assert_eq!([5.8, 6.0].map(|degrees| swirl(degrees, 1.0)), rotary);
-    assert_eq!(swirl(12.0, 0.3), LimitedBy::ThirdOrder, "a narrow ellipse");
+    assert_eq!(swirl(12.0, 0.3), LimitedBy::ThirdOrder, "the ellipse is narrow");
 
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
     (p.slosh.breaking_steepness, p.init.slosh_angle) = (0.2, 0.131);
-    // k a = 2 xi/(xi^2 - 1) A = 1.541 A
+    // The steepness is k a = 2 xi/(xi^2 - 1) A = 1.541 A.
     assert_eq!(reason(&p, 9.81), LimitedBy::Breaking);
     p.init.slosh_angle = 0.129;
     assert_eq!(reason(&p, 9.81), LimitedBy::None);
@@ -212,7 +212,7 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     p.init.omega = 5.0;
     assert_eq!(reason(&p, 9.81), LimitedBy::None);
     p.init.omega = 0.0;
-    // 92.1 g is the Bond number.
+    // The Bond number is 92.1 g.
     assert_eq!([1.08, 1.09].map(|g| reason(&p, g)), [LimitedBy::BondNumber, LimitedBy::None]);
     p.slosh.capillarity = true;
     assert_eq!(reason(&p, 0.5), LimitedBy::None);
@@ -221,8 +221,8 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     assert_eq!(reason(&p, 0.0), LimitedBy::None);
 }
 
-/// A mode of a table is out of range above the limits that the table states, if the model uses the coefficients of the
-/// table. With other models it is out of range at smaller angles.
+/// If the slosh model uses the coefficients of the table of modes, a mode is out of range above the limits in the table.
+/// With other slosh models it is out of range at smaller angles.
 #[test]
 fn a_table_of_modes_has_its_own_limits() {
     let reason = |model: SloshModel, limit: f64, degrees: f64| {
@@ -246,7 +246,7 @@ fn a_table_of_modes_has_its_own_limits() {
         [44.0, 46.0].map(|degrees| liquid(0.0, degrees)),
         [LimitedBy::None, LimitedBy::ThirdOrder]
     );
-    // sqrt(2 0.00085/|3 0.7/8 - 1.4/2|) = 3.57 degrees
+    // The limit is sqrt(2 0.00085/|3 0.7/8 - 1.4/2|) = 3.57 degrees.
     let linear = [3.55, 3.6].map(|degrees| reason(SloshModel::Linear, 10.0, degrees));
     assert_eq!(linear, [LimitedBy::None, LimitedBy::ThirdOrder]);
 }

@@ -1,6 +1,5 @@
-//! Rotary sloshing of the spherical model compared with external references: an independent
-//! unit-vector model, the analytic stability boundaries of the forced spherical pendulum, and the
-//! onset that Rubaga observed on the bench.
+//! Tests of rotary slosh of the spherical model against independent references: a model in unit vectors, the analytic
+//! stability boundaries of the forced spherical pendulum, and the onset of rotary slosh that Rubaga observed on the bench.
 
 use std::f64::consts::TAU;
 
@@ -9,9 +8,10 @@ use ode_solvers::dop853::Dop853;
 use ode_solvers::{SVector, System};
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};
 
-/// Hub and one spherical pendulum by its unit vector p: theta, w, p, p'. Newton's law of the slosh mass in the hub's frame
-/// with the rod's pull eliminated by p.p'' = -|p'|^2. The plant keeps the slosh mass's inertial velocity in place of p',
-/// and the rod's pull acts on the hub, where this takes w' from the whole angular momentum.
+/// Hub and one spherical pendulum with the unit vector p as coordinates: theta, w, p, p'. Newton's law of the slosh mass in
+/// the hub's frame, in which p.p'' = -|p'|^2 eliminates the tension of the rod. The equations of the plant differ: they
+/// have the inertial velocity of the slosh mass instead of p', and the tension acts on the hub, whereas here w' follows
+/// from the total angular momentum.
 struct UnitVector {
     i0: f64,
     m: f64,
@@ -30,7 +30,7 @@ impl System<f64, State> for UnitVector {
         let (w, p, v) = (y[1], [y[2], y[3], y[4]], [y[5], y[6], y[7]]);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (x, y_) = (r + l * p[0], l * p[1]);
-        // Specific force without w': Coriolis, centrifugal, drag, gravity.
+        // Specific force without the terms in w': Coriolis force, centrifugal force, drag, gravity.
         let f = [
             2.0 * w * l * v[1] + w * w * x - c / m * l * v[0],
             -2.0 * w * l * v[0] + w * w * y_ - c / m * l * v[1],
@@ -38,7 +38,7 @@ impl System<f64, State> for UnitVector {
         ];
         let (pf, v2) = (dot(p, f), dot(v, v));
         let acc = [0, 1, 2].map(|i| (f[i] - pf * p[i]) / l - v2 * p[i]);
-        // w' from the whole angular momentum's rate.
+        // w' follows from the derivative of the total angular momentum.
         let inner = x * (l * acc[1] + 2.0 * w * l * v[0] - w * w * y_)
             - y_ * (l * acc[0] - 2.0 * w * l * v[1] - w * w * x);
         let wd = (tau - b * w - m * inner) / (i0 + m * r * r * p[1] * p[1]);
@@ -90,33 +90,32 @@ fn stereographic_and_unit_vector_pendulums_agree_beyond_the_horizontal() {
             time = *t;
             highest = highest.max(y[4]);
             let o = plant.outputs(&inputs);
-            // Both start with 1e-13. The motion is chaotic, errors grow ninefold in
-            // 0.2 s, so that after 1.5 s some 1e-11 is left.
+            // Both simulations start with an error of 1e-13. The motion is chaotic: errors grow ninefold in 0.2 s, so that
+            // they are about 1e-11 after 1.5 s.
             assert!((o.theta - y[0]).abs() < 1e-9, "theta at {t}");
             assert!((o.omega - y[1]).abs() < 1e-9, "omega at {t}");
             assert!((o.slosh_angle.sin() - y[3]).abs() < 1e-9, "p_y at {t}");
             assert!((o.slosh_angle_radial.sin() - y[2]).abs() < 1e-9, "p_x at {t}");
         }
-        assert!(time > 1.4 && highest > 0.3, "the bob passes the horizontal: {highest}");
+        assert!(time > 1.4 && highest > 0.3, "the bob must pass the horizontal: {highest}");
     }
 }
 
-/// Returns whether a radial seed grows. The hub is too heavy to feel the liquid, and its tank is so far out
-/// that the hinge moves on a straight line: y = eps l cos(w t). The motion starts on the planar orbit of
+/// Returns true if a small radial displacement grows. The hub is too heavy for the liquid to move it, and the tank is so far
+/// from the axis that the hinge moves on a straight line: y = eps l cos(w t). The motion starts on the planar orbit with the
 /// amplitude a eps^(1/3), mu a + a^3/8 + 1 = 0.
 fn leaves_the_plane(eps: f64, mu: f64) -> bool {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.tank.r = 1000.0;
     p.hub.inertia = 1e12;
-    // This damping is large enough to end the initial transient and too small to move the
-    // boundaries. The growth that overcomes it, zeta w, shifts mu by about (2 zeta / eps^(2/3))^2 =
-    // 4e-4.
+    // This damping is large enough to end the initial transient and too small to move the boundaries. A growth rate that
+    // exceeds it, zeta w, shifts mu by about (2 zeta/eps^(2/3))^2 = 4e-4.
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 1e-4;
     let l = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().calculated().length[0];
     let w = (9.81 / l).sqrt() * (1.0 + mu * eps.powf(2.0 / 3.0)).sqrt();
-    // The planar branch that exists on both sides of the boundary: above resonance the
-    // bob is in antiphase (a < 0), below it in phase (the smallest positive root).
+    // The planar branch that exists on both sides of the boundary: above resonance the bob is in antiphase (a < 0), below
+    // resonance it is in phase (the smallest positive root).
     let cubic = |a: f64| mu * a + a * a * a / 8.0 + 1.0;
     let (mut low, mut high) = if mu > 0.0 { (-3.0, 0.0) } else { (0.0, 1.6) };
     for _ in 0..60 {
@@ -125,14 +124,15 @@ fn leaves_the_plane(eps: f64, mu: f64) -> bool {
         if (cubic(middle) > 0.0) == rises { high = middle } else { low = middle }
     }
     let amplitude = low * eps.powf(1.0 / 3.0);
-    // Hub: theta = eps l cos(w t)/r up to a constant, so omega(0) = 0 and the torque
-    // moves a known inertia.
+    // The hub moves as theta = eps l cos(w t)/r up to a constant, so that omega(0) = 0, and the torque follows
+    // from its known inertia.
     let inertia = p.hub.inertia;
     let torque = |t: f64| -inertia * eps * l / p.tank.r * w * w * (w * t).cos();
     p.init.slosh_angle = amplitude;
     p.init.slosh_angle_radial = 1e-5;
     let h = TAU / w / 16.0;
-    // Chords lose (w h)^2/12 of the sine; raised knots give it back.
+    // Straight lines between the knots of a sine lose (w h)^2/12 of its amplitude; the values at the knots are increased
+    // to compensate for this.
     let raise = (w * h / 2.0 / (w * h / 2.0).sin()).powi(2);
     let mut plant = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
     let cycles = 4000;
@@ -152,10 +152,9 @@ fn leaves_the_plane(eps: f64, mu: f64) -> bool {
 
 #[test]
 fn forced_pendulum_loses_planar_stability_at_the_analytic_boundaries() {
-    // Limits for eps -> 0: (5/8)(4/3)^(2/3) = 0.75714 and -(3/8) 4^(2/3) = -0.94494.
-    // Numerically, by shooting and Floquet multipliers, at eps = 1e-3: 0.760748 and
-    // -0.932806. The start is good to eps^(2/3) = 1 % of the amplitude and growth near
-    // a boundary is slow, so it is bracketed to 0.02.
+    // The limits for eps -> 0 are (5/8)(4/3)^(2/3) = 0.75714 and -(3/8) 4^(2/3) = -0.94494. Shooting and Floquet multipliers
+    // give 0.760748 and -0.932806 at eps = 1e-3. The initial amplitude has an error of eps^(2/3) = 1 %, and growth near a
+    // boundary is slow, so that each boundary is bracketed to 0.02.
     let eps = 1e-3;
     for (stable, unstable) in [(0.7607 + 0.02, 0.7607 - 0.02), (-0.9328 - 0.02, -0.9328 + 0.02)] {
         assert!(!leaves_the_plane(eps, stable), "planar at mu = {stable}");
@@ -183,9 +182,9 @@ fn swirl(p: &Parameters, frequency: f64, amplitude: f64) -> f64 {
 
 #[test]
 fn a_steady_sine_makes_slosh_rotary_between_50_and_60_millinewton_metres() {
-    // The thesis's author saw no rotation at 0.05 N m, a weak one at 0.075, a clear one
-    // from 0.1 on (appendix A). Planar motion has a radial share of second order, less than
-    // a per cent; rotary motion is a cone.
+    // The author of the thesis saw no rotation at 0.05 N m, a weak rotation at 0.075 N m, and a clear rotation from
+    // 0.1 N m on (appendix A). Planar motion has a radial component of second order, less than one per cent; rotary
+    // motion is a cone.
     for (h, frequency) in [(0.10, 2.435), (0.05, 2.210)] {
         let mut p = bench(SloshModel::Spherical, FrictionModel::Stribeck);
         p.tank.h = h;

@@ -1,4 +1,4 @@
-//! Cost and accuracy of a step.
+//! Tests of the cost and the accuracy of steps.
 
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, STATES, SloshModel, StepError};
@@ -43,14 +43,14 @@ fn errors_of_states_stay_within_the_solver_tolerance() {
                 let found = after(&p, &inputs, tolerance, 2.0);
                 let off = found.iter().zip(exact).map(|(a, b)| (a - b).abs());
                 let off = off.fold(0.0, f64::max);
-                // Rates of 3 rad/s; a step is allowed a hundredth of the tolerance.
+                // The test is for rates of 3 rad/s; a step may have an error of a hundredth of the tolerance.
                 assert!(off < 0.1 * tolerance, "{slosh:?} {friction:?} {tolerance:e}: {off:e}");
             }
         }
     }
 }
 
-/// Angle, rate and energies of a hub without liquid and friction under a ramp of torque are polynomials of time.
+/// Angle, rate and energies of a hub without liquid and friction, under a ramp of torque, are polynomials of time.
 #[test]
 fn internal_steps_are_the_same_for_long_and_short_communication_steps() {
     let p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -59,9 +59,9 @@ fn internal_steps_are_the_same_for_long_and_short_communication_steps() {
     assert_eq!(long, short);
 }
 
-/// Numbers of internal steps by slosh model and friction law, each in the order of its numbers, at the
-/// tolerances 1e-5 and 1e-10. More would be slower, fewer less exact; a deviation of one in twenty is
-/// rounding.
+/// Expected numbers of internal steps by slosh model and friction law, in the order of their numbers, at the
+/// tolerances 1e-5 and 1e-10. More steps would be slower, and fewer less exact. Because of rounding, a deviation of
+/// one in twenty is accepted.
 const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
     [[7, 12], [7, 12], [34, 56], [16, 29], [174, 194]],
@@ -86,12 +86,12 @@ fn a_second_takes_few_internal_steps() {
     let rows: String = found.iter().map(|row| format!("    {row:?},\n")).collect();
     assert!(
         pairs.all(is_near),
-        "the counts differ from STEPS; if the change means it, put these rows there:\n{rows}"
+        "the numbers of steps differ from STEPS; if the change is intended, replace the rows by:\n{rows}"
     );
 }
 
-/// The tolerance is relative to the size of the motion, so that on a hub at rest small waves take no more steps than large
-/// ones.
+/// The tolerance is relative to the size of the motion, so that small waves on a hub at rest take no more steps than large
+/// waves.
 #[test]
 fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     for slosh in SloshModel::ALL {
@@ -105,8 +105,8 @@ fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     }
 }
 
-/// The hub is too heavy to move. The allowed error takes both angles and rates into account, so that a motion that starts at
-/// an angle (with the rate 0) needs no more steps than a motion that starts with a rate.
+/// The hub is too heavy to move. The scale of the allowed error includes both angles and rates, so that a motion that starts
+/// at an angle with the rate 0 needs no more steps than a motion that starts with a rate.
 #[test]
 fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     for slosh in SloshModel::ALL {
@@ -122,8 +122,8 @@ fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     }
 }
 
-/// At eight times the Stribeck speed the additional friction of Stribeck's law is below 1e-30, invisible to any tolerance.
-/// A long step from there to rest must still notice it.
+/// At eight times the Stribeck speed the excess friction of Stribeck's law is below 1e-30, invisible at any tolerance. A
+/// long step from this rate to rest must still take it into account.
 #[test]
 fn a_long_step_from_a_fast_hub_to_rest_equals_short_steps() {
     for friction in [FrictionModel::Stribeck, FrictionModel::StribeckSmooth] {

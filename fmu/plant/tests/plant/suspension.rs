@@ -1,5 +1,5 @@
-//! A hub that hangs from a torsion line: frequencies and decays in closed form, balances, and results that without a
-//! line are bit-identical to a hub without suspension.
+//! Tests of a hub that hangs from a torsion line: frequencies and decays in closed form, and balances. Without stiffness and
+//! damping of the line, results are bit-identical to those without suspension.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,7 +12,7 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &Inputs::default(), 0.0, TOLERANCE).unwrap()
 }
 
-/// Returns a bench with rigid liquid on a line of 0.5 N m/rad, twisted by 0.1 rad at the start.
+/// Returns a bench with rigid liquid on a line of 0.5 N m/rad that is twisted by 0.1 rad at the start.
 fn frozen(friction: FrictionModel) -> Parameters {
     let mut p = bench(SloshModel::Frozen, friction);
     (p.hub.k, p.hub.theta_0, p.init.theta) = (0.5, -0.2, -0.1);
@@ -24,7 +24,7 @@ fn inertia(p: &Parameters) -> f64 {
     p.hub.inertia + m_liq * p.tank.r * p.tank.r
 }
 
-/// With `hub.k` = `hub.c` = 0 the rest angle `hub.theta_0` has no effect.
+/// If `hub.k` and `hub.c` are 0, the rest angle `hub.theta_0` has no effect.
 #[test]
 fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
     for slosh in SLOSH {
@@ -43,8 +43,8 @@ fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
     }
 }
 
-/// The expected energy of the line is k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J, to which I w^2/2 is added, and its torque
-/// is -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
+/// The expected energy is k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J of the line plus I w^2/2, and the expected torque is -k
+/// (theta - theta_0) - c w = -0.05 - 0.02 N m.
 #[test]
 fn torque_and_energy_of_the_suspension_line_follow_from_its_twist() {
     let mut p = frozen(FrictionModel::None);
@@ -55,7 +55,7 @@ fn torque_and_energy_of_the_suspension_line_follow_from_its_twist() {
     assert!((outputs.energy - kinetic - 0.0025).abs() < 1e-15, "{} {kinetic}", outputs.energy);
 }
 
-/// A rigid hub obeys I theta'' = -k (theta - theta_0) - c theta'.
+/// The motion of a hub with rigid liquid fulfils I theta'' = -k (theta - theta_0) - c theta'.
 #[test]
 fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
     for c in [0.0, 0.05] {
@@ -89,7 +89,7 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
     };
     let (r, g) = (p.tank.r, 9.81);
     let i = p.hub.inertia + (m_0 + m) * r * r;
-    // det = (k - I w2)(m g l - m l^2 w2) - (m l r w2)^2
+    // The determinant is (k - I w2)(m g l - m l^2 w2) - (m l r w2)^2.
     let a = i * m * l * l - (m * l * r).powi(2);
     let b = -(i * m * g * l + p.hub.k * m * l * l);
     let c = p.hub.k * m * g * l;
@@ -105,7 +105,7 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
         }
         let o = plant.outputs(&Inputs::default());
         for (got, start) in [(o.theta, 1e-2), (o.slosh_angle, 1e-2 * ratio)] {
-            // cos(7 2 pi/3) = -1/2
+            // The factor is cos(7 2 pi/3) = -1/2.
             assert!((got / start + 0.5).abs() < 1e-8, "{omega2}: {got} {start}");
         }
     }
@@ -118,7 +118,7 @@ fn dry_friction_stops_a_hub_on_a_suspension_line_at_the_predicted_angle_and_time
     let mut p = frozen(FrictionModel::Stribeck);
     (p.friction.b, p.friction.d, p.friction.c) = (0.0, 0.0, 0.006);
     let (half, loss) = (PI * (inertia(&p) / p.hub.k).sqrt(), 2.0 * p.friction.c / p.hub.k);
-    // 0.1 -> -0.076 -> 0.052 -> -0.028 -> 0.004, within c_f/k = 0.012.
+    // The reversals are at 0.1, -0.076, 0.052, -0.028 and 0.004 rad; the last is within c_f/k = 0.012 rad.
     let mut plant = plant(&p);
     for swing in 1..=4 {
         let until = f64::from(swing) * half * (1.0 + 1e-9) - plant.time();
@@ -129,14 +129,14 @@ fn dry_friction_stops_a_hub_on_a_suspension_line_at_the_predicted_angle_and_time
         assert!((twist - expected).abs() < 1e-9, "{swing}: {twist} {expected}");
     }
     let (_, time, contact) = plant.last_contact();
-    assert_eq!(contact, 0, "held, though the line pulls");
+    assert_eq!(contact, 0, "the bearing must hold the hub against the torque of the line");
     assert!((time - 4.0 * half).abs() < 1e-8, "{time} {}", 4.0 * half);
     let before = plant.outputs(&Inputs::default());
     plant.step(&Inputs::default(), 10.0).unwrap();
     let now = plant.outputs(&Inputs::default());
     assert_eq!((now.theta, now.omega), (before.theta, 0.0));
     assert!((now.tau_friction + now.tau_suspension).abs() < 1e-15);
-    // A command that adds to the line breaks it away at the sum of both.
+    // A torque command in the direction of the line's torque breaks the hub away when their sum reaches the static friction.
     let missing = p.friction.c - now.tau_suspension.abs();
     let towards = now.tau_suspension.signum();
     for (factor, stuck) in [(1.0 - 1e-6, true), (1.0 + 1e-6, false)] {

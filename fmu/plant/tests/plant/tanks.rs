@@ -1,4 +1,4 @@
-//! Tanks of any shape through a table of modes.
+//! Tests of tanks of any shape, whose modes are given by a table.
 
 use super::common::{SLOSHING, bench};
 use formulas::{cylinder, third_order};
@@ -30,7 +30,8 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// Tests the table with and without a wave height, whose default is the wave height of a cylinder with the diameter tank.d.
+/// The table is tested with and without a wave height; its default is the wave height of a cylinder with the diameter
+/// tank.d.
 #[test]
 fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {
@@ -47,7 +48,7 @@ fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
         let (s, kappa) = third_order::coefficients(p.tank.h / (p.tank.d / 2.0));
         (p.slosh.table.nonlinear_inertia[0], p.slosh.table.nonlinear_stiffness[0]) = (s, kappa);
         assert_eq!(run(&p), expected, "{model:?}");
-        // Waves of another height, and nothing else.
+        // Only the wave heights differ.
         p.slosh.table.wave[..3].copy_from_slice(&[0.1, 0.2, 0.3]);
         for (a, b) in run(&p).iter().zip(&expected) {
             assert_eq!((a.omega, a.slosh_angle), (b.omega, b.slosh_angle));
@@ -111,7 +112,7 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
     };
     one(|p| p.slosh.table.frequency[0] = 1.0, "set one of the two above 0");
     one(|p| p.slosh.table.length.swap(0, 1), "order of their frequencies");
-    // A stiffness counts: omega^2 = g/l + k/m.
+    // The stiffness k contributes to the frequency: omega^2 = g/l + k/m.
     one(|p| p.slosh.table.k[0] = 1000.0, "order of their frequencies");
     assert!(refused(|p| (p.slosh.table.length[1], p.slosh.table.k[1]) = (0.1, 20.0)).is_empty());
     one(|p| p.slosh.table.m_liq *= 0.1, "add up to");
@@ -124,8 +125,8 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
     );
 }
 
-/// Liquid that the walls of the tank take along in a rotation (`tank.I_own`) adds to the inertia of the hub, wherever the
-/// tank is.
+/// Liquid that rotates with the walls of the tank (`tank.I_own`) adds to the inertia of the hub, independent of the tank's
+/// position.
 #[test]
 fn the_tanks_own_inertia_is_turned_with_the_hub() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -134,7 +135,7 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
         p.tank.r = r;
         p.tank.own_inertia = 0.002;
         let o = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap().outputs(&inputs);
-        // pi/4 d^2 h of water, rigid, on its circle
+        // pi/4 d^2 h of rigid water moves on the circle of radius r.
         let m = 1000.0 * core::f64::consts::FRAC_PI_4 * 0.163 * 0.163 * 0.10;
         let inertia = p.hub.inertia + 0.002 + m * r * r;
         assert!((o.omega_dot * inertia / 1e-3 - 1.0).abs() < 1e-12, "{r} {}", o.omega_dot);
@@ -143,8 +144,8 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
     }
 }
 
-/// If the table has only the modes along one axis of a box, models in which the liquid also moves along the other axis are
-/// refused, because a box has other modes there.
+/// If the table contains only the modes along one axis of a box, slosh models in which the liquid also moves along the other
+/// axis are refused, because the modes along this axis are different.
 #[test]
 fn modes_along_one_axis_are_refused_where_the_liquid_moves_along_both() {
     for model in SloshModel::ALL {

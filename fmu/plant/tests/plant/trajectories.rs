@@ -1,9 +1,9 @@
 //! Compares the plant with trajectories of known accuracy.
 //!
-//! `trajectories.json` has 20 s runs by two independent high-order integrators (the linear model by
-//! a 60-digit matrix exponential), sampled every second. Each record has its number of valid digits
-//! (`digits`, relative to the signal's largest value, `largest`). `events` are [time, contact] of
-//! the set-valued friction law, beginning with the contact at the start.
+//! `trajectories.json` contains motions of 20 s, sampled every second, that were computed by two independent integrators of
+//! high order (for the linear model by a 60-digit matrix exponential). Each record contains its number of valid digits
+//! (`digits`, relative to `largest`, the largest value of the signal). `events` are pairs [time, contact] of the set-valued
+//! friction law, and begin with the contact at the start.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -68,14 +68,13 @@ impl Fill {
         p
     }
 
-    /// Returns the communication step, s, and the torque at the communication points. A pulse and a
-    /// release are exact. A sine that is passed as straight lines would lose (w H)^2/12 of its
-    /// amplitude; values multiplied by 1/sinc^2(f H) give the lines the fundamental of the sine
-    /// itself.
+    /// Returns the communication step, s, and the torque at the communication points. A pulse and a release are exact. A
+    /// sine that is replaced by straight lines would lose (w H)^2/12 of its amplitude; therefore the values are multiplied
+    /// by 1/sinc^2(f H), so that the fundamental of the lines is the sine.
     fn input<'a>(&'a self, run: &'a Run) -> (f64, impl Fn(f64) -> f64 + 'a) {
         let step = match run.input.as_str() {
-            // Stick and slip begin when the torque itself, not its fundamental,
-            // passes a level: 1e-7 s needs (w H)^2/8 of it small.
+            // Stick and slip begin when the torque itself, and not its fundamental, passes a level. For an error of 1e-7 s
+            // the step must be so small that (w H)^2/8 of the torque is negligible.
             "sine_0p1" if run.friction == "stribeck" => 1e-4,
             "sine_0p1" => 1e-3,
             _ => 0.02,
@@ -112,7 +111,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             _ => fill.l * o.slosh_angle.cos() * o.slosh_rate,
         };
         for (signal, samples) in &run.samples {
-            // A spherical release under no friction never moves radially to speak of.
+            // Without friction a released spherical pendulum has almost no radial motion.
             let scale = run.largest[signal].max(1e-12);
             let error = (value(signal) - samples[second]).abs() / scale;
             let worst = largest_error.entry(signal).or_default();
@@ -132,7 +131,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             let (a, b) = (torque(k as f64 * step), torque((k + 1) as f64 * step));
             inputs.tau_cmd =
                 if is_pulse { Ramp::held(a) } else { Ramp { value: a, slope: (b - a) / step } };
-            // Halves, so that two events rarely share one.
+            // Half steps are taken, so that two events are rarely in the same step.
             for _ in 0..2 {
                 plant.step(&inputs, step / 2.0).unwrap();
                 inputs.tau_cmd.value = inputs.tau_cmd.value_at(step / 2.0);
@@ -140,7 +139,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
                 if o.discrete.event_count as usize == events.len() {
                     events.push((o.discrete.event_time, o.discrete.friction_mode));
                 } else if o.discrete.event_count as usize > events.len() {
-                    // Two events in one step: only the later one can be read.
+                    // If there were two events in one step, only the later one can be read.
                     events.push((f64::NAN, 2));
                     events.push((o.discrete.event_time, o.discrete.friction_mode));
                 }
@@ -148,13 +147,13 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             inputs.tau_cmd = Ramp::held(b);
         }
     }
-    // The claimed accuracy is 1e-8. The sine's chords lose up to (w H)^2/12 = 1.8e-5 at 1 ms before
-    // the knots are raised, and leave higher harmonics of that size / 1e3.
+    // The reference is exact to 1e-8. Straight lines between the knots of the sine would lose up to (w H)^2/12 = 1.8e-5 at 1
+    // ms; with increased knots, harmonics of a thousandth of this remain.
     let allowed = f64::max(1e-8, 10f64.powf(-run.digits));
     let mut wrong: Vec<String> = largest_error
         .iter()
         .filter(|(_, error)| **error > allowed || error.is_nan())
-        .map(|(signal, error)| format!("{name}: {signal} is off by {error:.1e} of its maximum"))
+        .map(|(signal, error)| format!("{name}: error of {signal} is {error:.1e} of its maximum"))
         .collect();
     if run.friction == "stribeck" {
         if events.len() != run.events.len() {
@@ -186,7 +185,7 @@ fn check(model: &str, tolerance: f64) {
             runs += 1;
         }
     }
-    assert!(runs >= 20, "the reference has at least 20 runs of every model");
+    assert!(runs >= 20, "the reference must contain at least 20 runs of every model");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
