@@ -1,11 +1,11 @@
-//! Common parts of the C interfaces of all FMI versions: status of a call, the host's logger, texts and
-//! arrays, handles of instances and saved states. Panics end here; a panic makes the instance unusable.
+//! Common parts of the C interfaces of all FMI versions: status of a call, the host's logger, texts and arrays, handles of
+//! instances and saved states. A panic does not leave the C interface; it makes the instance unusable.
 //!
-//! Pointers may be NULL wherever the standard does not forbid it, and mostly also where it does.
+//! Pointers may be NULL wherever the FMI standard does not forbid it, and in most other places as well.
 
 #![allow(unsafe_code)]
-// The safety contract of every function is the FMI standard's: a handle comes from this FMU and is
-// not yet freed, arrays have the lengths given, strings end with NUL.
+// The safety contract of every function is that of the FMI standard: a handle comes from this FMU and is not yet freed,
+// arrays have the given lengths, and strings end with NUL.
 #![allow(clippy::missing_safety_doc)]
 
 use std::any::Any;
@@ -22,14 +22,14 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of an FMI function, which tells the host whether the call succeeded: [`OK`],
-/// [`DISCARD`], [`ERROR`] or [`FATAL`].
+/// Return value of an FMI function, by which the host learns if the call has succeeded: [`OK`], [`DISCARD`], [`ERROR`] or
+/// [`FATAL`].
 pub type Status = c_int;
 /// The call succeeded.
 pub const OK: Status = 0;
 /// Status with which warnings are sent to the host's log; no function returns it.
 pub const WARNING: Status = 1;
-/// The FMU cannot compute the result, and the instance is unchanged.
+/// The FMU cannot compute the result of the call, and the instance is unchanged.
 pub const DISCARD: Status = 2;
 /// The call was refused or has failed.
 pub const ERROR: Status = 3;
@@ -47,12 +47,12 @@ fn status(severity: Severity) -> Status {
 /// The host's logger, independent of the FMI version: status, category, message.
 pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 
-/// Sends messages to the host's logger.
+/// Sends the messages of one instance to the host's logger.
 #[allow(missing_docs)]
 pub struct Log {
     logger: Option<Logger>,
     pub filter: Filter,
-    /// True once the warning about the host's communication steps has been given, so that it is given only once.
+    /// True after the warning about the host's communication steps has been logged, so that it is logged only once.
     step_warned: bool,
 }
 
@@ -62,8 +62,7 @@ impl Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
 
-    /// Writes the reason why a call has failed to the host's log, under the log category for the
-    /// severity of the failure.
+    /// Writes the reason why a call has failed to the host's log. The log category follows from the severity of the failure.
     pub fn report(&self, fault: &Fault) {
         self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
     }
@@ -78,8 +77,7 @@ impl Log {
         }
     }
 
-    /// Writes a warning to the host's log that `call` has had a side effect, which `effect`
-    /// describes.
+    /// Writes a warning to the host's log that `call` has had the side effect that `effect` describes.
     #[cold]
     pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
         self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));
@@ -97,7 +95,7 @@ impl Log {
         }
     }
 
-    /// Logs the last event if events have occurred since the number of events was `before`.
+    /// Writes the last event to the host's log, if events have occurred since `before` was their number.
     #[inline(always)]
     pub fn report_event<M: Model, V: Version>(
         &self,
@@ -185,11 +183,10 @@ pub unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// Borrows the variable of the host, passed as the pointer argument `name`, into which a function
-/// writes one result.
+/// Returns the host's variable into which a function writes one result. The host passes its address as the argument `name`.
 ///
 /// # Errors
-/// If the pointer is NULL.
+/// If the address is NULL.
 pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
     unsafe { pointer.as_mut() }.ok_or_else(|| null_argument(call, name))
 }
@@ -201,16 +198,18 @@ pub fn null_argument(call: &Call, name: &str) -> Fault {
 
 // ---- Instances ----
 
-/// First word of a live component. Calls check it, so that a wrong handle gives an error instead of a crash.
+/// Constant that is part of the mark of live components. Calls check the mark, so that a wrong handle gives an error
+/// instead of a crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
-/// Returns the mark: the number that is the first word of a live component or saved state at this address. The mark depends
-/// on the model, the FMI version and the loaded copy of the library, so that handles of other FMUs, of the other FMI
-/// version or of a second copy of the library are recognised as wrong. It is computed from the address of the variable
-/// table and a digit for the version. The upper 16 bits of a mark differ from the upper 16 bits of every valid address.
+/// Returns the mark of an object of this kind at this address: the number that is the first word of a live component
+/// or saved state. The mark depends on the model, the FMI version and the loaded copy of the library, so that handles
+/// of other FMUs, of the other FMI version or of a second copy of the library are recognised as wrong. It is computed
+/// from the address of the variable table and a digit for the version. The upper 16 bits of a mark differ from those
+/// of every valid address.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
-    // Below the alignment of the table, so that the two parts do not overlap.
+    // The digit is smaller than the alignment of the table, so that it does not overlap with the table's address.
     let version = V::PREFIX.bytes().last().unwrap_or_default() & 7;
     kind ^ table ^ u64::from(version) ^ handle.addr() as u64
 }
@@ -219,14 +218,14 @@ fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
 /// handles are refused without being read.
 const LOWEST_ADDRESS: usize = 1024;
 
-/// The object to which a component handle points.
+/// The object to which the handle of a component points.
 #[repr(C)]
 #[allow(missing_docs)]
 pub struct Component<M: Model, V: Version> {
     mark: u64,
     pub instance: Instance<M, V>,
     pub log: Log,
-    /// Data that only this version of FMI keeps about the host, for example its callbacks.
+    /// Data about the host that only this version of FMI needs, for example the host's callbacks.
     pub host: V::Host<M>,
 }
 
@@ -252,8 +251,7 @@ unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bo
 
 unsafe fn free<T>(handle: *mut c_void) {
     unsafe {
-        // The mark is cleared, so that a later call with this handle is an error as long as the memory is
-        // not used again.
+        // The mark is cleared, so that a later call with this handle gives an error until the memory is used again.
         ptr::write_volatile(handle.cast::<u64>(), 0);
         drop(Box::from_raw(handle.cast::<T>()));
     }
@@ -269,8 +267,8 @@ pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     }
 }
 
-/// Runs `body` on the component behind a handle. A fault is logged and becomes the returned status; a panic
-/// makes the instance unusable.
+/// Runs `body` on the component behind a handle. If `body` fails, the fault is logged and determines the returned status. If
+/// `body` panics, the instance becomes unusable.
 #[inline]
 pub unsafe fn perform<M: Model, V: Version>(
     handle: *mut c_void,
@@ -298,8 +296,8 @@ pub unsafe fn perform<M: Model, V: Version>(
     status(fault.severity)
 }
 
-/// Runs `body` like [`perform`], but only if the instance state allows the call. It is for calls that must not
-/// look at their arguments otherwise.
+/// Runs `body` as [`perform`] does, but only if the instance state allows the call. It is for calls that must not read their
+/// arguments in other states.
 #[inline]
 pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     handle: *mut c_void,
@@ -313,8 +311,8 @@ pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     unsafe { perform(handle, call, if_allowed) }
 }
 
-/// Runs `body` like [`perform`], and logs warnings about initial parameters and inputs if the simulation starts
-/// with this call.
+/// Runs `body` as [`perform`] does. If the simulation starts with this call, logs warnings about initial parameters and
+/// inputs.
 pub unsafe fn perform_start<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -336,10 +334,10 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
 }
 
-/// Stops the standard library from printing panics, because the host's logger reports them. The hook belongs
-/// to this library's own copy of the standard library, not to the host.
+/// Stops the standard library from printing panics, because the host's logger reports them. The panic hook belongs to this
+/// library's own copy of the standard library, not to the host's.
 pub fn silence_panics() {
-    // In this crate's own tests the standard library is that of the test runner.
+    // The tests of this crate share the standard library of the test runner, whose panic messages are needed.
     #[cfg(not(test))]
     {
         static ONCE: std::sync::Once = std::sync::Once::new();
@@ -365,7 +363,7 @@ pub unsafe fn filter<M: Model>(
     Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))
 }
 
-/// Fills an array that the host passes to a getter with the values that `body` writes.
+/// Fills an array of the host, which it passes to a getter, with the values that `body` writes.
 pub unsafe fn fill<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -379,8 +377,8 @@ pub unsafe fn fill<M: Model, V: Version>(
     }
 }
 
-/// Accepts a step of the host's integrator, and tells the host whether an event must be handled now. `B` is
-/// the version's Boolean.
+/// Accepts a step of the host's integrator, and sets the host's variable that states if an event must be handled now. `B` is
+/// the Boolean type of the FMI version.
 pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     handle: *mut c_void,
     enter_event_mode: *mut B,
@@ -399,9 +397,9 @@ pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     }
 }
 
-/// Defines the C functions of one version of FMI: each as a function that is generic in the model, and
-/// together as a macro that exports them for one model under their C names. The exported macro is needed
-/// because each FMU must define these symbols itself. The first token is `$`.
+/// Defines the C functions of one version of FMI: each as a function that is generic in the model, and a macro that exports
+/// all of them for one model under their C names. The exported macro is necessary because each FMU must define these symbols
+/// itself. The first token of the input is `$`.
 macro_rules! c_functions {
     ($d:tt $export:ident, $version:ident; $(
         $(#[$doc:meta])*
@@ -452,7 +450,7 @@ pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void 
     Box::into_raw(state).cast()
 }
 
-/// Returns the saved instance behind a handle; `name` is the argument's name for messages.
+/// Returns the instance in the saved state behind a handle. `name` is the name of the argument for messages.
 ///
 /// # Errors
 ///
@@ -489,8 +487,7 @@ pub unsafe fn save_state<M: Model, V: Version>(
     Ok(())
 }
 
-/// Writes the number of bytes that a saved state has when it is serialised to the host's variable
-/// `size`.
+/// Writes the number of bytes of a serialised state to the host's variable `size`.
 pub unsafe fn serialized_size<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -506,7 +503,7 @@ pub unsafe fn serialized_size<M: Model, V: Version>(
     }
 }
 
-/// Serialises a saved state into an array of the host, which is refused if the array is too short.
+/// Writes a saved state as bytes into an array of the host. Returns an error if the array is too short.
 pub unsafe fn serialize<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -527,8 +524,8 @@ pub unsafe fn serialize<M: Model, V: Version>(
     }
 }
 
-/// Restores a saved state from bytes. The bytes must come from an instance with the same variables. The handle of the new
-/// state is only written and never read, because the host need not have initialised it.
+/// Restores a saved state from bytes, which must come from an instance with the same variables. The host's variable for the
+/// handle is only written and never read, because the host need not have initialised it.
 pub unsafe fn deserialize<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -543,16 +540,16 @@ pub unsafe fn deserialize<M: Model, V: Version>(
             let bytes = array(call, "serializedState", bytes, size)?;
             let mut saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
             component.instance.check_layout(call, &saved)?;
-            saved.extent = component.instance.extent.clone(); // bytes do not have its start values
+            saved.extent = component.instance.extent.clone(); // the bytes do not contain its start values
             ptr::write(to, new_state(saved));
             Ok(())
         })
     }
 }
 
-/// Frees a saved state and sets the handle to NULL; NULL is allowed. fmusim (0.0.39) passes the state itself
-/// instead of the handle's address. The state is then recognised by its mark, which cannot be an address, and is also
-/// freed.
+/// Frees a saved state and sets the host's handle to NULL; the handle may be NULL. fmusim (0.0.39) passes the state
+/// itself instead of the address of the handle. The state is then recognised by its mark, which cannot be an address, and
+/// is freed as well.
 pub unsafe fn free_state<M: Model, V: Version>(
     call: &Call,
     name: &str,

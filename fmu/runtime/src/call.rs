@@ -1,5 +1,5 @@
-//! Functions of FMI as data: name, the instance states in which they are allowed, and the message if they are
-//! not.
+//! Properties of the functions of FMI: name, the instance states in which they are allowed, and the error message if a
+//! call is not allowed.
 //!
 //! Each version of FMI lists its functions (see [`Version`](crate::version::Version)).
 
@@ -25,7 +25,7 @@ impl Interface {
     }
 }
 
-/// The party, host or FMU, that handles events such as the start of sticking.
+/// Who handles events, such as the start of sticking: the host or the FMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Events {
@@ -38,7 +38,7 @@ pub enum Events {
 }
 
 impl Events {
-    /// All ways to handle events, in the order of their numbers.
+    /// All values in the order of their numbers.
     pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
@@ -57,8 +57,8 @@ pub enum InstanceState {
     Failed = 6,
     /// A call has panicked. The instance can only be freed.
     Fatal = 7,
-    /// Event mode directly after initialization mode. Parameters can still be set here, because OpenModelica
-    /// does so; the next call that continues the simulation makes it an ordinary event mode.
+    /// Event mode directly after initialization mode. Parameters can still be set, because OpenModelica does so. The next
+    /// call that continues the simulation changes the state to the ordinary event mode.
     Initialized = 8,
     Configuration = 9,
     Intermediate = 10,
@@ -96,12 +96,11 @@ impl InstanceState {
         }
     }
 
-    /// Returns true if an instance with this interface and handler of events can reach this state and remain
-    /// in it.
+    /// Returns true if an instance with this interface and this handling of events can enter this state and remain in it.
     pub fn is_reachable(self, interface: Interface, events: Events) -> bool {
         match self {
             InstanceState::Stepping => interface == Interface::CoSimulation,
-            // These states exist only during calls; they are never saved.
+            // These states exist only during a call and are never saved.
             InstanceState::Configuration | InstanceState::Intermediate => false,
             InstanceState::Continuous => interface == Interface::ModelExchange,
             InstanceState::Event | InstanceState::Initialized => events != Events::InStep,
@@ -114,22 +113,21 @@ impl InstanceState {
     }
 }
 
-/// C types in which values are read and set.
+/// C types of the values that a function reads or sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum CType {
     Real,
     Integer,
-    /// Enumeration, in FMI versions with a type of their own for it.
+    /// Enumeration, in FMI versions that have functions of their own for it.
     Enumeration,
-    /// Structural parameter, in FMI versions with a type of their own for it.
+    /// Structural parameter, in FMI versions that have functions of their own for it.
     Size,
     Boolean,
     String,
 }
 
-/// Sets of instance states in which a function is allowed. A set is an integer with one bit per
-/// state.
+/// Sets of instance states in which a function is allowed. A set is an integer with one bit for each state.
 #[allow(missing_docs)]
 pub(crate) mod states {
     use super::InstanceState;
@@ -141,7 +139,7 @@ pub(crate) mod states {
     pub const C: u16 = InstanceState::Continuous.bit();
     pub const T: u16 = InstanceState::Terminated.bit();
     pub const F: u16 = InstanceState::Failed.bit();
-    /// All states except fatal.
+    /// All states except `Fatal`.
     pub const ANY: u16 = I | M | S | E | C | T | F;
     /// All states in which the simulation has started.
     pub const RUN: u16 = S | E | C | T | F;
@@ -153,7 +151,7 @@ pub(crate) mod states {
 /// A function of one version of FMI and the conditions under which it may be called.
 #[derive(Debug)]
 pub struct Call {
-    /// Name of the function, with which its messages begin.
+    /// Name of the function, with which error messages begin.
     pub name: &'static str,
     allowed: u16,
     /// The C type of the values if the function reads or sets values of variables; `None` for all
@@ -167,11 +165,11 @@ impl Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// Checks that the host may make this call with the interface, the handler of events and the
-    /// present state of the instance.
+    /// Checks that the host may make this call, for the interface, the handling of events and the present state of the
+    /// instance.
     ///
     /// # Errors
-    /// If it may not; the message names the instance states in which it may.
+    /// If the call is not allowed; the message contains the instance states in which it is allowed.
     #[inline]
     pub fn check(
         &self,
@@ -213,7 +211,7 @@ impl Call {
         let possible = InstanceState::ALL
             .iter()
             .filter(|s| s.is_reachable(interface, events) || passing.contains(s));
-        // For a host the first event mode is like any other.
+        // The message does not distinguish the first event mode from any other.
         let possible = possible.filter(|s| **s != InstanceState::Initialized);
         let allowed: Vec<_> =
             possible.filter(|s| self.allowed & s.bit() != 0).map(|s| s.name()).collect();
@@ -224,13 +222,14 @@ impl Call {
         )))
     }
 
-    /// Returns a fault with the status Error: the call was refused or has failed.
+    /// Returns a fault with the status Error, because the call was refused or has failed.
     #[cold]
     pub fn error(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
     }
 
-    /// Returns a fault with the status Discard: the result of the call cannot be computed, and the instance is unchanged.
+    /// Returns a fault with the status Discard, because the result of the call cannot be computed and the instance is
+    /// unchanged.
     #[cold]
     pub fn discard(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Discard, text: format!("{}: {why}", self.name) }
@@ -261,9 +260,9 @@ pub enum Severity {
 /// The reason why a call has failed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// Determines the status that the function returns.
+    /// Severity, from which the returned status of the function follows.
     pub severity: Severity,
-    /// Message for the log: the function, the variable, and the allowed values.
+    /// Message for the log, with the function, the variable, and the allowed values.
     pub text: String,
 }
 

@@ -1,29 +1,29 @@
 //! The clock of an instance. Times of the host are compared only here, with one tolerance.
 //!
-//! A host may multiply (k h), accumulate (t += h) or convert counters, may start at 1e9 s, and may be off by
-//! a few units in the last place. The simulation must not depend on that: in Co-Simulation the host's time is
-//! only a label for an instant, and a model that needs the time since the start adds up the step sizes.
+//! A host may multiply (k h), accumulate (t += h) or convert counters, may start at 1e9 s, and its time may have errors of a
+//! few units in the last place. The simulation must not depend on these errors: in Co-Simulation the host's time is only a
+//! label of an instant, and a model that needs the time since the start adds up the step sizes.
 
 use crate::call::Interface;
 use crate::number::{is_finite, text};
 
-/// Allowed drift of the clock of a host that accumulates step sizes, as a fraction of the time since the
-/// start: after 1e7 steps of 0.1 s such a clock is off by 2e-10.
+/// Allowed drift of the clock of a host that accumulates step sizes, as a fraction of the time since the start. After 1e7
+/// steps of 0.1 s the drift of such a clock is 2e-10.
 const DRIFT: f64 = 1e-9;
 
-/// Allowed rounding error of a host's time, relative to the largest number from which it is computed: 8 to 16
-/// units in the last place.
+/// Allowed rounding error of a host's time, relative to the largest number from which the time is computed: 8 to 16 units
+/// in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// An instant for the model.
+/// An instant of the simulation, as a model receives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// Time by the host's clock, s. Messages and outputs name the instant by this time.
+    /// Time of the host's clock, s, by which messages and outputs state the instant.
     pub time: f64,
     /// Time since the start of the simulation, s, in Model Exchange. `None` in Co-Simulation, where
     /// the model adds up the step sizes instead.
     pub since_start: Option<f64>,
-    /// Times of the host that differ by less than this are equal, s.
+    /// Times of the host that differ by less than this, s, count as equal.
     pub resolution: f64,
 }
 
@@ -33,33 +33,32 @@ pub(crate) struct Clock {
     pub stop: Option<f64>,
     /// The host's time, s.
     pub time: f64,
-    /// True in Model Exchange, where the host sets the time, and false in Co-Simulation, where steps advance it.
+    /// True in Model Exchange, where the host sets the time. False in Co-Simulation, where steps advance it.
     pub is_hosts: bool,
-    /// Time of the last event, s. In Model Exchange the host may not go back before it.
+    /// Time of the last event, s, before which a Model Exchange host may not go back.
     pub last_event: f64,
 }
 
 impl Clock {
-    /// Returns a clock that shows the time `start`, s. `stop` is the end of the experiment, s, if
-    /// the host gives one.
+    /// Returns a clock at the time `start`, s. `stop` is the end of the experiment, s, if the host has set one.
     pub fn new(interface: Interface, start: f64, stop: Option<f64>) -> Clock {
         let is_hosts = interface == Interface::ModelExchange;
         Clock { start, stop, time: start, is_hosts, last_event: f64::NEG_INFINITY }
     }
 
-    /// Returns the present instant, that is, the present time with its resolution.
+    /// Returns the present instant: the present time and its resolution.
     pub fn now(&self) -> Instant {
         self.at(self.time, 0.0)
     }
 
-    /// Returns the instant before a step of size `h` (s) from the host's time `time` (s).
+    /// Returns the instant at the start of a step of size `h` (s), at the host's time `time` (s).
     pub fn at(&self, time: f64, h: f64) -> Instant {
         let resolution = self.resolution(time).max(self.resolution(time + h));
         let since_start = self.is_hosts.then_some(time - self.start);
         Instant { time, since_start, resolution }
     }
 
-    /// Returns the difference, s, below which two times of the host near `time` are equal.
+    /// Returns the difference, s, below which two times of the host near `time` count as equal.
     fn resolution(&self, time: f64) -> f64 {
         ROUNDING * self.start.abs().max(time.abs())
     }
@@ -70,7 +69,7 @@ impl Clock {
         DRIFT * (time - self.start).abs().max(h) + self.resolution(time)
     }
 
-    /// Returns true if two times of the host, s, are equal within rounding.
+    /// Returns true if two times of the host, s, are equal except for rounding.
     pub fn is_same(&self, a: f64, b: f64) -> bool {
         (a - b).abs() <= self.resolution(a)
     }
@@ -83,7 +82,7 @@ impl Clock {
     /// Checks that the host may make a step of size `h`, s, from the time `at`, s.
     ///
     /// # Errors
-    /// If such a step is not allowed; the text is the reason.
+    /// If the step is not allowed; the text is the reason.
     #[inline(always)]
     pub fn check_step(&self, at: f64, h: f64) -> Result<(), String> {
         if !(is_finite(h) && h > 0.0) {
@@ -106,11 +105,10 @@ impl Clock {
         }
     }
 
-    /// Checks a time that the host sets. `goes_back` says that a time before the last event is allowed, as in FMI 2.0.
+    /// Checks a time that the host sets. If `goes_back` is true, a time before the last event is allowed, as in FMI 2.0.
     ///
     /// # Errors
-    ///
-    /// If this time cannot be set; the text is the reason.
+    /// If this time is not allowed; the text is the reason.
     pub fn check_time(&self, time: f64, goes_back: bool) -> Result<(), String> {
         if !is_finite(time) {
             return Err(format!("time = {} s (allowed: any finite number)", text(time)));
@@ -125,8 +123,7 @@ impl Clock {
         Ok(())
     }
 
-    /// Returns the stop time, s, if the present time is after it by more than a clock's rounding
-    /// error.
+    /// Returns the stop time, s, if the present time is later by more than the rounding error of a clock.
     pub fn passed_stop(&self) -> Option<f64> {
         self.stop.filter(|stop| self.time > stop + self.tolerance(*stop, 1.0))
     }

@@ -4,12 +4,12 @@ use std::fmt::Debug;
 
 pub use crate::clock::Instant;
 
-/// Reason why the model could not compute a step, as a text for the user.
+/// Reason why a model could not compute a step, as a text for the user.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct StepFailure {
     pub text: String,
-    /// True if the step may succeed when the host tries it again with a shorter length.
+    /// True if the step may succeed if the host tries it again with a smaller size.
     pub shorter_may_succeed: bool,
 }
 
@@ -20,7 +20,7 @@ impl From<&str> for StepFailure {
     }
 }
 
-/// Instant at which a step of [`Model::step_to_event`] has ended.
+/// How a step of [`Model::step_to_event`] has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum StepEnd {
@@ -34,35 +34,33 @@ pub enum StepEnd {
 
 /// A dynamic system with inputs, parameters, continuous states and events.
 ///
-/// A clone is a saved state, so a model must keep no data elsewhere. Times are in s. Functions that a smooth
-/// model without events does not need have a default.
+/// A clone of the model is a saved state, so that a model must not keep data elsewhere. Times are in s. Functions that a
+/// smooth model without events does not need have a default implementation.
 pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// All parameters of the model; their default values are the start values.
     type Parameters: Clone + Debug + Default;
-    /// All inputs, each with its present value and its slope over the step; the default has the start values
+    /// All inputs, each with its present value and its slope over the step. The default contains the start values,
     /// and slopes of 0.
     type Inputs: Copy + Debug + Default;
-    /// Everything that follows from states and inputs at one instant. The same type holds the derivatives of
-    /// the outputs in a direction.
+    /// All values that follow from states and inputs at one instant. The same type contains the directional
+    /// derivatives of the outputs.
     type Outputs: Copy + Debug;
-    /// Discrete values that inputs can change immediately; `()` for a model without events.
+    /// Discrete values that a change of inputs can change immediately; `()` for a model without events.
     type Discrete: Default;
 
-    /// True if outputs depend on the inputs' slopes too, for example because an output is a time
-    /// derivative.
+    /// True if outputs also depend on the inputs' slopes, for example because an output is a time derivative.
     const OUTPUTS_USE_SLOPES: bool = false;
 
-    /// Name of the parameter that counts the elements with event indicators, for example the tanks.
-    /// Each element has the same number of indicators, and the indicators are in the order of the
-    /// elements. `None` if the number of indicators does not depend on a parameter.
+    /// Name of the parameter that counts the elements that have event indicators, for example the tanks. Each element
+    /// has the same number of indicators, in the order of the elements. `None` if the number of indicators does not
+    /// depend on a parameter.
     const INDICATORS_OF: Option<&'static str> = None;
 
-    /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is
-    /// relative.
+    /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is the relative
+    /// tolerance of the integration.
     ///
     /// # Errors
-    ///
-    /// Everything that is wrong with combinations of parameters; single parameters are in their ranges.
+    /// The messages of all problems with combinations of parameters. Each parameter is within its own range.
     fn new(
         parameters: &Self::Parameters,
         inputs: &Self::Inputs,
@@ -70,18 +68,17 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         tolerance: f64,
     ) -> Result<Self, Vec<String>>;
 
-    /// Lists where parameters and initial inputs are outside the range in which the model was verified, one
-    /// sentence each.
+    /// Returns warnings, one sentence each, if parameters or initial inputs are outside the range in which the model was
+    /// verified.
     fn warnings(&self, parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
         let _ = (parameters, inputs);
         Vec::new()
     }
 
-    /// Returns the reason why a parameter is not used although the part of the model that it describes is, as
-    /// "name = value" of the parameter that replaces it. `name` is the name in the table, `indices` are the indices of the
-    /// element, from 0 (empty for a scalar). Hosts get a warning about such parameters if they differ from their start
-    /// values. Parameters of parts that are switched off give no warning, because the same parameters often serve several
-    /// models.
+    /// Returns the reason why a parameter has no effect although its part of the model is in use, as "name = value" of the
+    /// parameter that replaces it. `name` is the name in the table, and `indices` are the indices of the element, from 0
+    /// (empty for a scalar). The runtime warns about such parameters if they differ from their start values. It does not
+    /// warn about parameters of parts that are switched off, because hosts often use the same parameters for several models.
     fn overridden(parameters: &Self::Parameters, name: &str, indices: &[usize]) -> Option<String> {
         let _ = (parameters, name, indices);
         None
@@ -92,21 +89,20 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// [`About::saved_words`](crate::table::About::saved_words).
     fn save(&self, words: &mut Vec<u64>);
 
-    /// Restores a saved state with the same parameters. Returns `None` if the words are not a state.
+    /// Restores a saved state of a model with the same parameters. Returns `None` if the words are not a valid state.
     fn resume(parameters: &Self::Parameters, words: &[u64], tolerance: f64) -> Option<Self>;
 
-    /// Advances by exactly `h` > 0 seconds while the inputs change with their slopes. After an error the
-    /// model is unchanged. It allocates no memory unless it fails.
+    /// Advances by exactly `h` > 0 seconds while the inputs change with their slopes. If an error is returned, the model is
+    /// unchanged. It allocates no memory unless it fails.
     fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), StepFailure>;
 
-    /// Advances like [`Model::step`], but stops at the first event. A second step from there to the same end
-    /// with the same inputs gives a bit-identical result to the whole step.
+    /// Advances as [`Model::step`] does, but stops at the first event. A second step from there to the same end with the
+    /// same inputs must give the result of the whole step bit-identically.
     fn step_to_event(&mut self, inputs: &Self::Inputs, h: f64) -> Result<StepEnd, StepFailure> {
         self.step(inputs, h).map(|()| StepEnd::End)
     }
 
-    /// Applies the discrete changes that the present inputs cause, as
-    /// [`Model::apply_present_inputs`] does, but for good, so that they cannot be reverted.
+    /// Applies the discrete changes that the present inputs cause, as [`Model::apply_present_inputs`] does, but permanently.
     fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
         let _ = inputs;
     }
@@ -114,31 +110,29 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// Returns the outputs for the present states and the given inputs.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
-    /// Sets the slopes, over a step of size `h` (s), of inputs that follow from other inputs during the step,
-    /// for example a rate from its derivative; these inputs are declared by
-    /// [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs). Returns true if there are
-    /// any.
+    /// Sets the slopes, over a step of size `h` (s), of inputs that are determined by other inputs during the step, for
+    /// example of a rate from its derivative. [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs)
+    /// declares these inputs. Returns true if there are any.
     fn set_dependent_slopes(inputs: &mut Self::Inputs, h: f64) -> bool {
         let _ = (inputs, h);
         false
     }
 
-    /// Returns the continuous states in the order in which the model counts them (see
-    /// `Variable::state`).
+    /// Returns the continuous states in the order of their numbers in the model (see `Variable::state`).
     fn continuous_states(&self) -> &[f64];
 
-    /// Sets the continuous states from the host's integrator (Model Exchange).
+    /// Sets the continuous states as the host's integrator has computed them (Model Exchange).
     fn set_continuous_states(&mut self, x: &[f64]);
 
-    /// Sets the present time by the host's clock, in Model Exchange.
+    /// Sets the present time of the host's clock (Model Exchange).
     fn set_time(&mut self, now: Instant);
 
-    /// Computes the derivatives of the continuous states.
+    /// Computes the derivatives of the continuous states by time.
     fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
 
-    /// Computes derivatives in the direction of the states `dx` and of the input slopes in `along`: the results for the
-    /// state derivatives are written to `dx_dot`, and the results for the outputs are returned. Discrete values and the
-    /// slopes of `inputs` are held constant.
+    /// Computes directional derivatives for a change of the states by `dx` and of the inputs by the slopes in `along`.
+    /// Writes the derivatives of the state derivatives to `dx_dot`, and returns those of the outputs. Discrete values and
+    /// the slopes of `inputs` do not change.
     fn directional_derivative(
         &mut self,
         inputs: &Self::Inputs,
@@ -147,9 +141,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         dx_dot: &mut [f64],
     ) -> Self::Outputs;
 
-    /// Applies the discrete changes that the present inputs cause, before the model is evaluated. The result
-    /// is passed to [`Model::revert`] afterwards. If the host handles events, discrete values change only in
-    /// event mode, and neither function is called.
+    /// Applies the discrete changes that the present inputs cause, before the model is evaluated. The returned value is
+    /// passed to [`Model::revert`] afterwards. If the host handles events, neither function is called, because discrete
+    /// values then change only in event mode.
     fn apply_present_inputs(&mut self, inputs: &Self::Inputs) -> Self::Discrete {
         let _ = inputs;
         Self::Discrete::default()
@@ -160,7 +154,7 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         let _ = before;
     }
 
-    /// Applies changes of tunable parameters while the simulation runs.
+    /// Changes tunable parameters while the simulation runs.
     fn tune(
         &mut self,
         parameters: &Self::Parameters,
@@ -170,15 +164,15 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         Ok(())
     }
 
-    /// Computes the event indicators, functions that change sign at events:
-    /// [`About::event_indicators`](crate::table::About::event_indicators) of them. With a reduced description
-    /// only the first ones are used ([`Model::INDICATORS_OF`]).
+    /// Computes the event indicators, which change their sign at events. There are
+    /// [`About::event_indicators`](crate::table::About::event_indicators) of them; with a reduced model description only the
+    /// first ones are used ([`Model::INDICATORS_OF`]).
     fn event_indicators(&mut self, inputs: &Self::Inputs, indicators: &mut [f64]) {
         let _ = (inputs, indicators);
     }
 
-    /// Handles the events that are due now. Returns true if continuous states have changed. After an error
-    /// nothing has changed.
+    /// Handles the events that are due now. Returns true if continuous states have changed. If an error is returned,
+    /// the model is unchanged.
     fn handle_event(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
         let _ = inputs;
         Ok(false)
@@ -192,25 +186,24 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// Accepts a step of a Model Exchange host. Returns true if an event must be handled now.
     ///
     /// # Errors
-    ///
     /// The reason why the states that the host has set are not valid.
     fn accept_step(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
         let _ = inputs;
         Ok(false)
     }
 
-    /// Returns a warning about the simulation so far, or about the steps of a Model Exchange host. It is
-    /// called after each step until there is a warning.
+    /// Returns a warning about the simulation so far, or about the step sizes of a Model Exchange host. The runtime calls
+    /// this function after each step until it returns a warning.
     fn step_warning(&self) -> Option<&'static str> {
         None
     }
 
-    /// Returns the number of events since the start, by which the runtime notices new ones.
+    /// Returns the number of events since the start, from which the runtime notices new events.
     fn event_count(&self) -> i32 {
         0
     }
 
-    /// Describes the last event for the log: what happened, and when.
+    /// Returns the text of the last event for the log: what happened, and when.
     fn last_event(&self) -> String {
         String::new()
     }

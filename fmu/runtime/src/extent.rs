@@ -1,9 +1,8 @@
-//! Reduced model descriptions, which have variables only for a few tanks and modes. They are for hosts that show
-//! every variable to the user. The binary is the same as for the full model description.
+//! Reduced model descriptions, which contain the variables of only a few tanks and modes. They are for hosts that show every
+//! variable to the user. The binary is the same as for the full model description.
 //!
-//! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals the GUID of the full description
-//! except for the last nine hexadecimal digits, from which the binary learns which states and event indicators the
-//! host knows:
+//! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals that of the full description except for the
+//! last nine hexadecimal digits. From these digits the binary learns which states and event indicators the host knows:
 //!
 //! ```text
 //! {........-....-....-....-...tmasscccc}   t, m, a  largest values of the parameters in `Table::sizes`, 0 if there are fewer
@@ -11,8 +10,8 @@
 //!                                          cccc     checksum of resources/start_values.txt, 0000 without the file
 //! ```
 //!
-//! The file resources/start_values.txt has the start values that differ from the start values in the table of
-//! variables, one line `name = value` for each, in the order of the table.
+//! The file resources/start_values.txt contains the start values that differ from those in the table of variables, one line
+//! `name = value` each, in the order of the table.
 
 use std::path::Path;
 
@@ -21,8 +20,7 @@ use crate::model::Model;
 use crate::table::{GUID_LENGTH, Scalar, Table};
 use crate::variable::{Access, Causality, Dimension, Value};
 
-/// Name of the file in the FMU's folder `resources` that has the start values of a reduced model
-/// description.
+/// Name of the file in the FMU's folder `resources` that contains the start values of a reduced model description.
 pub const START_VALUES: &str = "start_values.txt";
 
 const DIGITS: usize = SIZES + 6;
@@ -34,8 +32,8 @@ const SIZES: usize = 3;
 pub struct Extent {
     token: String,
     sizes: Vec<(&'static str, usize)>,
-    /// Numbers of the continuous states that the reduced description has, as the model counts them,
-    /// in the order in which the host reads them.
+    /// Numbers, in the model, of the continuous states that the reduced description contains, in the order in which
+    /// the host reads them.
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
@@ -44,9 +42,9 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Returns the extent that a token describes, with the start values of the table. `token` is the GUID or
-    /// instantiationToken that the host passes, `whole` the token of the full description. Returns `None` if `token` does
-    /// not belong to a reduced description of this table.
+    /// Returns the extent that belongs to a GUID or instantiationToken, with the start values of the table. `token` is the
+    /// one that the host passes, and `whole` that of the full description. Returns `None` if `token` does not belong to a
+    /// reduced description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -87,11 +85,11 @@ impl Extent {
         Some(Extent { token: token.into(), sizes, places, indicators, starts, inputs: Vec::new() })
     }
 
-    /// Reads the start values of the reduced description from the FMU's folder `resources`, if they
-    /// differ from the start values in the table.
+    /// Reads the start values of the reduced description from the file in the FMU's folder `resources`, if the description
+    /// has such a file.
     ///
     /// # Errors
-    /// If the file is missing, belongs to another description, or does not fit the table.
+    /// If the file is missing, belongs to another description, or does not match the table.
     pub fn read_starts<M: Model>(&mut self, resources: Option<&Path>) -> Result<(), String> {
         let expected = &self.token[GUID_LENGTH - 5..GUID_LENGTH - 1];
         if expected == "0000" {
@@ -149,7 +147,7 @@ impl Extent {
         &self.token
     }
 
-    /// Returns the indices in the model of the continuous states, in the host's order.
+    /// Returns the numbers, in the model, of the continuous states, in the order in which the host reads them.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
@@ -170,8 +168,8 @@ impl Extent {
         &self.inputs
     }
 
-    /// Returns an error if `value` is too large for a parameter that sizes arrays, because the description
-    /// has no variables for more elements.
+    /// Returns an error if `value` of a parameter that determines array sizes is so large that the description has no
+    /// variables for all elements.
     pub fn problem<M: Model>(&self, scalar: &Scalar<M>, value: Value) -> Option<String> {
         let (_, most) = self.sizes.iter().find(|(name, _)| *name == scalar.variable.name)?;
         match value {
@@ -184,8 +182,8 @@ impl Extent {
     }
 }
 
-/// Returns the number of the table's event indicators that belong to elements within the sizes. `of` is the parameter that
-/// counts the elements with indicators.
+/// Returns the number of the table's event indicators that belong to elements within `sizes`. `of` is the name of the
+/// parameter that counts the elements with indicators.
 fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
     let all = table.about.event_indicators;
     let size = sizes.iter().find(|(name, _)| Some(*name) == of);
@@ -205,8 +203,8 @@ pub fn checksum(text: &str) -> String {
 }
 
 impl<M: Model> Table<M> {
-    /// Returns, in the order of their first array, the parameters that say how many elements arrays
-    /// have: the name of each and its largest value.
+    /// Returns the name and the largest value of each parameter that determines the number of elements of arrays, in the
+    /// order of the first array.
     pub fn sizes(&self) -> Vec<(&'static str, usize)> {
         let mut sizes: Vec<(&'static str, usize)> = Vec::new();
         for dimension in self.variables.iter().flat_map(|variable| variable.shape) {
@@ -221,8 +219,8 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if a reduced description with these `sizes` contains this scalar, that is, if
-    /// the indices of the scalar do not exceed them.
+    /// Returns true if a reduced description with these `sizes` contains this scalar, because the indices of the scalar
+    /// do not exceed them.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {
@@ -234,8 +232,8 @@ impl<M: Model> Scalar<M> {
     }
 }
 
-/// Returns the folder of a URI, in which form FMI 2.0 passes the resources: `file:///a%20b`, on Windows
-/// `file:///C:/a`. A path that is not a URI is returned unchanged.
+/// Returns the folder to which a URI points; FMI 2.0 passes the folder of resources in this form: `file:///a%20b`, on
+/// Windows `file:///C:/a`. A path that is not a URI is returned unchanged.
 pub fn folder_of_uri(uri: &str) -> Option<std::path::PathBuf> {
     let Some(rest) = uri.strip_prefix("file:") else {
         return (!uri.is_empty() && !uri.contains("://")).then(|| uri.into());

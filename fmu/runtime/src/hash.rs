@@ -1,5 +1,5 @@
-//! FNV-1a with 128 bits, which distinguishes tables and byte strings identically on every platform. It
-//! protects against mistakes, not against attackers.
+//! FNV-1a hash with 128 bits, which distinguishes tables and byte strings identically on every platform. It protects against
+//! mistakes, not against attackers.
 
 /// A hash value to which bytes and texts are added one after another.
 #[derive(Clone, Copy, Debug)]
@@ -11,7 +11,7 @@ impl Hash {
         Hash(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
 
-    /// Returns the hash of everything so far and of `bytes`.
+    /// Returns the hash of everything that was added so far, followed by `bytes`.
     pub fn bytes(mut self, bytes: &[u8]) -> Hash {
         for byte in bytes {
             self.0 ^= u128::from(*byte);

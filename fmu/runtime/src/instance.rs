@@ -1,11 +1,10 @@
 //! Effects of the host's calls on an instance, which are the same for every version of FMI.
 //!
-//! A refused call changes nothing. The only exception is a step that the model cannot compute: the model
-//! keeps its state, but the instance enters the state "step failed", in which it can be read, reset, or given
-//! a saved state.
+//! A refused call changes nothing. The only exception is a step that the model cannot compute: the model keeps its state,
+//! but the instance enters the state "step failed", in which the host can read, reset or restore the instance.
 //!
-//! In Model Exchange the host integrates: it sets time and states. If the host handles events
-//! ([`Events::ByHost`]), discrete values change only in [`Instance::new_discrete_states`].
+//! In Model Exchange the host integrates and sets time and states. If the host handles events ([`Events::ByHost`]), discrete
+//! values change only in [`Instance::new_discrete_states`].
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -19,52 +18,49 @@ use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Causality, Value, Variable};
 use crate::version::Version;
 
-/// Relative tolerance of the integration if the host gives none.
+/// Relative tolerance of the integration if the host sets none.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 /// Range of the relative tolerances of the integration that a host can set.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
-/// Limit of the magnitude of continuous states. Powers and products of larger states could overflow, although
-/// no real motion reaches it.
+/// Limit of the magnitude of continuous states, which no realistic motion reaches. Powers and products of
+/// larger states could overflow.
 pub const MAX_STATE: f64 = 1e30;
 
-/// An instance of an FMU, for one version of FMI.
-///
-/// A clone is a saved state, because an instance consists of nothing else.
+/// An instance of an FMU, for one version of FMI. A clone is a complete saved state, because an instance has no other data.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Instance<M: Model, V: Version> {
     version: PhantomData<V>,
     pub(crate) interface: Interface,
     pub(crate) events: Events,
-    /// Form in which the host's model description has arrays: as one variable each, or as one
+    /// Form of arrays in the model description that the host has read: one variable for each array, or one
     /// variable for each element.
     pub(crate) layout: Layout,
-    /// The part of the variables that the model description read by the host contains; `None` for all.
+    /// Part of the variables that is in the model description that the host has read; `None` if it contains all.
     pub(crate) extent: Option<Arc<Extent>>,
     pub(crate) state: InstanceState,
     pub(crate) clock: Clock,
     pub(crate) tolerance: f64,
-    /// Values of the parameters in the order of the table. They may be outside their ranges,
-    /// because they are checked only at the end of initialization.
+    /// Values of the parameters in the order of the table. They may be outside their ranges, because they are checked at the
+    /// end of initialization mode.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
     pub(crate) sloped: bool,
-    /// True from the end of a step with linearly changing inputs until an input is set. The inputs
-    /// still have the slopes of that step meanwhile, so that outputs are limits from the left.
+    /// True from the end of a step with linearly changing inputs until an input is set. In this time the inputs keep the
+    /// slopes of the step, so that outputs are limits from the left.
     pub(crate) past_slopes: bool,
-    /// The model. It is created when it is needed for the first time in initialization mode, and dropped when
-    /// a parameter or input is set before the simulation starts.
+    /// The model. It is created when it is first needed in initialization mode, and dropped if a parameter or input is set
+    /// before the simulation starts.
     pub(crate) model: Option<M>,
     pub(crate) outputs: Option<M::Outputs>,
-    /// Values of the discrete outputs, by slot, as the host saw them when it was last in event
-    /// mode; needed if events are handled as [`Events::Reported`]. Empty until initialization has
-    /// ended; before that, discrete outputs are computed like all others.
+    /// Values of the discrete outputs, by slot, as the host saw them when it was last in event mode. They are needed if
+    /// events are handled as [`Events::Reported`]. Empty until initialization has ended; before that, discrete outputs are
+    /// computed like all other outputs.
     pub(crate) shown: Vec<i32>,
     scratch: [Vec<f64>; 2],
 }
 
-/// Iterator over the numbers of the continuous states as the model counts them, in the order in
-/// which the host reads them.
+/// Iterator over the numbers, in the model, of the continuous states, in the order in which the host reads them.
 struct Places<M: Model> {
     extent: Option<Arc<Extent>>,
     next: usize,
@@ -117,7 +113,7 @@ pub struct EventInfo {
     pub next_time: Option<f64>,
 }
 
-// A derived `clone_from` would allocate memory again.
+// A derived `clone_from` would allocate memory.
 impl<M: Model, V: Version> Clone for Instance<M, V> {
     fn clone(&self) -> Self {
         Instance {
@@ -144,8 +140,8 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
 }
 
 impl<M: Model, V: Version> Instance<M, V> {
-    /// Creates an instance for a host that does not choose who handles events: the host in Model Exchange, the
-    /// FMU within its steps in Co-Simulation.
+    /// Creates an instance for a host that does not choose who handles events. In Model Exchange the host handles them, in
+    /// Co-Simulation the FMU does so within its steps.
     pub fn new(interface: Interface) -> Self {
         Instance::with_events(interface, V::events(interface))
     }
@@ -173,7 +169,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Restricts a new instance to the variables of a reduced description.
+    /// Restricts a new instance to the variables of a reduced model description.
     pub fn with_extent(mut self, extent: Option<Arc<Extent>>) -> Self {
         if let Some(extent) = &extent {
             self.parameters = extent.starts().to_vec();
@@ -204,27 +200,26 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Checks that a call is allowed in the present state.
     ///
     /// # Errors
-    ///
-    /// If it is not.
+    /// If the call is not allowed.
     #[inline]
     pub fn check(&self, call: &'static Call) -> Result<&'static Call, Fault> {
         call.check(self.interface, self.events, self.state)?;
         Ok(call)
     }
 
-    /// Returns the state in the standard's state machine, which decides what calls are allowed.
+    /// Returns the state of the instance in the standard's state machine, which determines the allowed calls.
     pub fn state(&self) -> InstanceState {
         self.state
     }
 
-    /// Returns the simulation time that has been reached, s: the end of the last step, or in Model Exchange the
-    /// time that the host has set.
+    /// Returns the present simulation time, s: the end of the last step, or in Model Exchange the time that the host has
+    /// set.
     pub fn time(&self) -> f64 {
         self.clock.time
     }
 
-    /// Makes the instance unusable: after a panic its values cannot be trusted, so every further
-    /// call except freeing is refused.
+    /// Makes the instance unusable after a panic, because its values may be wrong: every further call except freeing is
+    /// refused.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
     }
@@ -236,7 +231,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Sets tolerance, start time and stop time (s); `None` if the host does not define it.
+    /// Sets tolerance, start time and stop time (s), each `None` if the host has not set it.
     pub fn setup_experiment(
         &mut self,
         tolerance: Option<f64>,
@@ -279,8 +274,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Leaves initialization mode, so that the simulation can start.
     ///
     /// # Errors
-    ///
-    /// If parameters are not allowed, at the latest here.
+    /// If parameters are not allowed. This is the last call that checks all parameters.
     pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::EXIT_INITIALIZATION)?;
         self.outputs(call)?;
@@ -298,8 +292,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
     }
 
-    /// Returns the warnings at the start of the simulation: the warnings of [`Model::warnings`], and for each reason
-    /// ([`Model::overridden`]) one warning about the parameters that differ from their start values but have no effect.
+    /// Returns the warnings at the start of the simulation. In addition to those of [`Model::warnings`] there is one warning
+    /// for each reason ([`Model::overridden`]) why parameters that differ from their start values have no effect.
     pub fn warnings(&self) -> Vec<String> {
         let Some(model) = &self.model else { return Vec::new() };
         let parameters = self.given_parameters();
@@ -319,7 +313,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 None => reasons.push((why, vec![scalar.name()])),
             }
         }
-        /// Largest number of parameter names in one message. More names would hide the reason.
+        /// Largest number of parameter names in one message, so that the reason remains visible.
         const NAMED: usize = 6;
         warnings.extend(reasons.into_iter().map(|(why, names)| {
             let verb = if names.len() == 1 { "has" } else { "have" };
@@ -341,8 +335,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Ends the simulation. Afterwards the last values can still be read, and the instance can be reset; no
-    /// step is allowed.
+    /// Ends the simulation. Afterwards the host can still read the last values and reset the instance, but not make steps.
     pub fn terminate(&mut self) -> Result<(), Fault> {
         let call = self.check(V::TERMINATE)?;
         self.leave_initialized(call)?;
@@ -350,8 +343,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Resets the instance to its state after instantiation: parameters and inputs have their start values
-    /// again, also those that the host has set. The layout of arrays and the reduced description stay.
+    /// Resets the instance to its state after instantiation: all parameters and inputs have their start values again. The
+    /// layout of arrays and the reduced model description do not change.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
         let (layout, extent) = (self.layout, self.extent.take());
@@ -360,17 +353,17 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Reads a value, for the function `call` of the FMI version.
+    /// Returns the value of a variable, for the function `call` of the FMI version.
     pub fn get(&mut self, call: &'static Call, reference: u32) -> Result<Value, Fault> {
         let call = self.check(call)?;
         self.value(call, reference)
     }
 
-    /// Reads a value for a call that was already checked.
+    /// Returns the value of a variable, for a call that was already checked.
     #[inline(always)]
     pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
         let scalar = scalar::<M, V>(call, reference)?;
-        // A state is read directly and not looked up among the outputs.
+        // A state is read directly from the model, which is faster than computing the outputs.
         match (scalar.state, scalar.access, &self.model, &self.outputs) {
             (Some(place), _, Some(model), _) => {
                 Ok(Value::Real(model.continuous_states()[place(scalar.element)]))
@@ -435,7 +428,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// Sets all values for the function `call`, or none of them if one is refused.
+    /// Sets several values, for the function `call` of the FMI version. If one value is refused, no value is set.
     #[inline]
     pub fn set(
         &mut self,
@@ -466,8 +459,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Resets all elements of the variables selected by `meant` to their start values. Returns the variables that
-    /// have changed, that is, at least one of their elements had another value, in the order of the table.
+    /// Sets all elements of the variables for which `meant` returns true to their start values. Returns the variables that
+    /// have changed because at least one of their elements had another value, in the order of the table.
     pub(crate) fn restart(
         &mut self,
         meant: impl Fn(&Variable<M>) -> bool,
@@ -497,7 +490,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns true if a discrete value in the model differs from the value that the host can read, which changes
+    /// Returns true if a discrete value in the model differs from the value that the host can read; the latter changes
     /// only in event mode.
     fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
         let outputs = *self.outputs(call)?;
@@ -505,7 +498,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(all.any(|(scalar, shown)| discrete(scalar, &outputs) != *shown))
     }
 
-    /// Sets an input or a parameter, and drops results that depend on it.
+    /// Sets an input or a parameter, and drops all results that depend on it.
     #[inline(always)]
     fn store(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
@@ -564,8 +557,8 @@ impl<M: Model, V: Version> Instance<M, V> {
                 _ => Err(call.discard(state_refusal(scalar, value))),
             };
         }
-        // Parameters that are not allowed are refused all together when initialization ends; everything else
-        // is refused immediately.
+        // Parameters that are not allowed are refused together when initialization ends. All other values are refused
+        // immediately.
         if !is_input {
             self.check_set_parameter(call, scalar)?;
         }
@@ -579,8 +572,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Returns true if the host may set single continuous states now, that is, in Model Exchange in
-    /// event mode or continuous-time mode.
+    /// Returns true if the host may set single continuous states now. This is allowed in Model Exchange, in event
+    /// mode and continuous-time mode.
     fn takes_states(&self) -> bool {
         self.interface == Interface::ModelExchange
             && matches!(self.state, InstanceState::Event | InstanceState::Continuous)
@@ -619,7 +612,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         references: &[u32],
         value: &impl Fn(usize) -> Value,
     ) -> Result<(), Fault> {
-        // All other parameters are in their ranges, because they were when the simulation started.
+        // All other parameters are within their ranges, which was checked when the simulation started.
         let mut parameters = self.given_parameters();
         for (n, reference) in references.iter().enumerate() {
             let scalar = scalar::<M, V>(call, *reference)?;
@@ -631,8 +624,8 @@ impl<M: Model, V: Version> Instance<M, V> {
             .map_err(|problems| call.error(problems.join("; ")))
     }
 
-    /// Sets slopes of inputs (unit of the input per s) for the next step only, in which the inputs change
-    /// linearly; afterwards they are held again. `orders` must be 1, because there are no higher derivatives.
+    /// Sets slopes of inputs (unit of the input per s) for the next step, in which the inputs change linearly; after this
+    /// step they are constant again. `orders` must be 1, because higher derivatives are not supported.
     pub fn set_input_derivatives(
         &mut self,
         references: &[u32],
@@ -657,7 +650,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes time derivatives of variables, with the input slopes that are set for the next step.
+    /// Computes time derivatives of variables, with the slopes of inputs that are set for the next step.
     pub fn output_derivatives(
         &mut self,
         references: &[u32],
@@ -690,9 +683,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, references, &along, answers)
     }
 
-    /// Computes the derivative of `unknowns` in the direction `direction` of `knowns`. Knowns are inputs and
-    /// continuous states; in initialization mode, before the initial state is computed, they are inputs and
-    /// real parameters.
+    /// Computes the derivative of `unknowns` for a change of `knowns` by `direction`. Knowns are inputs and continuous
+    /// states; in initialization mode, before the initial state is computed, they are inputs and real parameters.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -724,8 +716,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, unknowns, &along, answers)
     }
 
-    /// Computes the derivatives of the unknowns in the direction of the states in the first scratch vector
-    /// and of the input slopes in `along`.
+    /// Computes the derivatives of the unknowns for a change of the states by the first scratch vector and of the inputs by
+    /// the slopes in `along`.
     fn derivatives_along(
         &mut self,
         call: &Call,
@@ -765,10 +757,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         done
     }
 
-    /// Returns the value references on which a variable depends. Before the simulation starts, these are the
-    /// dependencies of its initial value. Afterwards they are the declared inputs and states that have an
-    /// effect at present: in stick or slip, with the selected models. A derivative that is zero exactly at
-    /// the present point counts if it is not zero nearby.
+    /// Returns the value references of the variables on which a variable depends. Before the simulation starts, these are
+    /// the dependencies of its initial value. Afterwards they are those declared inputs and states that have an effect at
+    /// present, which depends for example on stick or slip and on the selected models. If a derivative is zero at the
+    /// present point but not nearby, the dependency counts as well.
     pub(crate) fn dependencies(
         &mut self,
         call: &Call,
@@ -812,9 +804,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(found.map(|(known, _)| V::reference(known)).collect())
     }
 
-    /// Displaces states and inputs by up to `share` of their nominal values, each `point` in
-    /// another direction. Derivatives at such nearby points show which dependencies vanish only at
-    /// the present point.
+    /// Displaces states and inputs by up to `share` of their nominal values, for each `point` in another direction.
+    /// Derivatives at such nearby points show which dependencies vanish only at the present point.
     fn move_aside(&mut self, share: f64, point: u64) {
         // Multiples of the golden ratio fill the interval uniformly.
         let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;
@@ -842,9 +833,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.outputs = None;
     }
 
-    /// Computes derivatives in initialization mode by central differences with Richardson extrapolation,
-    /// between instances with different start values. Each known is changed by a thousandth of its value, or
-    /// of its nominal value if that is larger.
+    /// Computes derivatives in initialization mode by central differences with Richardson extrapolation, between
+    /// instances with different start values. Each known is changed by a thousandth of its value, or of its nominal value
+    /// if this is larger.
     fn initial_derivative(
         &self,
         call: &Call,
@@ -893,15 +884,15 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Makes a step from `at` by `h`, s. It allocates no memory unless it fails.
+    /// Makes a step of size `h` from the time `at`, both in s. It allocates no memory unless it fails.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
         let call = self.check(V::DO_STEP)?;
         self.step_by(call, at, h, |model, inputs| model.step(inputs, h).map(|()| StepEnd::End))?;
         Ok(())
     }
 
-    /// Makes a step like [`Instance::do_step`] for a host that handles events between steps; with `stops` it
-    /// stops at the first event.
+    /// Makes a step as [`Instance::do_step`] does, for a host that handles events between steps. If `stops` is true, the
+    /// step stops at the first event.
     #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
@@ -933,8 +924,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
 
-    /// Refuses a step from `at` (s) by `h` (s) that is never valid, for example because its size is negative or because it
-    /// does not begin at the present time.
+    /// Returns an error if a step of size `h` from the time `at`, both in s, is never valid, for example because its size is
+    /// negative or because it does not begin at the present time.
     #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         self.clock.check_step(at, h).map_err(|why| call.error(why))
@@ -969,7 +960,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 model.set_time(self.clock.now());
                 let end = at + h;
                 let why = format_args!("step from {at:?} s to {end:?} s failed: {text}");
-                // If a failed step has a state of its own, a shorter step cannot be tried.
+                // If the instance enters a state of its own after a failed step, the host cannot try a smaller step.
                 if shorter_may_succeed && V::AFTER_ERROR.is_some() {
                     return Err(call.discard(why));
                 }
@@ -994,7 +985,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(ended)
     }
 
-    /// Drops the slopes of the last step, so that inputs are held unless new slopes are set.
+    /// Drops the slopes of the last step, so that inputs are constant unless new slopes are set.
     #[inline]
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
@@ -1012,8 +1003,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Leaves the state of an intermediate update.
     ///
     /// # Errors
-    ///
-    /// If a call of the host has failed meanwhile.
+    /// If a call that the host made during the intermediate update has failed.
     pub(crate) fn leave_intermediate(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state != InstanceState::Intermediate {
             return Err(
@@ -1049,8 +1039,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets inputs exactly to the values at the end of the step, which differ from the result of the slopes
-    /// by rounding.
+    /// Sets inputs exactly to their given values at the end of the step. Values that are computed from the
+    /// slopes differ by rounding.
     pub(crate) fn end_ramps(&mut self, references: &[u32], ends: &M::Inputs) {
         let mut ends = *ends;
         for reference in references {
@@ -1100,8 +1090,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
-    /// Handles events whose effects within the step were already computed: applies changes by the present
-    /// inputs, and shows all discrete values to the host.
+    /// Handles events whose effects were already computed within the step: applies the changes that the present inputs
+    /// cause, and makes all discrete values visible to the host.
     fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
         let inputs = self.inputs;
         let now = self.clock.now();
@@ -1110,7 +1100,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         model.take_present_inputs(&inputs);
         self.outputs = None;
         self.show_discrete(call)?;
-        // The next step handles what is still due, for example in a damaged saved state.
+        // The next step handles an event that is still due, for example in a damaged saved state.
         let next_time = self.model(call)?.next_time_event().filter(|next| *next > now.time);
         Ok(EventInfo { states_changed: false, next_time })
     }
@@ -1126,8 +1116,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Leaves event mode, so that steps can follow. `call` is the function of the FMI version, which decides in
-    /// which states this is allowed.
+    /// Leaves event mode, so that steps can follow. `call` is the function of the FMI version, which determines the states
+    /// in which this is allowed.
     pub fn enter_step_mode(&mut self, call: &'static Call) -> Result<(), Fault> {
         self.check(call)?;
         self.state = InstanceState::Stepping;
@@ -1163,8 +1153,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// Sets the simulation time, s, in Model Exchange. In FMI 2.0 a host may go back to any time, in FMI 3.0 not
-    /// before the last event; times that are NaN or infinite are refused.
+    /// Sets the simulation time, s, in Model Exchange. In FMI 2.0 a host may go back to any time, in FMI 3.0 only to the
+    /// last event. A time that is NaN or infinite is refused.
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
         let call = self.check(V::SET_TIME)?;
         self.clock.check_time(time, !V::SETS_STATES).map_err(|why| call.error(why))?;
@@ -1177,12 +1167,12 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets the continuous states. States that are NaN, infinite or larger than [`MAX_STATE`] are discarded,
-    /// because the integrator should then try a shorter step.
+    /// Sets the continuous states. If a state is NaN, infinite or larger than [`MAX_STATE`], the call is discarded, because
+    /// the integrator should then try a smaller step.
     pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
         let call = self.check(V::SET_CONTINUOUS_STATES)?;
         if let (Some(_), Some(model)) = (&self.extent, &self.model) {
-            self.scratch[0].copy_from_slice(model.continuous_states()); // the host does not know all
+            self.scratch[0].copy_from_slice(model.continuous_states()); // the host may know only some of the states
         }
         let places = self.places();
         check_length(call, "nx", states.len(), places.len())?;
@@ -1206,8 +1196,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Reads the continuous states in the host's order, that is, the order of the derivatives in the model
-    /// description. The array must have as many elements as there are states.
+    /// Reads the continuous states in the order of the derivatives in the model description. The array must have as many
+    /// elements as there are states.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_CONTINUOUS_STATES)?;
         let places = self.places();
@@ -1219,8 +1209,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes the derivatives of the states. NaN and infinity are discarded, because the integrator should
-    /// then try a shorter step.
+    /// Computes the derivatives of the states. If a derivative is NaN or infinite, the call is discarded, because the
+    /// integrator should then try a smaller step.
     pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_DERIVATIVES)?;
         let places = self.places();
@@ -1244,8 +1234,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes the event indicators, each of which changes its sign at an event. NaN and infinity are discarded,
-    /// because the host should then try a shorter step.
+    /// Computes the event indicators, each of which changes its sign at an event. If an indicator is NaN or infinite, the
+    /// call is discarded, because the host should then try a smaller step.
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_EVENT_INDICATORS)?;
         let count = match &self.extent {
@@ -1295,8 +1285,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Restores a saved state.
     ///
     /// # Errors
-    ///
-    /// If it belongs to another interface, handler of events or set of variables.
+    /// If the saved state belongs to an instance with another interface, handling of events, or set of variables.
     pub fn restore(&mut self, saved: &Self) -> Result<(), Fault> {
         let call = self.check(V::SET_STATE)?;
         if saved.interface != self.interface {
@@ -1316,7 +1305,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Refuses a saved state of an instance whose model description has other variables.
+    /// Returns an error if the model description of the saved instance has other variables.
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout != self.layout {
             return Err(call.error(
@@ -1371,7 +1360,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 
-    /// Returns the parameters in the model's form, even if their values are not allowed.
+    /// Returns the parameters that the host has set in the form of the model, even if their values are not allowed.
     fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
@@ -1408,26 +1397,26 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(query_model(*events, model, inputs, question))
     }
 
-    /// Returns a warning about the host's steps, see [`Model::step_warning`].
+    /// Returns a warning about the host's step sizes; see [`Model::step_warning`].
     pub fn step_warning(&self) -> Option<&'static str> {
         self.model.as_ref().and_then(M::step_warning)
     }
 
-    /// Returns the number of events since the start, by which callers notice that a step had events. It may
-    /// wrap around.
+    /// Returns the number of events since the start, from which callers notice that a step had events. It may overflow and
+    /// restart.
     #[inline]
     pub fn event_count(&self) -> i32 {
         self.model.as_ref().map_or(0, M::event_count)
     }
 
-    /// Describes the last event for the log.
+    /// Returns the text of the last event for the log.
     pub fn last_event(&self) -> String {
         self.model.as_ref().map_or(String::new(), M::last_event)
     }
 }
 
 /// Evaluates the function `question` of the model. If the FMU handles events within its steps, the changes that the present
-/// inputs cause are applied before and reverted afterwards; if the host handles events, they are not.
+/// inputs cause are applied before and reverted afterwards. If the host handles events, they are not applied.
 #[inline(always)]
 fn query_model<M: Model, T>(
     events: Events,
@@ -1494,8 +1483,8 @@ fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
     ))
 }
 
-/// Advances the inputs along their slopes by `h` seconds, within their ranges. The host can give `h` only to within
-/// `resolution`, s.
+/// Advances the inputs along their slopes by `h` seconds, within their ranges. The value of `h` has the error `resolution`,
+/// s, because it comes from the host.
 #[inline(always)]
 fn follow_slopes<M: Model>(
     call: &Call,
@@ -1528,8 +1517,8 @@ fn hold_inputs<M: Model>(inputs: &mut M::Inputs) {
     }
 }
 
-/// Returns the value of an input after `h` seconds. At the smallest allowed value a deviation by rounding of
-/// slope, value and time is corrected.
+/// Returns the value of an input after `h` seconds. If it is below its smallest allowed value only by rounding of slope,
+/// value and time, it is set to this value.
 #[inline]
 fn end_of_ramp<M: Model>(
     scalar: &Scalar<M>,
@@ -1612,7 +1601,7 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
     Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
 }
 
-/// Finds the scalar of a value reference, which must have the type of the call.
+/// Finds the scalar of a value reference. Its type must be that of the call.
 #[inline]
 fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
     V::scalar(reference, call.c_type).map_err(|why| call.error(why))
@@ -1625,9 +1614,8 @@ mod tests {
     use crate::tests::trays::Trays;
     use crate::v3::Fmi3;
 
-    /// The nearby points at which dependencies are tested: states with the nominal value 5 m and
-    /// inputs with the nominal value 4 m/s move by up to a hundredth of it, inputs upwards, within
-    /// their range.
+    /// Dependencies are tested at nearby points: states with the nominal value 5 m and inputs with the nominal value 4 m/s
+    /// are changed by up to a hundredth of these values. Inputs are only increased, and stay within their ranges.
     #[test]
     fn nearby_points_for_differences_move_every_state_and_input_by_a_share_of_its_size() {
         let moved = |share: f64, point: u64, q: f64| {
@@ -1651,7 +1639,7 @@ mod tests {
         let (mut states, mut inputs) = (Vec::new(), Vec::new());
         for point in 1..9 {
             let (by_state, by_input) = moved(0.01, point, 0.5);
-            // another share, other sizes
+            // Another share changes the displacements in proportion.
             let (twice, inputs_twice) = moved(0.02, point, 0.5);
             for n in 0..3 {
                 assert!((by_state[n] - twice[n]).abs() < 1e-12, "{by_state:?} {twice:?}");
@@ -1662,7 +1650,8 @@ mod tests {
         }
         assert!(states.iter().all(|part| part.abs() <= 1.0), "{states:?}");
         assert!(inputs.iter().all(|part| (0.0..=1.0).contains(part)), "{inputs:?}");
-        // They fill the interval: of 24 places none is far from its neighbour. An input has the same place in two points.
+        // The displacements fill the interval: of 24 places none is far from its neighbour. An input has the same
+        // displacement for two points.
         states.sort_unstable_by(f64::total_cmp);
         assert!(states[0] < -0.85 && states[23] > 0.85, "{states:?}");
         assert!(
@@ -1671,7 +1660,7 @@ mod tests {
         );
         inputs.sort_unstable_by(f64::total_cmp);
         assert!(inputs[0] < 0.2 && inputs[23] > 0.7, "{inputs:?}");
-        // at the end of the range they stay
+        // Inputs at the end of their range do not change.
         assert_eq!(moved(0.01, 1, 8.0).1, [0.0; 3]);
     }
 }

@@ -1,11 +1,10 @@
-//! Common base of the project's FMUs. It knows FMI and no physics; a model knows its physics and no FMI. They
-//! meet in the trait [`Model`].
+//! Common base of the project's FMUs. This crate implements FMI and contains no physics; a model contains physics and no
+//! FMI. The trait [`Model`] connects the two.
 //!
-//! [`variable`] and [`table`] define a model's variables, [`call`] the states in which functions are allowed,
-//! [`instance`] the effects of calls. [`snapshot`] saves states, and [`log`] selects messages for the host's
-//! log. The trait [`version::Version`] contains the differences between versions of FMI. Each version is one
-//! module ([`v2`], [`v3`]) with its C interface, on top of the common [`c_abi`]. Only these modules have
-//! unsafe code.
+//! [`variable`] and [`table`] define the variables of a model, [`call`] the instance states in which functions are allowed,
+//! and [`instance`] the effects of calls. [`snapshot`] serialises saved states, and [`log`] selects messages for the host's
+//! log. The trait [`version::Version`] contains the differences between versions of FMI. Each version is one module ([`v2`],
+//! [`v3`]) with its C interface, on top of the common [`c_abi`]. Only these modules contain unsafe code.
 //!
 //! An FMU is a crate with a table, an implementation of [`Model`] and two lines:
 //! `runtime::export_fmi2!(TheModel);` and `runtime::export_fmi3!(TheModel);`.
@@ -33,7 +32,7 @@ pub mod version;
 pub use dynamics::Dynamics;
 pub use model::Model;
 
-// The runtime's own tests use the FMU of tests/spring.
+// The tests of this crate use the FMU of tests/spring.
 #[cfg(test)]
 extern crate self as runtime;
 #[cfg(test)]

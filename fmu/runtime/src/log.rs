@@ -1,10 +1,9 @@
-//! Selects the messages for the host's logger.
+//! Selection of the messages that are passed to the host's logger.
 //!
-//! There are messages about calls that fail, warnings when the simulation starts or a size changes, and the
-//! model's events. `loggingOn` of a new instance has no effect: failures are always logged, because a status
-//! without a reason helps nobody, and events are logged only if a category is switched on. However,
-//! fmi2SetDebugLogging and fmi3SetDebugLogging are obeyed: off means no messages, and on without categories
-//! means all messages.
+//! There are messages about calls that fail, warnings when the simulation starts or an array size changes, and the events of
+//! the model. `loggingOn` of a new instance has no effect: failures are always logged, because a status without a reason is
+//! useless, and events are logged only if a category is switched on. fmi2SetDebugLogging and fmi3SetDebugLogging do have an
+//! effect: off means no messages, and on without categories means all messages.
 
 use crate::call::Severity;
 use crate::model::Model;
@@ -44,7 +43,7 @@ fn category_names<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option
     if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
 }
 
-/// Returns the categories of a model with the descriptions for a version of FMI.
+/// Returns the log categories of a model, with the descriptions for a version of FMI.
 pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     let description = |topic| match topic {
         Some(Topic::Event) => table.about.events.into(),
@@ -77,7 +76,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Failures and warnings, with which an instance starts.
+    /// Failures and warnings, which is the selection of a new instance.
     pub const FAILURES: Filter =
         Filter { events: false, warning: true, discard: true, error: true, fatal: true };
     /// All messages.
@@ -94,11 +93,10 @@ impl Filter {
         Filter { discard: true, error: true, fatal: true, ..self }
     }
 
-    /// Returns the selection of messages in the log categories `names`; an empty list selects all
-    /// messages.
+    /// Returns the selection of messages in the log categories `names`; an empty list selects all messages.
     ///
     /// # Errors
-    /// If names are unknown; the text lists them and the known names.
+    /// If names are unknown; the text contains them and the known names.
     pub fn from_categories<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
         let known = category_names(table);
         if names.is_empty() {

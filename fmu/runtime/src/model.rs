@@ -11,8 +11,8 @@ pub trait Model: Dynamics {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns the inputs and continuous states on which the variable depends without delay, for
-    /// the dependencies in the model description.
+    /// Returns the inputs and continuous states on which the variable depends without delay, for the element ModelStructure
+    /// of the model description.
     pub fn depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
         let known = M::table()
             .scalars
@@ -21,8 +21,8 @@ impl<M: Model> Scalar<M> {
         known.filter(|s| self.names(self.variable.depends_on, s))
     }
 
-    /// Returns the inputs and parameters on which the initial value of the variable depends, for
-    /// the dependencies in the model description.
+    /// Returns the inputs and parameters on which the initial value of the variable depends, for the element ModelStructure
+    /// of the model description.
     pub fn initial_depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
         let known = M::table()
             .scalars

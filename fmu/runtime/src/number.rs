@@ -1,6 +1,6 @@
-//! Numbers that may be NaN or infinite, for hosts that trap invalid operations.
+//! Functions for numbers that may be NaN or infinite, in hosts that trap invalid floating-point operations.
 
-/// Returns true if x is finite. It tests the bits, because comparing with NaN would end the process of a host
+/// Returns true if x is finite. The function tests the bits, because a comparison with NaN would end the process of a host
 /// that traps invalid operations.
 #[inline]
 pub const fn is_finite(x: f64) -> bool {
@@ -8,8 +8,7 @@ pub const fn is_finite(x: f64) -> bool {
     x.to_bits() & EXPONENT != EXPONENT
 }
 
-/// Formats a number for a message. Formatting compares numbers, which must not be done with NaN, see
-/// [`is_finite`].
+/// Formats a number for a message. NaN is formatted without a comparison, because it could be trapped; see [`is_finite`].
 pub fn text(x: f64) -> String {
     let is_nan = x.to_bits() << 1 > f64::INFINITY.to_bits() << 1;
     if is_nan { "NaN".into() } else { format!("{x:?}") }

@@ -1,7 +1,7 @@
 //! A saved state as bytes.
 //!
-//! A saved state is a copy of the instance, which is written here in little-endian form, so that it can be
-//! moved to another process or machine:
+//! A saved state is a copy of the instance. It is written here in little-endian form, so that it can be moved to
+//! another process or machine:
 //!
 //! | part | bytes |
 //! | --- | --- |
@@ -41,7 +41,7 @@ const HAS_SLOPES: u8 = 4;
 const HAS_PAST_SLOPES: u8 = 8;
 const HAS_SHOWN: u8 = 16;
 
-/// Returns the number of bytes of a serialised state, which is the same for every state of a model.
+/// Returns the number of bytes of a serialised state, which is the same for all states of a model.
 pub fn size<M: Model>() -> usize {
     let table = M::table();
     let head = 8 + 4 + 4 + 38 + 4 + 5 * 8;
@@ -50,7 +50,7 @@ pub fn size<M: Model>() -> usize {
     head + set + table.about.saved_words * 8 + 16
 }
 
-/// Writes a saved state as bytes that another process can read.
+/// Returns a saved state as bytes, which another process can read.
 pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     let (table, size) = (M::table(), size::<M>());
     let mut bytes = Vec::with_capacity(size);
@@ -65,7 +65,7 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
         | flag(saved.past_slopes, HAS_PAST_SLOPES)
         | flag(!saved.shown.is_empty(), HAS_SHOWN);
     bytes.extend([saved.state as u8, flags, saved.interface as u8, saved.events as u8]);
-    // Until the start time is set, any finite number serves.
+    // If the start time is not set yet, its number has no meaning but must be finite.
     let Clock { start, stop, time, last_event, .. } = saved.clock;
     let last_event = last_event.max(f64::MIN);
     let stop = stop.unwrap_or(0.0);
@@ -106,7 +106,6 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
 /// Restores a saved state from bytes.
 ///
 /// # Errors
-///
 /// If the bytes are not a saved state of this model; the text is the reason.
 pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, String> {
     let (table, size) = (M::table(), size::<M>());
@@ -236,8 +235,8 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(format!("the saved state is damaged: {what}")) }
     }
 
-    /// Reads the value of a parameter, which must have the type of `like`, from a saved state. The
-    /// value may be outside its range, because a state can be saved before initialization ends.
+    /// Reads the value of a parameter from a saved state. Its type must be that of `like`. It may be outside the parameter's
+    /// range, because a state can be saved before the end of initialization mode.
     fn value<M: Model>(&mut self, scalar: &Scalar<M>, like: Value) -> Result<Value, String> {
         let bytes = self.take()?;
         let number = i32::try_from(i64::from_le_bytes(bytes));

@@ -1,7 +1,7 @@
 //! A model's table of variables, and everything that follows from it.
 //!
-//! A variable exists exactly if it has an entry in the table. The model description, the value references,
-//! reading and setting, start values, range checks, saved states and the GUID follow from it.
+//! A variable exists if and only if it has an entry in the table. The model description, the value references, reading and
+//! setting, start values, range checks, saved states and the GUID follow from this entry.
 
 use std::sync::OnceLock;
 
@@ -27,8 +27,8 @@ pub struct About {
     pub saved_words: usize,
 }
 
-/// All data about a model's variables. It uses no heap memory, so that a host may load and unload the FMU any
-/// number of times.
+/// All data about the variables of a model. The table uses no heap memory, so that a host may load and unload the FMU
+/// any number of times.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Table<M: Dynamics> {
@@ -43,14 +43,14 @@ pub struct Table<M: Dynamics> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// Way in which the entries of the table become variables of FMI.
+/// How the entries of the table become variables of FMI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Layout {
     /// Each element of an array is a variable.
     Scalars = 0,
-    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that size arrays
-    /// are structural.
+    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that determine array sizes are
+    /// structural.
     Arrays = 1,
 }
 
@@ -65,7 +65,7 @@ pub const GUID_LENGTH: usize = 38;
 /// Joins parts of a table. `N` is the number of all variables.
 ///
 /// # Panics
-/// If the parts have another number of variables, or none.
+/// If the parts together do not have `N` variables.
 pub const fn join<M: Dynamics, const N: usize>(parts: &[&[Variable<M>]]) -> [Variable<M>; N] {
     let mut all = [parts[0][0]; N];
     let (mut n, mut part) = (0, 0);
@@ -77,12 +77,11 @@ pub const fn join<M: Dynamics, const N: usize>(parts: &[&[Variable<M>]]) -> [Var
         }
         part += 1;
     }
-    assert!(n == N, "the number of variables");
+    assert!(n == N, "N must be the number of variables");
     all
 }
 
-/// Range of consecutive scalars in the table: the index of the first scalar, and the index after
-/// the last scalar.
+/// Range of consecutive scalars in the table: the index of the first scalar, and the index after that of the last scalar.
 type Span = (usize, usize);
 
 /// Returns the range of indices of one kind of scalars: 'i' for inputs, 'p' for parameters, any other character for
@@ -110,7 +109,7 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
     (begin, end)
 }
 
-/// A scalar of the table: a scalar variable, or one element of an array.
+/// A scalar of the table: a scalar variable, or one element of an array variable.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
@@ -119,21 +118,20 @@ pub struct Scalar<M: Dynamics> {
     pub access: Access<M>,
     /// C type in which the scalar is read and set. It is copied from the table's entry, because every call needs it.
     pub c_type: CType,
-    /// Function that returns the number of the continuous state, if this scalar is a continuous
-    /// state. It is copied from the table's entry, because every call needs it.
+    /// If this scalar is a continuous state, the function that returns the number of the state. It is copied from the entry
+    /// in the table, because every call needs it.
     pub state: Option<Place>,
     /// Index among all scalars, from which the value reference follows (see
     /// [`Version`](crate::version::Version)).
     pub index: u32,
     /// Number of the element in its array, 0 for the first.
     pub element: usize,
-    /// For a parameter the number of scalar parameters before it in the table; for a discrete
-    /// output the number of discrete outputs before it. It is the index in the instance's arrays of
-    /// values.
+    /// Index of the scalar's value in the instance. For a parameter it is the number of scalar parameters before it in the
+    /// table, and for a discrete output the number of discrete outputs before it.
     pub slot: usize,
 }
 
-// Derived implementations would require the same of M.
+// Derived implementations would require the same traits of M.
 impl<M: Dynamics> Clone for Scalar<M> {
     fn clone(&self) -> Self {
         *self
@@ -189,7 +187,7 @@ pub const fn scalars<M: Dynamics, const N: usize>(
         }
         entry += 1;
     }
-    assert!(n == N, "as many as scalar_count says");
+    assert!(n == N, "N must be the result of scalar_count");
     scalars
 }
 
@@ -198,31 +196,31 @@ const fn is_discrete<M: Dynamics>(variable: &Variable<M>) -> bool {
 }
 
 impl<M: Dynamics> Scalar<M> {
-    /// Returns the name, with indices for the element of an array.
+    /// Returns the name of the scalar, with indices if it is an element of an array.
     pub fn name(&self) -> String {
         self.variable.element_name(self.element)
     }
 
-    /// Returns the number of the continuous state, as the model counts states, if this scalar is a
-    /// continuous state.
+    /// Returns the number of the continuous state in the model, if this scalar is a continuous state.
     #[inline]
     pub fn state(&self) -> Option<usize> {
         self.state.map(|place| place(self.element))
     }
 
-    /// Returns an error message if this scalar must not have `value`, otherwise `None`.
+    /// Returns an error message if `value` is not allowed for this scalar, otherwise `None`.
     #[inline]
     pub fn problem(&self, value: Value) -> Option<String> {
         self.variable.problem(self.element, value)
     }
 
-    /// Returns the start value, or `None` if the scalar is computed.
+    /// Returns the start value; `None` if the value of the scalar is computed.
     pub fn start(&self) -> Option<Value> {
         let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
         self.variable.start(&mut parameters, &mut inputs, self.element)
     }
 
-    /// Returns true if the list of dependencies `names`, which may have names of whole arrays, contains the scalar `other`.
+    /// Returns true if the list of dependencies `names` contains the scalar `other`. The list may contain names of whole
+    /// arrays.
     pub(crate) fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {
@@ -260,8 +258,8 @@ impl<M: Dynamics> Table<M> {
         self.scalars.iter().position(|s| s.name() == name).map(|n| n as u32)
     }
 
-    /// Returns a hash of everything on which a host depends, and of the version. A host that passes another
-    /// GUID has read another model description. Descriptions of variables do not count.
+    /// Returns the GUID: a hash of the version and of all properties on which a host depends, but not of the descriptions of
+    /// variables. If a host passes another GUID, it has read another model description.
     pub fn guid(&self) -> &str {
         let bytes = self.guid.get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
@@ -271,8 +269,8 @@ impl<M: Dynamics> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. The layouts
-    /// have different tokens, so that the token tells the binary which description a host has read.
+    /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. Each layout has its own
+    /// token, from which the binary recognises the description that a host has read.
     pub fn token(&self, layout: Layout) -> &str {
         let bytes = self.tokens[layout as usize].get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
@@ -293,14 +291,14 @@ impl<M: Dynamics> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Returns true if a parameter sizes arrays, which makes it structural if arrays are variables.
+    /// Returns true if a parameter determines array sizes. It is then structural if arrays are variables.
     pub fn is_structural(&self, variable: &Variable<M>) -> bool {
         let sizes =
             |d: &Dimension| matches!(d, Dimension::Sized(name, _) if *name == variable.name);
         self.variables.iter().any(|v| v.shape.iter().any(sizes))
     }
 
-    /// Returns the discrete outputs in the order of the table, each at its slot.
+    /// Returns the discrete outputs in the order of their slots, which is that of the table.
     pub fn discrete(&self) -> impl Iterator<Item = &'static Scalar<M>> + use<M> {
         self.scalars.iter().filter(|scalar| is_discrete(scalar.variable))
     }
@@ -326,16 +324,15 @@ impl<M: Dynamics> Table<M> {
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the derivatives of the continuous states. Their order is also the order of states, derivatives and nominal
-    /// values in Model Exchange.
+    /// Returns the derivatives of the continuous states. In Model Exchange their order is also that of states,
+    /// derivatives and nominal values.
     #[inline]
     pub const fn derivatives(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.derivatives;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the numbers of the continuous states as the model counts them, in the order in which
-    /// the host reads them.
+    /// Returns the numbers, in the model, of the continuous states, in the order in which the host reads them.
     pub fn places(&self) -> impl ExactSizeIterator<Item = usize> + use<M> {
         self.derivatives().iter().map(|s| match s.access {
             Access::Derivative(place) => place(s.element),
@@ -343,7 +340,7 @@ impl<M: Dynamics> Table<M> {
         })
     }
 
-    /// Finds the scalar that is continuous state number `place` of the model.
+    /// Returns the scalar that is continuous state number `place` of the model.
     pub fn state_at(&self, place: usize) -> Option<&'static Scalar<M>> {
         self.scalars.iter().find(|s| s.state() == Some(place))
     }

@@ -1,4 +1,4 @@
-//! Units, which tables of variables name and the model description defines.
+//! Units of variables, which the model description defines.
 
 /// A unit as a product of powers of SI base units, with its display units.
 #[derive(Debug)]
@@ -7,8 +7,7 @@ pub struct Unit {
     pub name: &'static str,
     /// Exponents of kg, m, s, rad; `None` if they are not integers.
     pub base: Option<[i32; 4]>,
-    /// Units in which hosts may show a value, each with the factor by which the value in this unit
-    /// is multiplied.
+    /// Units in which hosts may show a value, each with its factor: value in this unit = factor times value in the SI unit.
     pub display_units: &'static [(&'static str, f64)],
 }
 
@@ -53,7 +52,7 @@ pub static UNITS: &[Unit] = &[
     unit("N.m",     [ 1,  2, -2, 0], &[("mN.m", 1e3)]),
     unit("N.m.s",   [ 1,  2, -1, 0], &[]),
     unit("N.m/s",   [ 1,  2, -3, 0], &[]),
-    // The radian of a torsional stiffness or damping is that of the angle or rate to which the torque is
+    // The radian in the unit of a torsional stiffness or damping is that of the angle or rate to which the torque is
     // proportional.
     unit("N.m/rad", [ 1,  2, -2, -1], &[]),
     unit("N.m.s/rad", [ 1, 2, -1, -1], &[]),

@@ -1,6 +1,5 @@
-//! The C interface of FMI 2.0 for Model Exchange and Co-Simulation: 44 functions with their names, signatures
-//! and constants. The standard documents them; comments here describe only what is particular to this
-//! implementation.
+//! The C interface of FMI 2.0 for Model Exchange and Co-Simulation: 44 functions with their names, signatures and constants.
+//! The FMI standard documents them; the comments here describe only properties of this implementation.
 //!
 //! Every function is generic in the model; `export_fmi2!` exports them for one model under their names. Their
 //! effects are implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface
@@ -11,9 +10,8 @@
 #![allow(unsafe_code)]
 // The names are the standard's.
 #![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
-// The safety contract of every function is the FMI 2.0 standard's: a component
-// comes from fmi2Instantiate and is not yet freed, arrays have the lengths given,
-// strings end with NUL.
+// The safety contract of every function is that of the FMI 2.0 standard: a component comes from fmi2Instantiate and is not
+// yet freed, arrays have the given lengths, and strings end with NUL.
 #![allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -66,7 +64,7 @@ pub const fmi2PendingStatus: fmi2StatusKind = 1;
 pub const fmi2LastSuccessfulTime: fmi2StatusKind = 2;
 pub const fmi2Terminated: fmi2StatusKind = 3;
 
-/// The host's logger, which formats the message like printf.
+/// The host's logger, which formats the message as printf does.
 pub type fmi2CallbackLogger = Option<
     unsafe extern "C" fn(
         environment: fmi2ComponentEnvironment,
@@ -78,7 +76,7 @@ pub type fmi2CallbackLogger = Option<
     ),
 >;
 
-/// Callbacks of the host. Only the logger is used; each may be NULL.
+/// Callbacks of the host. Each may be NULL, and only the logger is used.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
@@ -92,14 +90,14 @@ pub struct fmi2CallbackFunctions {
 
 // ---- Which functions there are, and when each may be called ----
 
-/// Functions of FMI 2.0 with the instance states that allow them, as far as they are not in [`Version`].
+/// Functions of FMI 2.0 that are not in [`Version`], with the instance states in which they are allowed.
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
     use super::*;
     pub static SET_DEBUG_LOGGING:   Call = Call::new("fmi2SetDebugLogging", ANY);
-    // Parameters and inputs can be read from the start; all other variables have values from initialization
-    // mode on. When a variable can be set depends on the variable.
+    // Parameters and inputs can be read from the start; all other variables have values from initialization mode on. When a
+    // variable can be set depends on its causality.
     pub static GET_REAL:            Call = typed(CType::Real, "fmi2GetReal", ANY);
     pub static GET_INTEGER:         Call = typed(CType::Integer, "fmi2GetInteger", ANY);
     pub static GET_BOOLEAN:         Call = typed(CType::Boolean, "fmi2GetBoolean", ANY);
@@ -156,7 +154,7 @@ impl Version for Fmi2 {
     const ENTER_CONTINUOUS_TIME:  &'static Call = &me(Call::new("fmi2EnterContinuousTimeMode", E));
     const COMPLETED_STEP:         &'static Call = &me(Call::new("fmi2CompletedIntegratorStep", C));
     const SET_TIME:               &'static Call = &me(Call::new("fmi2SetTime", E | C));
-    // As for `ENTER_EVENT`.
+    // As `ENTER_EVENT`, because OpenModelica also calls this function in the event mode after initialization.
     const SET_CONTINUOUS_STATES:  &'static Call = &me(Call::new("fmi2SetContinuousStates", E | C));
     const GET_DERIVATIVES:        &'static Call = &me(Call::new("fmi2GetDerivatives", M | E | C | T | F));
     const GET_EVENT_INDICATORS:   &'static Call = &me(Call::new("fmi2GetEventIndicators", M | E | C | T | F));
@@ -202,8 +200,7 @@ fn wrong_reference<M: Model>(reference: u32, found: Option<&Scalar<M>>) -> Strin
     }
 }
 
-/// Result of fmi2NewDiscreteStates, which tells the host about the events that were handled and the
-/// next time event.
+/// Result of fmi2NewDiscreteStates, which describes the handled events and the next time event for the host.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
@@ -245,23 +242,22 @@ unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Wraps the host's logger. The struct of callbacks need not exist after fmi2Instantiate has returned.
+/// Returns a logger that calls the host's logger. The struct of callbacks need not exist after fmi2Instantiate has returned.
 fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Option<Logger> {
     let logger = functions.logger?;
     let environment = functions.componentEnvironment;
     let name = c_string(instance_name.unwrap_or(""));
-    // The text is passed as an argument and not as the format, because it may contain a percent sign.
+    // The message is passed as an argument and not as the format, because it may contain a percent sign.
     Some(Box::new(move |status, category, message| unsafe {
         let (category, message) = (category.as_ptr(), message.as_ptr());
         logger(environment, name.as_ptr(), status, category, c"%s".as_ptr(), message);
     }))
 }
 
-/// Returns the interface of the requested instance and the part of the variables that the host's model description
+/// Returns the interface of the requested instance, and the part of the variables that the host's model description
 /// contains.
 ///
 /// # Errors
-///
 /// If the instance cannot be created; the text is the reason.
 fn interface<M: Model>(
     name: Option<String>,
@@ -330,8 +326,8 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Writes a property of the last step to the host's variable: `known` returns the value for a kind
-/// of status. The call is discarded if `known` has no value for this kind.
+/// Writes a property of the last step to the host's variable. `known` returns the value for a kind of status; if it has no
+/// value for this kind, the call is discarded.
 unsafe fn write_step_status<M: Model, T>(
     c: fmi2Component,
     call: &'static Call,
@@ -449,8 +445,8 @@ fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedState: *const fmi2Byte, s
 fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode());
 
-/// Handles the events that are due, and tells the host whether it has changed states and when the next time
-/// event is.
+/// Handles the events that are due. The struct `eventInfo` then states if states have changed, and the time of
+/// the next time event.
 fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi2Status = {
     let call = Fmi2::NEW_DISCRETE_STATES;
     perform_start::<M, Fmi2>(c, call, |component| {
@@ -472,8 +468,8 @@ fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi
 fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
 
-/// Accepts a step of the host's integrator. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has
-/// no effect.
+/// Accepts a step of the host's integrator. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU
+/// stores no past states.
 fn fmi2CompletedIntegratorStep(c: fmi2Component, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean, enterEventMode: *mut fmi2Boolean, terminateSimulation: *mut fmi2Boolean) -> fmi2Status =
     completed_step::<M, Fmi2, _>(c, enterEventMode, terminateSimulation);
 
@@ -518,7 +514,7 @@ fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference,
     })
 };
 
-/// Makes one step. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has no effect.
+/// Makes one step. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU stores no past states.
 fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean) -> fmi2Status = {
     let call = Fmi2::DO_STEP;
     perform::<M, Fmi2>(c, call, |component| {

@@ -1,23 +1,21 @@
-//! The C interface of FMI 3.0 for Model Exchange and Co-Simulation: 75 functions with their names, signatures
-//! and constants. The standard documents them; comments here describe only what is particular to this
-//! implementation.
+//! The C interface of FMI 3.0 for Model Exchange and Co-Simulation: 75 functions with their names, signatures and constants.
+//! The FMI standard documents them; the comments here describe only properties of this implementation.
 //!
 //! Every function is generic in the model; `export_fmi3!` exports them for one model under their names. Their
 //! effects are implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface
 //! in [`crate::c_abi`].
 //!
-//! The value reference of a scalar is its position among the variables, counted from 1. After the variables
-//! of the table follow the independent variable and the event indicators, which are not variables in FMI 2.0.
-//! There are no clocks and no binary variables; functions for these answer as the standard requires of an FMU
-//! without them.
+//! The value reference of a scalar is its position among the variables, counted from 1. After the variables of the table
+//! follow the independent variable and the event indicators, which are not variables in FMI 2.0. There are no clocks and no
+//! binary variables; the functions for them return what the standard requires of an FMU without them.
 //!
-//! A host that has read the description with arrays, which is known from its token, counts the entries of the
-//! table instead, and its references stand for all scalars of an array ([`arrays`]).
+//! A host that has read the description with arrays is recognised by its token. Its value references count the entries of
+//! the table instead, and each stands for all scalars of an array ([`arrays`]).
 
 // The names are the standard's.
 #![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
-// The safety contract of every function is the FMI 3.0 standard's: an instance comes from one of the functions that
-// make one and is not yet freed, arrays have the lengths given, strings end with NUL.
+// The safety contract of every function is that of the FMI 3.0 standard: an instance comes from one of the functions that
+// create one and is not yet freed, arrays have the given lengths, and strings end with NUL.
 #![allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
 // The standard documents the functions.
 #![allow(missing_docs)]
@@ -66,7 +64,7 @@ fn fmi3GetVersion() -> fmi3String = c"3.0".as_ptr();
 
 // ---- Inquiry, life and death ----
 
-/// Selects what is logged. Failures are always logged.
+/// Selects the messages that are logged. Failures are always logged.
 fn fmi3SetDebugLogging(instance: fmi3Instance, loggingOn: fmi3Boolean, nCategories: usize, categories: *const fmi3String) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &SET_DEBUG_LOGGING, |component| {
         let filter = filter::<M>(&SET_DEBUG_LOGGING, categories, nCategories)?;
@@ -167,7 +165,7 @@ fn fmi3SetInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReferen
     set::<M, _>(instance, &SET_INT32, (valueReferences, nValueReferences), (values, nValues), Value::Integer);
 fn fmi3SetUInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, _values: *const u32, nValues: usize) -> fmi3Status =
     access_no_variable::<M>(instance, const { &Call::new("fmi3SetUInt32", SET) }, (valueReferences, nValueReferences), nValues);
-/// Sets enumerations. A value that does not fit an i32 becomes 0, which is not an item of any enumeration.
+/// Sets enumerations. A value that exceeds an i32 is replaced by 0, which is not an item of any enumeration.
 fn fmi3SetInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Int64, nValues: usize) -> fmi3Status =
     set::<M, _>(instance, &SET_INT64, (valueReferences, nValueReferences), (values, nValues), |n| Value::Integer(i32::try_from(n).unwrap_or(0)));
 fn fmi3SetUInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3UInt64, nValues: usize) -> fmi3Status =
@@ -244,8 +242,7 @@ fn fmi3SetShiftFraction(instance: fmi3Instance, valueReferences: *const fmi3Valu
 /// Does nothing, because fmi3UpdateDiscreteStates evaluates everything.
 fn fmi3EvaluateDiscreteStates(instance: fmi3Instance) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &EVALUATE_DISCRETE_STATES, |_| Ok(()));
-/// Handles the events that are due, and tells the host whether it has changed states and when the next time
-/// event is.
+/// Handles the events that are due. The arguments then state if states have changed, and the time of the next time event.
 fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, nominalsOfContinuousStatesChanged: *mut fmi3Boolean, valuesOfContinuousStatesChanged: *mut fmi3Boolean, nextEventTimeDefined: *mut fmi3Boolean, nextEventTime: *mut fmi3Float64) -> fmi3Status = {
     let call = Fmi3::NEW_DISCRETE_STATES;
     perform_if_allowed::<M, Fmi3>(instance, call, |component| {
@@ -267,8 +264,8 @@ fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *m
 };
 fn fmi3EnterContinuousTimeMode(instance: fmi3Instance) -> fmi3Status =
     perform::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
-/// Accepts a step of the host's integrator. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has
-/// no effect.
+/// Accepts a step of the host's integrator. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU
+/// stores no past states.
 fn fmi3CompletedIntegratorStep(instance: fmi3Instance, _noSetFMUStatePriorToCurrentPoint: fmi3Boolean, enterEventMode: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean) -> fmi3Status =
     completed_step::<M, Fmi3, _>(instance, enterEventMode, terminateSimulation);
 fn fmi3SetTime(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status =

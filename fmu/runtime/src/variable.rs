@@ -47,7 +47,7 @@ impl Value {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Causality {
-    /// An input, which the host sets at any time.
+    /// An input, which the host may set at any time.
     Input,
     Output,
     Local,
@@ -60,7 +60,7 @@ pub enum Causality {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Quantity {
-    /// Unit of the SI value, for example "N.m"; "" if the unit depends on parameters.
+    /// Unit of the value, an SI unit, for example "N.m"; "" if the unit depends on parameters.
     pub unit: &'static str,
     pub display_unit: Option<&'static str>,
     pub min: Option<f64>,
@@ -113,8 +113,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
-/// Function from the number of an array's element, 0 for the first, to the number of the continuous
-/// state that this element is.
+/// Function from the number of an array's element, 0 for the first, to the number of the continuous state that the element
+/// is.
 pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
@@ -122,12 +122,13 @@ pub type Place = fn(usize) -> usize;
 #[allow(missing_docs)]
 pub enum Dimension {
     Fixed(usize),
-    /// Length given by the integer parameter of this name, and the largest length. If every element is a
-    /// variable of its own, the largest length always applies; if the array is one variable, the parameter is
-    /// structural (see [`Layout`](crate::table::Layout)).
+    /// The length is the value of the integer parameter with this name; the number is the largest length. If every
+    /// element is a variable of its own, the array always has the largest length. If the array is one variable, the
+    /// parameter is structural (see [`Layout`](crate::table::Layout)).
     Sized(&'static str, usize),
-    /// Always of the largest length; the integer parameter of this name says how many elements are used. A
-    /// reduced description leaves the other elements out (see [`extent`](crate::extent)).
+    /// The array always has the largest length, which is the number; the value of the integer parameter with
+    /// this name is the number of elements that are used. A reduced model description does not contain the
+    /// other elements (see [`extent`](crate::extent)).
     Used(&'static str, usize),
 }
 
@@ -142,28 +143,28 @@ impl Dimension {
     }
 }
 
-/// Access to a variable in the model. The last argument is the number of the element in an array, 0 for the
-/// first and for a scalar.
+/// How the value of a variable is read from and written to the model. The last argument of each function is the number of
+/// the element in an array, 0 for the first element and for a scalar.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub enum Access<M: Dynamics> {
-    /// An input; the function returns the places of its value and its slope.
+    /// An input; the function returns references to its value and its slope.
     Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
     Output(fn(&M::Outputs, usize) -> f64),
     OutputInteger(fn(&M::Outputs, usize) -> i32),
     OutputBoolean(fn(&M::Outputs, usize) -> bool),
-    /// A variable that follows only from parameters and present inputs; the function returns its
-    /// value, and its rate of change for the inputs' slopes.
+    /// A variable that depends only on parameters and present inputs; the function returns its value, and its rate of change
+    /// if the inputs change with their slopes.
     OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
     Boolean(fn(&mut M::Parameters) -> &mut bool),
     Integer(fn(&mut M::Parameters, usize) -> &mut i32),
-    /// A parameter that the model does not store as an i32.
+    /// A parameter that the model does not store as an i32, but in another type.
     Choice {
         get: fn(&M::Parameters, usize) -> i32,
         set: fn(&mut M::Parameters, usize, i32),
     },
-    /// A calculated parameter: the function computes it from the model, and it is constant in time.
+    /// A calculated parameter, which is constant in time; the function computes it from the model.
     Calculated(fn(&M, usize) -> f64),
     /// A continuous state that is not an output.
     State,
@@ -174,37 +175,35 @@ pub enum Access<M: Dynamics> {
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Variable<M: Dynamics> {
-    /// Name. The element of an array has its indices, counted from 1, in the empty brackets of the name;
-    /// further indices follow in brackets of their own. For example `tank[].p` with the shape 4, 3, 3 has the
+    /// Name of the variable. An array has empty brackets in its name, which contain the first index of an element, counted
+    /// from 1; further indices follow in brackets at the end. For example, `tank[].p` with the shape 4, 3, 3 has the
     /// elements `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
     pub description: &'static str,
     pub causality: Causality,
     pub kind: Kind,
-    /// Access to its value in the model.
+    /// How the value is read from and written to the model.
     pub access: Access<M>,
     /// Dimensions of an array; empty for a scalar.
     pub shape: &'static [Dimension],
-    /// For a continuous state the function that returns its number as the model counts states;
-    /// otherwise `None`.
+    /// For a continuous state the function that returns its number in the model; otherwise `None`.
     pub state: Option<Place>,
     /// True if events can make this state discontinuous.
     pub reinit: bool,
-    /// True if the slope of this input over a step follows from other inputs
-    /// ([`Dynamics::set_dependent_slopes`]), whatever slope the host sets.
+    /// True if other inputs determine the slope of this input over a step ([`Dynamics::set_dependent_slopes`]), whatever
+    /// slope the host sets.
     pub follows_inputs: bool,
     /// True if this parameter can be set during the simulation.
     pub tunable: bool,
-    /// Inputs and continuous states on which the variable depends without delay. The name of an
-    /// array stands for all its elements; the name with "[]" stands for the element with the index
-    /// of the variable.
+    /// Inputs and continuous states on which the variable depends without delay. The name of an array stands for all its
+    /// elements. The name with "[]" stands for the element that has the index of the variable.
     pub depends_on: &'static [&'static str],
-    /// Further parameters and inputs on which the initial value of the variable depends. A name
-    /// that ends with a dot stands for all parameters that begin with it.
+    /// Further parameters and inputs on which the initial value of the variable depends. A name that ends with a dot stands
+    /// for all parameters whose names begin with it.
     pub initial_depends_on: &'static [&'static str],
 }
 
-// Derived implementations would require the same of M.
+// Derived implementations would require the same traits of M.
 impl<M: Dynamics> Clone for Access<M> {
     fn clone(&self) -> Self {
         *self
@@ -218,8 +217,8 @@ impl<M: Dynamics> Clone for Variable<M> {
 }
 impl<M: Dynamics> Copy for Variable<M> {}
 
-/// Shortest time in which an input may cross its range, s, because values that follow from faster changes may
-/// overflow.
+/// Shortest time, s, in which an input may cross its range. If inputs changed faster, values that depend on
+/// their rates might overflow.
 const CROSSING: f64 = 1e-9;
 
 const fn variable<M: Dynamics>(
@@ -249,8 +248,8 @@ const fn quantity(unit: &'static str) -> Kind {
     Kind::Real(Quantity { unit, display_unit: None, min: None, max: None, nominal: None })
 }
 
-/// Defines functions that declare a variable: arguments between name and description, causality, type and
-/// access.
+/// Defines functions that declare a variable. Each row contains the arguments between name and description, the causality,
+/// the type and the access.
 macro_rules! declarations {
     ($($(#[$doc:meta])* $function:ident($($argument:ident: $type:ty),*) =
         $causality:ident, $kind:expr, $access:expr;)*) => {
@@ -272,15 +271,15 @@ macro_rules! declarations {
 const INTEGER: Kind = Kind::Integer { min: None, max: None };
 
 declarations! {
-    /// Declares an input with its value and slope.
+    /// Declares an input; `ramp` returns references to its value and its slope.
     input(ramp: fn(&mut M::Inputs, usize) -> [&mut f64; 2], unit: &'static str) =
         Input, quantity(unit), Access::Input(ramp);
     /// Declares an output; `get` reads element n from the model's outputs.
     output(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Output, quantity(unit), Access::Output(get);
     /// Declares a real local variable; `get` reads element n from the model's outputs.
     local(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Local, quantity(unit), Access::Output(get);
-    /// Declares a real local variable that follows only from parameters and present inputs, with its rate for
-    /// the inputs' slopes.
+    /// Declares a real local variable that depends only on parameters and present inputs; `get` returns its value, and its
+    /// rate if the inputs change with their slopes.
     local_of_inputs(get: fn(&M, &M::Inputs, usize) -> [f64; 2], unit: &'static str) =
         Local, quantity(unit), Access::OfInputs(get);
     /// Declares the derivative of a continuous state, whose name is "der(", the name of the state, and ")".
@@ -292,17 +291,17 @@ declarations! {
     /// Declares a local variable that is an enumeration; `get` reads element n from the model's outputs.
     local_enumeration(of: &'static Enumeration, get: fn(&M::Outputs, usize) -> i32) =
         Local, Kind::Enumeration(of), Access::OutputInteger(get);
-    /// Declares a real parameter; `field` returns the place of element n in the model's parameters.
+    /// Declares a real parameter; `field` returns a reference to element n in the model's parameters.
     parameter(field: fn(&mut M::Parameters, usize) -> &mut f64, unit: &'static str) =
         Parameter, quantity(unit), Access::Real(field);
-    /// Declares a Boolean parameter; `field` returns its place in the model's parameters.
+    /// Declares a Boolean parameter; `field` returns a reference to it in the model's parameters.
     switch(field: fn(&mut M::Parameters) -> &mut bool) = Parameter, Kind::Boolean, Access::Boolean(field);
-    /// Declares an integer parameter; `field` returns the place of element n in the model's parameters.
+    /// Declares an integer parameter; `field` returns a reference to element n in the model's parameters.
     integer(field: fn(&mut M::Parameters, usize) -> &mut i32) = Parameter, INTEGER, Access::Integer(field);
-    /// Declares an integer parameter that the model stores in another type, which `get` and `set` convert.
+    /// Declares an integer parameter that the model stores in another type; `get` and `set` convert it.
     count(get: fn(&M::Parameters, usize) -> i32, set: fn(&mut M::Parameters, usize, i32)) =
         Parameter, INTEGER, Access::Choice { get, set };
-    /// Declares a parameter that is an enumeration; `get` and `set` convert the item to its number.
+    /// Declares a parameter that is an enumeration; `get` and `set` convert the number of the item.
     choice(of: &'static Enumeration, get: fn(&M::Parameters, usize) -> i32, set: fn(&mut M::Parameters, usize, i32)) =
         Parameter, Kind::Enumeration(of), Access::Choice { get, set };
     /// Declares a calculated parameter; `get` computes element n from the model with its parameters.
@@ -379,8 +378,7 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Declares that during a step this input follows from other inputs, for example a rate from an
-    /// acceleration.
+    /// Declares that other inputs determine this input during a step, for example a rate by its derivative.
     pub const fn follows_inputs(mut self) -> Self {
         self.follows_inputs = true;
         self
@@ -430,7 +428,7 @@ impl<M: Dynamics> Variable<M> {
         false
     }
 
-    /// Returns the indices, each from 0, of an element (0 for the first).
+    /// Returns the indices of an element, each counted from 0. The number of the first element is 0.
     pub fn indices(&self, element: usize) -> Vec<usize> {
         let mut indices = Vec::with_capacity(self.shape.len());
         let mut rest = element;
@@ -442,7 +440,7 @@ impl<M: Dynamics> Variable<M> {
         indices
     }
 
-    /// Returns the name of an element (0 for the first).
+    /// Returns the name of an element. The number of the first element is 0.
     pub fn element_name(&self, element: usize) -> String {
         let indices: Vec<_> = self.indices(element).iter().map(|i| (i + 1).to_string()).collect();
         self.indexed(&indices)
@@ -473,7 +471,7 @@ impl<M: Dynamics> Variable<M> {
         name + closing
     }
 
-    /// Returns the start value, or `None` if the variable is computed.
+    /// Returns the start value; `None` if the value of the variable is computed.
     pub fn start(
         &self,
         parameters: &mut M::Parameters,
@@ -486,8 +484,8 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the value in `parameters`, or `None` if the variable is not a parameter. `parameters` are not
-    /// changed; they are borrowed mutably because the same accessors serve reading and writing.
+    /// Returns the value in `parameters`; `None` if the variable is not a parameter. `parameters` are not changed; the
+    /// reference is mutable because the same accessor functions read and write.
     pub fn parameter_value(&self, parameters: &mut M::Parameters, element: usize) -> Option<Value> {
         match self.access {
             Access::Real(field) => Some(Value::Real(*field(parameters, element))),
@@ -517,8 +515,8 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the largest rate of an input: the larger bound of its range divided by [`CROSSING`], or
-    /// infinity without a range.
+    /// Returns the largest rate of an input: the bound of its range with the larger magnitude divided by [`CROSSING`], or
+    /// infinity if it has no range.
     pub fn fastest(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { min: Some(min), max: Some(max), .. }) => {
@@ -533,7 +531,7 @@ impl<M: Dynamics> Variable<M> {
     #[inline]
     pub fn allows_rate(&self, rate: f64) -> bool {
         let Kind::Real(Quantity { min, max, .. }) = &self.kind else { return is_finite(rate) };
-        // NaN must not be multiplied, see [`is_finite`].
+        // NaN must not be multiplied in a host that traps invalid operations, see [`is_finite`].
         let change = if is_finite(rate) { rate.abs() } else { 0.0 } * CROSSING;
         is_finite(rate)
             && (max.is_none_or(|max| change <= max) || min.is_none_or(|min| change <= -min))
@@ -565,7 +563,7 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns an error if `value` is not allowed for an element, as `name = value unit (allowed: …)`.
+    /// Returns an error message if `value` is not allowed for an element, in the form `name = value unit (allowed: …)`.
     #[inline]
     pub fn problem(&self, element: usize, value: Value) -> Option<String> {
         if self.allows(value) { None } else { Some(self.refusal(element, value)) }
@@ -575,7 +573,7 @@ impl<M: Dynamics> Variable<M> {
     fn allows(&self, value: Value) -> bool {
         match (&self.kind, value) {
             (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
-                // NaN must not be compared, see [`is_finite`].
+                // NaN must not be compared in a host that traps invalid operations, see [`is_finite`].
                 let number = if is_finite(x) { x } else { f64::INFINITY };
                 is_finite(x) && min.is_none_or(|m| number >= m) && max.is_none_or(|m| number <= m)
             }

@@ -1,18 +1,18 @@
-//! Properties of a version of FMI: the names of its functions, the states in which they are allowed, the
-//! handler of events, and the numbering of value references.
+//! Properties of a version of FMI: the names of its functions, the instance states in which they are allowed, who handles
+//! events, and the numbers of value references.
 
 use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
 use crate::table::{Layout, Scalar};
 
-/// A version of FMI. Each constant is the function that performs an operation of
-/// [`Instance`](crate::instance::Instance). Functions that read and set values are not listed, because a
-/// version has several of them.
+/// A version of FMI. Each constant of the type [`Call`] is the function that performs an operation of
+/// [`Instance`](crate::instance::Instance). Functions that read and set values are not among them, because a version has
+/// several.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
     const PREFIX: &'static str;
 
-    /// Data that an instance keeps about its host in this version of FMI, other than the logger.
+    /// Data about its host that an instance stores in this version of FMI, except for the logger.
     type Host<M: Model>;
 
     /// The instance state after a call has failed; `None` if the state does not change.
@@ -21,7 +21,7 @@ pub trait Version: std::fmt::Debug + 'static {
     const OUT_OF_RANGE: Severity;
     /// The instance state that follows initialization mode if the host handles events.
     const FIRST_EVENT: InstanceState;
-    /// True if Model Exchange hosts may set single continuous states, and may not go back before an event.
+    /// True if Model Exchange hosts may set single continuous states, and may not set a time before the last event.
     const SETS_STATES: bool;
 
     const SETUP_EXPERIMENT: &'static Call;
@@ -47,15 +47,14 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// Returns the text by which the FMU recognises its model description: the GUID (FMI 2.0) or
-    /// instantiationToken (FMI 3.0).
+    /// Returns the text by which the FMU recognises its model description: the GUID (FMI 2.0) or the instantiationToken (FMI
+    /// 3.0).
     fn token<M: Model>(layout: Layout) -> &'static str;
 
-    /// Returns the party that handles events of an instance with this interface, if the host does
-    /// not choose.
+    /// Returns who handles the events of an instance with this interface if the host does not choose.
     fn events(interface: Interface) -> Events;
 
-    /// Returns true if a host may choose this handler of events for an interface.
+    /// Returns true if a host may choose this handling of events for an interface.
     fn allows(interface: Interface, events: Events) -> bool {
         events == Self::events(interface)
     }
@@ -63,10 +62,10 @@ pub trait Version: std::fmt::Debug + 'static {
     /// Returns the value reference by which the host refers to a scalar in this version of FMI.
     fn reference<M: Model>(scalar: &Scalar<M>) -> u32;
 
-    /// Finds the scalar to which a host's value reference belongs.
+    /// Returns the scalar of a host's value reference.
     ///
     /// # Errors
-    /// If there is none, or it does not have this C type.
+    /// If there is no such scalar, or it does not have this C type.
     fn scalar<M: Model>(
         reference: u32,
         c_type: Option<CType>,

@@ -1,4 +1,4 @@
-//! Setup before the motion, and the states in which each call is allowed.
+//! Tests of the setup before the simulation, and of the instance states in which each call is allowed.
 
 use super::*;
 use crate::call::{Call, Events, InstanceState};
@@ -65,7 +65,7 @@ fn instance_goes_through_the_states_of_its_interface() {
     assert_eq!(instance.state(), Event);
     instance.reset().unwrap();
     assert_eq!(to_bytes(&instance), to_bytes(&fresh(ME)));
-    // Any call that goes on ends the time of parameters.
+    // After any call that continues the simulation, parameters can no longer be set.
     type GoesOn = fn(&mut Subject) -> Result<(), Fault>;
     let goes_on: [GoesOn; 6] = [
         |i| i.enter_event_mode(),
@@ -82,7 +82,8 @@ fn instance_goes_through_the_states_of_its_interface() {
     }
 }
 
-/// Two start levels that are both too high are named in one error at the end of initialisation, and can be corrected.
+/// Two start levels are both too high. One error at the end of initialisation contains both problems, and the
+/// levels can be corrected.
 #[test]
 fn contradicting_parameters_end_initialization_with_all_faults_named() {
     let mut instance = fresh(CS);
@@ -96,7 +97,7 @@ fn contradicting_parameters_end_initialization_with_all_faults_named() {
     set(&mut instance, "start.level[1]", 10.0).unwrap();
     set(&mut instance, "start.level[2]", 10.0).unwrap();
     assert_eq!(instance.exit_initialization_mode(), Ok(()));
-    // In Model Exchange parameters can be set once more.
+    // In Model Exchange parameters can still be set after initialization.
     let mut instance = started(ME, &[]);
     set(&mut instance, "start.level[1]", 90.0).unwrap();
     assert_eq!(
@@ -168,8 +169,8 @@ const STATUS: [&str; 5] =
 const SET: [&str; 4] = ["SetReal", "SetInteger", "SetBoolean", "SetString"];
 const LOOK: [&str; 3] = ["GetDerivatives", "GetEventIndicators", "GetContinuousStates"];
 
-/// The state machines of FMI 2.0.1 (sections 3.2.3 and 4.2.4), state by state. In addition this FMU allows
-/// event mode to be entered once more, time and states to be set in it, and a step that failed to be ended.
+/// The state machines of FMI 2.0.1 (sections 3.2.3 and 4.2.4), state by state. In addition, this FMU allows hosts to enter
+/// event mode again from event mode, to set time and states in event mode, and to terminate after a failed step.
 #[test]
 fn calls_allowed_in_each_state_equal_those_of_the_standard() {
     use InstanceState::*;

@@ -1,4 +1,4 @@
-//! Messages to the host's logger.
+//! Tests of the messages that the host's logger receives.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -38,7 +38,7 @@ fn failures_come_with_status_and_category() {
     log.filter = Filter::NONE;
     log.report(&Fault { severity: Severity::Fatal, text: String::new() });
     assert!(lines.take().is_empty());
-    // A host without a logger hears nothing.
+    // Without a logger of the host, nothing happens.
     Log::new(None).report(&Fault { severity: Severity::Fatal, text: String::new() });
 }
 
@@ -61,7 +61,7 @@ fn events_are_logged_on_request_with_the_last_one_and_their_number() {
     assert!(lines.take().is_empty());
 }
 
-/// Warnings concern the model that begins to move, with its parameters, its states and the present inputs.
+/// The warnings depend on the model at the start of the motion: its parameters, states and present inputs.
 #[test]
 fn warnings_concern_the_parameters_at_the_start_of_the_motion() {
     let mut instance = fresh(ME);

@@ -1,5 +1,5 @@
-//! Tests of one instance as a host in Rust meets it, with a model that has everything ([`vessels`])
-//! and one that has nothing but states (tests/spring).
+//! Tests of an instance through the Rust interface, with a model that uses all features of the runtime ([`vessels`]) and a
+//! model that has only states (tests/spring).
 
 mod experiment;
 mod log;
@@ -89,13 +89,13 @@ fn real(instance: &mut Subject, name: &str) -> f64 {
 }
 
 fn refused<T: std::fmt::Debug>(result: Result<T, Fault>) -> String {
-    let fault = result.expect_err("it should be refused");
+    let fault = result.expect_err("the call should be refused");
     assert_eq!(fault.severity, Severity::Error, "{}", fault.text);
     fault.text
 }
 
 fn discarded<T: std::fmt::Debug>(result: Result<T, Fault>) -> String {
-    let fault = result.expect_err("it should be discarded");
+    let fault = result.expect_err("the call should be discarded");
     assert_eq!(fault.severity, Severity::Discard, "{}", fault.text);
     fault.text
 }

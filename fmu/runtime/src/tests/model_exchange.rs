@@ -1,4 +1,4 @@
-//! Tests with a host that integrates and handles events.
+//! Tests with a host that integrates the states and handles events.
 
 use super::*;
 use crate::call::InstanceState;
@@ -82,7 +82,7 @@ fn discrete_changes_happen_only_at_events() {
     assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(true)));
     assert_eq!(real(&mut instance, "level[1]"), 1.5);
     assert_eq!((instance.event_count(), instance.time()), (1, 0.0));
-    // Once is enough.
+    // A second call has no effect.
     let info = EventInfo { states_changed: false, next_time: Some(5.0) };
     assert_eq!(instance.new_discrete_states(), Ok(info));
     instance.enter_continuous_time_mode().unwrap();
@@ -98,8 +98,8 @@ fn discrete_changes_happen_only_at_events() {
     );
 }
 
-/// Before the motion a variable depends on the values from which it starts. Later it depends on states and
-/// inputs, as far as they have an effect at present: without a leak a rate depends only on the inflow.
+/// Before the simulation starts, a variable depends on the values from which its initial value is computed. Afterwards it
+/// depends on those states and inputs that have an effect at present: without a leak a rate depends only on the inflow.
 #[test]
 fn only_declared_dependencies_that_have_an_effect_now_are_reported() {
     let of = |instance: &mut Subject, name: &str| {
@@ -142,7 +142,7 @@ fn invalid_continuous_states_end_the_simulation() {
     assert_eq!(instance.state(), InstanceState::Failed);
 }
 
-/// The slack is 1e-9 of the time since the start, at least 1e-9 s, plus 8 roundings of the largest time.
+/// The tolerance is 1e-9 of the time since the start, at least 1e-9 s, plus 8 rounding errors of the largest time.
 #[test]
 fn accepted_steps_may_pass_the_stop_time_by_rounding_errors() {
     for (start, stop, slack) in [

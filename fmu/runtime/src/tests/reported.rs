@@ -1,5 +1,5 @@
-//! Co-Simulation of FMI 3.0 by a host that handles events. Events happen within the steps; discrete outputs change when
-//! the host updates discrete states.
+//! Tests of Co-Simulation in FMI 3.0 with a host that handles events. Events occur within the steps; discrete outputs change
+//! when the host updates discrete states.
 
 use super::*;
 use crate::call::{Events, InstanceState};
@@ -41,7 +41,8 @@ fn valve_outputs(host: &mut Host) -> [Value; 3] {
 const CLOSED: [Value; 3] = [Value::Boolean(false), Value::Integer(0), Value::Integer(1)];
 const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Integer(2)];
 
-/// FMI 3.0 with event mode: after a step that ends at an event, discrete outputs change only in event mode.
+/// In FMI 3.0 with event mode, discrete outputs do not change in a step that ends at an event, but only in the following
+/// event mode.
 #[test]
 fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
@@ -57,8 +58,8 @@ fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let event = StepInfo { event: true, early: false };
     assert_eq!(host.step_to_event(0.5, 0.001, false), Ok(event));
     assert_eq!(valve_outputs(&mut host), CLOSED, "the valve has opened");
-    assert!((level(&mut host) / before - 0.5).abs() < 1e-3, "and half of the vessel is spilt");
-    // it stays an event until it is handled
+    assert!((level(&mut host) / before - 0.5).abs() < 1e-3, "half of the vessel must be spilt");
+    // The event remains until the host handles it.
     assert_eq!(host.step_to_event(0.501, 0.5, false), Ok(event));
     host.enter_event_mode().unwrap();
     assert_eq!(valve_outputs(&mut host), CLOSED);
@@ -70,7 +71,7 @@ fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     assert_eq!(valve_outputs(&mut host), OPENED);
 }
 
-/// An error terminates an instance of FMI 3.0, but its variables can still be read.
+/// An error ends the simulation of an instance in FMI 3.0, but its variables can still be read.
 #[test]
 fn after_an_error_before_initialization_discrete_outputs_have_their_start_values() {
     let mut host = Host::with_events(CS, Events::Reported);
@@ -78,14 +79,14 @@ fn after_an_error_before_initialization_discrete_outputs_have_their_start_values
     host.after_error();
     assert_eq!(host.state(), InstanceState::Terminated);
     assert_eq!(valve_outputs(&mut host), CLOSED);
-    // Saved states keep the difference between a value and none.
+    // Saved states distinguish discrete outputs with a value from those without.
     let bytes = to_bytes(&host);
     let mut other = from_bytes::<Vessels, Fmi3>(&bytes).unwrap();
     assert_eq!(valve_outputs(&mut other), CLOSED);
     assert!(to_bytes(&other) == bytes);
 }
 
-/// FMI 3.0: initialisation fails because a parameter is NaN; reading a discrete or a continuous output is then an error.
+/// In FMI 3.0 initialisation fails because a parameter is NaN. Reading a discrete or a continuous output is then an error.
 #[test]
 fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value() {
     let mut host = Host::with_events(CS, Events::Reported);
@@ -99,7 +100,7 @@ fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value()
     assert!(host.get(&GET_FLOAT64, number("level[1]")).is_err());
 }
 
-/// In the test model a platform rises by w = 0.25 m/s from 0 at t = 1 s and opens a valve, which is the event.
+/// In the test model a platform rises at w = 0.25 m/s from height 0 at t = 1 s. It opens a valve, which is the event.
 #[test]
 fn a_step_ends_at_an_event_if_the_host_allows_early_return_and_input_ramps_end_there_too() {
     let real = |host: &mut Host, name: &str| match host.get(&GET_FLOAT64, number(name)) {
@@ -113,14 +114,18 @@ fn a_step_ends_at_an_event_if_the_host_allows_early_return_and_input_ramps_end_t
         ((info.event, info.early), (host.time(), real(&mut host, "z")))
     };
     assert_eq!(after(Events::Reported, true, 6.0), ((true, true), (5.0, 1.0)));
-    assert_eq!(after(Events::Reported, true, 4.0), ((true, false), (5.0, 1.0)), "at its end");
+    assert_eq!(
+        after(Events::Reported, true, 4.0),
+        ((true, false), (5.0, 1.0)),
+        "the event is at the end of the step"
+    );
     assert_eq!(after(Events::Reported, true, 2.0), ((false, false), (3.0, 0.5)), "before");
     assert_eq!(after(Events::Reported, false, 6.0), ((true, false), (7.0, 1.5)), "passed");
     assert_eq!(after(Events::InStep, true, 6.0), ((false, false), (7.0, 1.5)), "not told");
 }
 
-/// The slack of a time before the last event is 1e-9 of the time since the start, plus 8 roundings of the
-/// largest time.
+/// A time before the last event is allowed within 1e-9 of the time since the start, plus 8 rounding errors of the largest
+/// time.
 #[test]
 fn time_may_go_back_to_the_last_event_at_most() {
     for (start, last, slack) in [
@@ -149,8 +154,7 @@ fn time_may_go_back_to_the_last_event_at_most() {
     }
 }
 
-/// After both errors the host may continue in FMI 3.0: an input outside its range, and invalid continuous
-/// states.
+/// In FMI 3.0 an input outside its range and invalid continuous states return Discard, after which the host may continue.
 #[test]
 fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     let mut host = stepping(Events::Reported, 0.0, &[]);
@@ -165,14 +169,14 @@ fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
         assert!(said.contains(&expected), "{said}");
     }
     host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(-9.9e29)).unwrap();
-    // a state alone is set as one
+    // If only a state is set, the call sets the state.
     let said = discarded(host.set(&SET_FLOAT64, &[number("q[2]")], |_| Value::Real(11.0)));
     assert!(said.contains("q[2] = 11.0"), "{said}");
     let start = number("start.level[1]");
     assert!(
         refused(host.set(&SET_FLOAT64, &[start], |_| Value::Real(2.0))).contains("start.level[1]")
     );
-    // and by a host that integrates itself, once the motion has begun
+    // A host that integrates the states itself can set a state, too, after the simulation has started.
     let level = |host: &mut Host| {
         refused(host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(1.0)))
     };
@@ -185,8 +189,8 @@ fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     assert!(refused(set(&mut two, "level[2]", 1.0)).contains("level[2]"));
 }
 
-/// A step with a million internal steps is discarded, because a shorter one may succeed. A step in which a
-/// vessel overflows is an error, because no shorter one helps. In FMI 2.0 both are errors,
+/// In FMI 3.0 a step that needs more than a million internal steps is discarded, because a smaller step may succeed. A
+/// step in which a vessel overflows is an error, because no smaller step would succeed. In FMI 2.0 both are errors,
 /// which end the simulation.
 #[test]
 fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
@@ -208,8 +212,8 @@ fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
     assert_eq!(host.state(), InstanceState::Failed);
 }
 
-/// FMI 3.0 Co-Simulation handles events within the step, or reports events to a host with event mode; in Model Exchange the
-/// host handles events.
+/// In FMI 3.0 Co-Simulation either the FMU handles events within the step, or events are reported to a host with event mode.
+/// In Model Exchange the host handles events.
 #[test]
 fn events_are_handled_by_the_interface_or_reported_in_co_simulation() {
     let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));

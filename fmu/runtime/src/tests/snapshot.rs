@@ -1,4 +1,4 @@
-//! Saved states: nothing is lost, and nothing that is damaged is taken.
+//! Tests of saved states: all data are restored, and damaged states are refused.
 
 use super::*;
 use crate::call::InstanceState;
@@ -103,8 +103,8 @@ fn an_instance_restored_from_bytes_continues_bit_identically() {
     assert!(refused(again.do_step(2.0, 8.0)).contains("stop time 9.0 s"));
 }
 
-/// The step before followed slopes: the outputs use them until an input is set, also after the state is
-/// restored.
+/// The inputs changed linearly in the step before. The outputs use these slopes until an input is set, also after
+/// the state is restored.
 #[test]
 fn input_slopes_of_the_last_step_are_part_of_a_saved_state() {
     let mut instance = eventful();
@@ -114,7 +114,7 @@ fn input_slopes_of_the_last_step_are_part_of_a_saved_state() {
     assert_eq!(real(&mut again, "trend"), 0.125);
     set(&mut again, "z", 0.0).unwrap();
     assert_eq!(real(&mut again, "trend"), 0.0);
-    // Slopes for the next step are not forgotten when an input is set.
+    // Slopes for the next step are kept if an input is set.
     let mut sloped = read(&to_bytes(&eventful())).unwrap();
     set(&mut sloped, "z", 0.0).unwrap();
     assert_eq!(real(&mut sloped, "trend"), 0.125);
@@ -181,7 +181,7 @@ fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     }
 }
 
-/// Single fields of a saved state are set to impossible values, and the checksum is made to match.
+/// Single fields of a saved state are set to invalid values, and the checksum is adjusted.
 #[test]
 fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());
@@ -212,7 +212,7 @@ fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
     assert_eq!(why(INPUTS + 8, &number(1e12)), "derivative of q[1] = 1000000000000.0");
     assert_eq!(why(WORDS + 4 * 8, &[2]), "the model's state");
     assert_eq!(why(FLAGS, &[0]), "the model is missing");
-    // Before the motion begins a wrong parameter may stand there, and no model.
+    // Before the simulation starts, a parameter out of its range and a missing model are allowed.
     let mut fresh = fresh(CS);
     set(&mut fresh, "leak", -1.0).unwrap();
     let mut again = read(&to_bytes(&fresh)).unwrap();

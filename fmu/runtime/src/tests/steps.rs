@@ -1,10 +1,10 @@
-//! Steps of Co-Simulation, and inputs with slopes.
+//! Tests of the steps of Co-Simulation, and of inputs with slopes.
 
 use super::*;
 use crate::variable::Access;
 
-/// Returns the level of a vessel, m, after `h` seconds with a leak of k = 1/2 1/s, from the level
-/// `x` and the inflow `q` with its slope.
+/// Returns the level of a vessel, m, after `h` seconds with a leak of k = 1/2 1/s. The level starts at `x`, and `q` is the
+/// inflow, whose slope is `slope`.
 fn level(x: f64, q: f64, slope: f64, h: f64) -> f64 {
     let e = (-0.5 * h).exp();
     x * e + 2.0 * q * (1.0 - e) + 2.0 * slope * (h - 2.0 * (1.0 - e))
@@ -29,7 +29,7 @@ fn inputs_change_along_their_derivatives_within_a_step() {
     close(real(&mut instance, "level[1]"), x, 1e-15);
     close(real(&mut instance, "level[2]"), 4.0, 1e-15);
     assert_eq!(real(&mut instance, "q[1]"), 2.0);
-    // The slope held for that step only.
+    // The slope was valid only for that step.
     instance.do_step(0.5, 0.25).unwrap();
     close(real(&mut instance, "level[1]"), level(x, 2.0, 0.0, 0.25), 1e-15);
     assert_eq!((real(&mut instance, "q[1]"), instance.time()), (2.0, 0.75));
@@ -54,8 +54,8 @@ fn a_step_must_be_longer_than_zero_and_begin_at_the_end_of_the_step_before() {
     assert!(unchanged(&mut instance, |i| i.do_step(-0.5, 1.0)).contains("= -0.5 s"));
 }
 
-/// Hosts add up steps in their own ways. Times are the same within 1e-9 of the larger of step and time since
-/// the start, plus 8 roundings of the largest time.
+/// Hosts add up step sizes in different ways. Times are equal within 1e-9 of the step size or the time since the start,
+/// whichever is larger, plus 8 rounding errors of the largest time.
 #[test]
 fn communication_point_may_be_off_by_rounding_errors() {
     for (start, before, h, slack) in [
@@ -81,7 +81,8 @@ fn communication_point_may_be_off_by_rounding_errors() {
     }
 }
 
-/// The stop time may also be passed by 1e-9 of the larger of step and time since the start, plus 8 roundings.
+/// The stop time may be passed by 1e-9 of the step size or the time since the start, whichever is larger, plus 8 rounding
+/// errors.
 #[test]
 fn the_last_step_may_pass_the_stop_time_by_rounding_errors() {
     for (start, stop, slack) in [
@@ -116,8 +117,8 @@ fn no_step_is_allowed_after_a_step_that_ends_at_the_stop_time() {
     );
 }
 
-/// q must not fall below 1. A ramp from 4 may miss this value by 1e-9 of its height and then ends exactly
-/// there.
+/// q must not fall below 1. If a ramp from 4 ends below this value by at most 1e-9 of the ramp's height, it
+/// ends at exactly 1.
 #[test]
 fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     let after = |end: f64| {
@@ -132,7 +133,7 @@ fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     assert!(refused(after(1.0 - 3.3e-9)).contains("at the end of the step q[1] = 0.9999"));
     assert!(refused(after(0.5)).contains("at the end of the step q[1] = 0.5 m/s"));
     assert!(refused(after(10.5)).contains("at the end of the step q[1] = 10.5 m/s"));
-    // What has no smallest value goes where its slope leads.
+    // An input without a smallest value follows its slope to any value.
     let mut instance = started(CS, &[]);
     slope(&mut instance, "w", -2.0).unwrap();
     instance.do_step(0.0, 1.0).unwrap();
@@ -145,7 +146,7 @@ fn a_step_that_is_refused_keeps_the_slopes() {
     slope(&mut instance, "w", 2.0).unwrap();
     let why = unchanged(&mut instance, |i| i.do_step(0.0, 1.0));
     assert!(why.contains("at the end of the step w = 3.0 m/s"), "{why}");
-    // Those of the step before, too.
+    // The slopes of the step before are kept as well.
     instance.do_step(0.0, 0.5).unwrap();
     assert!(instance.past_slopes);
     let why = unchanged(&mut instance, |i| i.do_step(0.5, f64::MAX));
@@ -158,15 +159,15 @@ fn an_input_that_is_the_derivative_of_another_input_changes_the_other_input() {
     instance.do_step(0.0, 0.5).unwrap();
     assert_eq!(real(&mut instance, "z"), 1.25);
     slope(&mut instance, "w", 2.0).unwrap();
-    // Looking on from here: the platform rises at w, whatever w does later.
+    // The derivative is that of the next step: the platform rises at w, even if w changes later.
     assert_eq!(rate(&mut instance, "room"), Ok(-0.5));
     instance.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut instance, "w"), 1.5);
     assert_eq!(real(&mut instance, "z"), 1.25 + 0.5 * 0.5 + 0.5 * 2.0 * 0.25);
 }
 
-/// Outputs at the end of a step are limits from the left, with the slopes of that step. A new value or slope
-/// of any input begins the next step, without those slopes.
+/// At the end of a step outputs are limits from the left, with the slopes of this step. If a value or slope of any input is
+/// set, they belong to the next step, without the old slopes.
 #[test]
 fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     let ramped = || {
@@ -186,12 +187,12 @@ fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     let why = unchanged(&mut ramped(), |i| slope(i, "q[2]", f64::NAN));
     assert!(why.contains("derivative of q[2] = NaN"), "{why}");
     assert_eq!(real(&mut sloped_anew, "trend"), 0.25);
-    // Held through the next step, they are gone.
+    // After the next step, with constant inputs, the slopes are dropped.
     let mut held = ramped();
     held.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut held, "trend"), 0.0);
     assert!(!held.past_slopes);
-    // Derivatives look forward: past slopes are no part of them, and stay.
+    // Derivatives belong to the next step, so that they do not use the old slopes and do not drop them.
     let mut asked = ramped();
     let net = real(&mut asked, "net[1]");
     assert_eq!(rate(&mut asked, "net[1]"), Ok(-0.5 * net));
@@ -252,7 +253,8 @@ fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
     assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
 }
 
-/// Between steps, outputs show the valve as the present inputs make it, but the model itself is not changed.
+/// Between steps the outputs show the valve in the position that the present inputs cause, but the model itself is not
+/// changed.
 #[test]
 fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     let mut instance = started(CS, &[]);
@@ -263,7 +265,7 @@ fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     assert_eq!(get(&mut instance, "events"), Ok(Value::Integer(0)));
     set(&mut instance, "z", 3.0).unwrap();
     assert_eq!(get(&mut instance, "valve"), Ok(Value::Integer(2)));
-    // Had it stayed open, the step would see no event.
+    // If the valve had stayed open in the model, the step would have no event.
     instance.do_step(0.0, 1e-9).unwrap();
     assert_eq!(instance.event_count(), 1);
     close(real(&mut instance, "level[1]"), 1.5, 1e-8);
@@ -272,7 +274,7 @@ fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
 
 #[test]
 fn the_model_receives_the_hosts_time_before_each_step() {
-    // Due at 100.5 s and half of the slack: the host is later than that.
+    // The event is due at 100.5 s plus half of the tolerance, and the time of the host is later.
     let mut instance = fresh(CS);
     set(&mut instance, "inspection", 100.5 + 0.5e-7).unwrap();
     instance.setup_experiment(None, 0.0, None).unwrap();

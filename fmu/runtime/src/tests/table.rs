@@ -44,7 +44,7 @@ fn a_table_lists_its_inputs_parameters_and_states() {
         assert_eq!(scalar.element, n - first);
     }
     assert_eq!(TABLE.find("level"), None);
-    // What a table begins with is found, and what it has none of is empty.
+    // The first entry of the table is found, and lists of kinds that the table does not contain are empty.
     let spring = Spring::table();
     assert_eq!(spring.inputs().len(), 1);
     assert_eq!(spring.derivatives().len(), 2);
@@ -206,7 +206,7 @@ fn the_guid_changes_with_everything_that_a_host_depends_on() {
         |v| v[5].kind = Kind::Integer { min: None, max: None },
         |v| v[7].kind = Kind::Enumeration(&OTHER_ITEMS),
         |v| v[7].kind = Kind::Enumeration(&OTHER_NAME),
-        // other start values
+        // Other start values:
         |v| v[12].access = v[14].access,
         |v| v.swap(0, 1),
     ];

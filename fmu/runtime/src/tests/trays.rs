@@ -1,5 +1,5 @@
-//! Trays that fill: a model whose arrays are as long as one of its parameters says, x_i' = q_i, with an output whose
-//! derivatives vanish where all is 0.
+//! Test model with trays that fill, x_i' = q_i. The lengths of its arrays are given by a parameter, and one output has
+//! derivatives that vanish where all levels and inflows are 0.
 
 use crate::clock::Instant;
 use crate::model::StepFailure;
@@ -10,7 +10,7 @@ use crate::variable::Variable;
 
 pub const MOST: usize = 3;
 
-/// Number of trays, and arrays without effect: sorted by tray, sorted by side, and of length zero.
+/// Number of trays, and arrays without effect: by tray, by side, and of length zero.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     rows: u8,

@@ -1,4 +1,4 @@
-//! Tests with a host that has read the model description with scalar variables.
+//! Tests with an FMI 3.0 host that has read the model description with scalar variables.
 
 #![allow(unsafe_code)]
 
@@ -28,11 +28,9 @@ fn reference(name: &str) -> u32 {
 struct TestHost {
     instance: Option<usize>,
     lines: Vec<(fmi3Status, String, String)>,
-    /// Times of the intermediate updates that the host has received, each with true if it could set
-    /// inputs then.
+    /// Times of the intermediate updates that the host has received, each with true if the host could set inputs then.
     updates: Vec<(f64, bool)>,
-    /// The force that the host sets in an intermediate update, for the end of the part of the step
-    /// that follows.
+    /// The force that the host sets in an intermediate update, for the end of the following part of the step.
     force: Option<f64>,
     wish: Option<f64>,
     statuses: Vec<fmi3Status>,
@@ -68,7 +66,7 @@ unsafe extern "C" fn update(
     };
     assert_eq!((get, finished), (1 - set, 1 - set));
     unsafe {
-        assert_eq!((*requested, *at), (0, time), "they come with values");
+        assert_eq!((*requested, *at), (0, time), "by default the return time is the present time");
         let mut statuses = Vec::new();
         if set != 0
             && let Some(force) = force
@@ -131,8 +129,8 @@ fn step(instance: fmi3Instance, at: f64, h: f64) -> (fmi3Status, bool, f64) {
     (status, early == 1, last)
 }
 
-/// A host of FMI 3.0 changes an input linearly within a step by intermediate update, a host of FMI 2.0 sets its derivative
-/// before the step; the results are bit-identical.
+/// A host of FMI 3.0 changes an input linearly within a step by intermediate updates, and a host of FMI 2.0 sets the
+/// derivative of the input before the step. The results are bit-identical.
 #[test]
 fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bit() {
     let (instance, host) = stepping(false);
@@ -157,8 +155,8 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
     let mut force_now = 0.0;
     unsafe {
         fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force_now, 1);
-        assert_eq!(force_now, at_knot(20), "the ramp ends where the host put it");
-        // Nothing set: held.
+        assert_eq!(force_now, at_knot(20), "the ramp must end at the value that the host has set");
+        // If the host sets nothing, the input is constant.
         host.lock().unwrap().force = None;
         assert_eq!(step(instance, 20.0 * 0.1, 0.1).0, fmi3OK);
         fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force_now, 1);
@@ -168,32 +166,31 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
     assert!(host.lock().unwrap().statuses.iter().all(|status| *status == fmi3OK));
 }
 
-/// FMI 3.0: the host requests a time in its intermediate update; a requested time before the step ends the step at once,
-/// and a time after its end has no effect.
+/// A host of FMI 3.0 requests an early return time in its intermediate update. If the time is before the step or NaN, the
+/// step ends at once; if it is after the end of the step, it has no effect.
 #[test]
 fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_return() {
     let (instance, host) = stepping(true);
     host.lock().unwrap().force = Some(1.0);
     host.lock().unwrap().wish = Some(0.25);
     assert_eq!(step(instance, 0.0, 1.0), (fmi3OK, true, 0.25));
-    // Before the step, or nowhere: at once.
+    // A time before the step, or NaN, ends the step at once.
     for wish in [0.1, f64::NAN] {
         host.lock().unwrap().wish = Some(wish);
         assert_eq!(step(instance, 0.25, 0.5), (fmi3OK, true, 0.25));
     }
-    // Behind the end: not early.
+    // A time after the end of the step has no effect.
     host.lock().unwrap().wish = Some(9.0);
     assert_eq!(step(instance, 0.25, 0.5), (fmi3OK, false, 0.75));
     unsafe { fmi3FreeInstance::<Spring>(instance) };
     let (instance, host) = stepping(false);
     host.lock().unwrap().force = Some(1.0);
     host.lock().unwrap().wish = Some(0.25);
-    assert_eq!(step(instance, 0.0, 1.0), (fmi3OK, false, 1.0), "it may not");
+    assert_eq!(step(instance, 0.0, 1.0), (fmi3OK, false, 1.0), "early return is not allowed");
     unsafe { fmi3FreeInstance::<Spring>(instance) };
 }
 
-/// The force should rise to 1 within the step, but the host returns at once and sets nothing in the next
-/// step.
+/// The force should rise to 1 within the step, but the host requests a return at once, and sets nothing in the next step.
 #[test]
 fn after_an_early_return_at_once_inputs_are_held() {
     let (instance, host) = stepping(true);
@@ -209,7 +206,8 @@ fn after_an_early_return_at_once_inputs_are_held() {
     assert_eq!(force, 0.0);
 }
 
-/// A host sets a force to NaN in intermediate update: fmi3SetFloat64 returns fmi3Discard, and fmi3DoStep reaches its end.
+/// In an intermediate update a host sets a force to NaN. fmi3SetFloat64 returns fmi3Discard, and fmi3DoStep reaches the
+/// end of the step.
 #[test]
 fn a_value_out_of_range_in_intermediate_update_is_discarded_and_the_step_goes_on() {
     let (instance, host) = stepping(false);
@@ -217,7 +215,7 @@ fn a_value_out_of_range_in_intermediate_update_is_discarded_and_the_step_goes_on
     assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, false, 0.5));
     assert_eq!(host.lock().unwrap().statuses, [fmi3Discard, fmi3OK]);
     unsafe {
-        // Not required, and not the time for it: outside of a step all is as always.
+        // F is not among the variables that the host requires within steps, but between steps it can be set.
         assert_eq!(fmi3SetFloat64::<Spring>(instance, &reference("F"), 1, &2.0, 1), fmi3OK);
         fmi3FreeInstance::<Spring>(instance);
     }
@@ -267,7 +265,7 @@ fn counts_types_and_references_are_checked_before_anything_is_written() {
         assert!(said.contains(part), "{said}");
         unsafe { fmi3FreeInstance::<Spring>(instance) };
     }
-    // Nothing of a type that no variable has is fine, and so is nothing behind NULL.
+    // Calls without references succeed for types that no variable has, and arrays may then be NULL.
     let (instance, _host) = stepping(false);
     unsafe {
         assert_eq!(fmi3GetUInt64::<Spring>(instance, ptr::null(), 0, ptr::null_mut(), 0), fmi3OK);
@@ -301,7 +299,7 @@ fn instantiation_fails_without_name_or_token_or_for_scheduled_execution() {
     };
     assert!(make(ptr::null(), token.as_ptr(), Some(log)).is_null());
     assert!(make(name, ptr::null(), Some(log)).is_null());
-    assert!(make(name, guid.as_ptr(), Some(log)).is_null(), "the other version's");
+    assert!(make(name, guid.as_ptr(), Some(log)).is_null(), "the GUID belongs to FMI 2.0");
     assert!(make(name, guid.as_ptr(), None).is_null());
     let scheduled = unsafe {
         fmi3InstantiateScheduledExecution::<Spring>(
@@ -383,7 +381,7 @@ fn a_directional_derivative_with_wrong_numbers_of_seeds_or_sensitivities_is_refu
     }
 }
 
-/// w.(J v) = (J^T w).v: both sides sum the same products in different orders.
+/// w.(J v) equals (J^T w).v; the two sides sum the same products in different orders.
 #[test]
 fn adjoint_derivatives_are_the_transposed_directional_ones() {
     let (instance, _host) = stepping(false);
@@ -425,7 +423,7 @@ fn adjoint_derivatives_are_the_transposed_directional_ones() {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (one, other) = (dot(&weights, &forward), dot(&adjoint, &seed));
     assert!((one - other).abs() <= 1e-13 * one.abs(), "{one} {other}");
-    assert_eq!(adjoint[3], 0.0, "nothing depends on time but by states and inputs");
+    assert_eq!(adjoint[3], 0.0, "outputs depend on time only through states and inputs");
 }
 
 #[test]
@@ -512,7 +510,7 @@ fn model_exchange_goes_through_its_modes_and_takes_single_states() {
         assert_eq!((status, b, next), (fmi3OK, [0; 5], 0.0));
         assert_eq!(fmi3EvaluateDiscreteStates::<Spring>(instance), fmi3OK);
         assert_eq!(fmi3EnterContinuousTimeMode::<Spring>(instance), fmi3OK);
-        // A state by its reference; its derivative follows.
+        // If a state is set by its reference, its derivative changes.
         let force = [0.25, 0.5];
         let references = ["x", "v"].map(reference);
         assert_eq!(
@@ -531,7 +529,7 @@ fn model_exchange_goes_through_its_modes_and_takes_single_states() {
             fmi3SetFloat64::<Spring>(instance, references.as_ptr(), 1, &f64::NAN, 1),
             fmi3Discard
         );
-        // Back to the event, and no further.
+        // The host may go back to the event, but not to an earlier time.
         assert_eq!(fmi3SetTime::<Spring>(instance, 2.0), fmi3OK);
         assert_eq!(fmi3SetTime::<Spring>(instance, 1.0), fmi3OK);
         assert_eq!(fmi3SetTime::<Spring>(instance, 0.9), fmi3Error);
@@ -579,12 +577,16 @@ fn times_come_with_initialization_and_those_that_are_not_defined_may_be_nan() {
         let begin = |tolerance, at, stop_defined, stop| {
             fmi3EnterInitializationMode::<Spring>(instance, 0, tolerance, at, stop_defined, stop)
         };
-        assert_eq!(begin(f64::NAN, 2.0, 1, 1.0), fmi3Error, "it stops before it starts");
+        assert_eq!(
+            begin(f64::NAN, 2.0, 1, 1.0),
+            fmi3Error,
+            "the stop time is before the start time"
+        );
         assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
         assert_eq!(begin(f64::NAN, 2.0, 1, 3.0), fmi3OK);
         assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
         assert_eq!(step(instance, 2.0, 1.0), (fmi3OK, false, 3.0));
-        assert_eq!(step(instance, 3.0, 0.1).0, fmi3Error, "past the stop time");
+        assert_eq!(step(instance, 3.0, 0.1).0, fmi3Error, "the step would pass the stop time");
         assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
         assert_eq!(begin(f64::NAN, -1.0, 0, f64::NAN), fmi3OK);
         assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
@@ -593,7 +595,7 @@ fn times_come_with_initialization_and_those_that_are_not_defined_may_be_nan() {
     }
 }
 
-/// fmusim 0.8 calls these functions in continuous-time mode, where the standard's table allows neither.
+/// fmusim 0.8 calls these two functions in continuous-time mode, in which the standard's table does not allow them.
 #[test]
 fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
     let host = Mutex::new(TestHost::default());

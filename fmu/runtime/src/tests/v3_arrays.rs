@@ -1,4 +1,4 @@
-//! Tests with a host that has read the model description with array variables.
+//! Tests with an FMI 3.0 host that has read the model description with array variables.
 
 #![allow(unsafe_code)]
 
@@ -65,7 +65,7 @@ fn values_of_arrays_are_read_and_set_in_row_major_order() {
     assert_eq!(*lines.lock().unwrap(), [""; 0]);
 }
 
-/// Messages name the error and the lengths of the arrays; if there are five or more, the first four.
+/// The messages contain the error and the lengths of the arrays; of five or more arrays they contain the first four.
 #[test]
 fn wrong_counts_types_and_references_of_arrays_are_described() {
     let all = [6, 7, 8, 6, 8];
@@ -99,8 +99,8 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
     }
 }
 
-/// Arrays whose size changes get their start values again; everything else keeps its values, and everything
-/// if the number of trays is unchanged.
+/// If the number of trays changes, arrays whose size depends on it get their start values, and all other variables keep
+/// their values. If the number is set to its present value, nothing changes.
 #[test]
 fn changing_the_size_of_an_array_resets_its_elements() {
     let lines = Lines::default();
@@ -127,17 +127,18 @@ fn changing_the_size_of_an_array_resets_its_elements() {
     rows(1);
     assert_eq!((get(instance, &[7, 8]), states()), ((fmi3OK, [10.0, 13.0, 9.0]), 1));
     unsafe {
-        // as new: two
+        // After a reset there are two trays.
         assert_eq!(fmi3Reset::<Trays>(instance), fmi3OK);
     }
     assert_eq!((get(instance, &[7, 8]), states()), ((fmi3OK, [10.0, 11.0, 13.0, 14.0, 0.5]), 2));
     unsafe { fmi3FreeInstance::<Trays>(instance) };
-    // to three rows; to one nothing was set any more
+    // For three rows m loses values that were set; for one row no value was set any more.
     let told = "fmi3SetUInt64: rows changed: the values set earlier for m are lost. Set them again";
     assert_eq!(*lines.lock().unwrap(), [told]);
 }
 
-/// The 24 scalars of the table, which end with k, the time and two event indicators can each be read as Float64.
+/// The table has 24 scalars, the last of which is k. After them follow the time and two event indicators; each can
+/// be read as Float64.
 #[test]
 fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     let lines = Lines::default();
@@ -188,8 +189,8 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// A square depends on all levels and inputs of the present trays, although all levels and inputs are 0 and the derivatives
-/// vanish; a rate depends on its own input.
+/// A square depends on all levels and inputs of the present trays, even where all are 0 and the derivatives vanish. A rate
+/// depends on its own input.
 #[test]
 fn elements_depend_on_elements_also_where_the_derivative_vanishes() {
     let lines = Lines::default();

@@ -48,7 +48,7 @@ fn computed_variables_have_a_value_from_initialization_mode_on() {
         assert!(why.contains(&format!("{name} {says}")), "{why}");
     }
     instance.enter_initialization_mode().unwrap();
-    // What is set changes what follows from it, again and again.
+    // Whenever an input is set, the variables that depend on it change.
     for (z, room) in [(0.5, 1.5), (1.0, 1.0)] {
         set(&mut instance, "z", z).unwrap();
         assert_eq!(real(&mut instance, "room"), room);
@@ -91,7 +91,7 @@ fn value_references_of_another_type_or_without_a_variable_are_refused() {
             last - 1
         )
     );
-    // There are no strings.
+    // The model has no strings.
     assert!(refused(instance.get(&GET_STRING, 0)).starts_with("fmi2GetString: level[1] (value"));
     assert!(refused(instance.set(&SET_STRING, &[0], |_| Boolean(true))).contains("of type Real"));
 }
@@ -104,20 +104,20 @@ fn setting_several_values_succeeds_or_fails_as_a_whole() {
     assert_eq!(why, "fmi2SetReal: q[2] = 11.0 m/s (allowed: 1.0 m/s to 10.0 m/s)");
     instance.set(&SET_REAL, &both, |n| Real([5.0, 6.0][n])).unwrap();
     assert_eq!((real(&mut instance, "q[1]"), real(&mut instance, "q[2]")), (5.0, 6.0));
-    // One input is set by itself.
+    // A single input is refused, too.
     assert!(unchanged(&mut instance, |i| set(i, "q[1]", 0.9)).contains("q[1] = 0.9"));
     assert!(unchanged(&mut instance, |i| set(i, "z", f64::NAN)).contains("z = NaN"));
     set(&mut instance, "q[1]", 10.0).unwrap();
     assert_eq!(real(&mut instance, "net[1]"), 10.0 - 0.5 * 3.0);
 }
 
-/// Wrong parameters are accepted one by one and named together by fmi2ExitInitializationMode.
+/// Parameters out of range are accepted one by one, and fmi2ExitInitializationMode reports all of them together.
 #[test]
 fn all_wrong_parameters_are_reported_when_initialization_ends() {
     let mut instance = fresh(CS);
     set(&mut instance, "start.level[1]", -1.0).unwrap();
     set_integer(&mut instance, "number", 6).unwrap();
-    // Whatever else is wrong: each can be set by itself, and the model is not asked for.
+    // Each value can be set whatever the others are, because the model is not needed for it.
     set(&mut instance, "leak", 0.25).unwrap();
     assert!(instance.model.is_none());
     instance.enter_initialization_mode().unwrap();
@@ -127,9 +127,9 @@ fn all_wrong_parameters_are_reported_when_initialization_ends() {
         "fmi2ExitInitializationMode: start.level[1] = -1.0 m (allowed: 0.0 m to 100.0 m); number = 6 \
          (allowed: -3 to 5); material = 3 (allowed: 1 glass, 2 steel)"
     );
-    // Inputs are refused on the spot.
+    // Inputs out of range are refused immediately.
     assert!(unchanged(&mut instance, |i| set(i, "q[1]", 0.0)).contains("q[1] = 0.0"));
-    // In event mode after initialization parameters are, too.
+    // Parameters in event mode after initialization are refused immediately, too.
     let mut instance = started(ME, &[]);
     assert!(unchanged(&mut instance, |i| set(i, "leak", -1.0)).contains("leak = -1.0"));
     set(&mut instance, "leak", 4.0).unwrap();
@@ -166,7 +166,8 @@ fn only_inputs_and_tunable_parameters_are_set_in_motion() {
     assert_eq!(real(&mut instance, "time_constant"), 0.25);
 }
 
-/// The model refuses a tunable parameter that contradicts the state; an input set in the call keeps its old value.
+/// The model refuses a tunable parameter that contradicts its state. An input that is set by the same call
+/// keeps its old value.
 #[test]
 fn a_call_with_one_refused_tunable_parameter_sets_no_variable() {
     let mut instance = started(CS, &[("z", 3.0)]);
@@ -189,7 +190,7 @@ fn directional_derivatives_equal_the_partial_derivatives_of_the_equations() {
         "net[2]",
         "room",
     ]);
-    // d level[1] = 2, d level[2] = 3, d q[2] = 5, d z = 7; a known that comes twice counts twice.
+    // The direction is d level[1] = 2, d level[2] = 3, d q[2] = 5, d z = 7; a known that occurs twice counts twice.
     let knowns = references(["level[1]", "level[2]", "q[2]", "z", "z", "level[1]"]);
     let mut answers = [0.0; 7];
     let direction = [1.5, 3.0, 5.0, 4.0, 3.0, 0.5];
@@ -215,7 +216,7 @@ fn directional_derivatives_equal_the_partial_derivatives_of_the_equations() {
     assert!(
         ask("sum", "z", f64::NAN).ends_with("direction of z = NaN (allowed: any finite number)")
     );
-    // Slopes that are set for the next step are no part of it.
+    // Slopes that are set for the next step have no effect on the directional derivative.
     instance.set_input_derivatives(&references(["q[1]"]), &[1], &[8.0]).unwrap();
     instance.directional_derivative(&unknowns, &level, &[1.0], &mut answers).unwrap();
     assert_eq!(answers[0], -0.5);
@@ -232,15 +233,15 @@ fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
         let done = instance.directional_derivative(&unknowns, &knowns, &[d], &mut answer);
         done.map(|()| answer[0])
     };
-    // 1/k by steps of k/1024: what central differences with Richardson's extrapolation leave is
-    // 4/1024^4 = 4e-12 of it, and rounding 1024 x 2e-16.
+    // The derivative of 1/k by steps of k/1024: central differences with Richardson's extrapolation have a relative error of
+    // 4/1024^4 = 4e-12, and rounding adds 1024 x 2e-16.
     close(ask("time_constant", "leak", 1.0).unwrap(), -4.0, 1e-11);
     close(ask("time_constant", "leak", -3.0).unwrap(), 12.0, 1e-11);
-    // Linear ones are exact but for rounding.
+    // Derivatives of linear functions are exact except for rounding.
     close(ask("net[1]", "start.level[1]", 2.0).unwrap(), -1.0, 1e-11);
     close(ask("net[1]", "q[1]", 1.0).unwrap(), 1.0, 1e-11);
     close(ask("sum", "start.level[2]", 1.0).unwrap(), 1.0, 1e-11);
-    // From 0 on by the order of magnitude.
+    // If the known is 0, the step follows from its nominal value.
     close(ask("room", "z", 1.0).unwrap(), -1.0, 1e-11);
     assert_eq!(ask("sum", "q[1]", 0.0), Ok(0.0));
     let known = "cannot be a known in initialization mode (allowed: inputs and parameters)";
@@ -248,8 +249,8 @@ fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     assert!(refused(ask("sum", "z", f64::INFINITY)).contains("direction of z = inf"));
 }
 
-/// After fmi2Error in fmi2DoStep the instance has the time and the values before the step, and only reading, reset,
-/// termination and restoring a state are allowed.
+/// After fmi2DoStep has returned fmi2Error, the instance has the time and the values of the start of the step. Only reading,
+/// reset, termination and restoring a state are allowed.
 #[test]
 fn after_a_step_that_failed_the_last_values_can_be_read() {
     let mut instance = started(CS, &[("z", 101.0)]);
@@ -260,7 +261,7 @@ fn after_a_step_that_failed_the_last_values_can_be_read() {
     assert!(unchanged(&mut instance, |i| set(i, "z", 1.0)).contains("state \"step failed\""));
 }
 
-/// A leak of 1e300 1/s empties a level of 1e20 m at a rate that exceeds all numbers.
+/// A leak of 1e300 1/s at a level of 1e20 m gives a rate that exceeds the largest number.
 #[test]
 fn a_nan_or_infinite_value_is_an_error_that_names_the_variable_and_its_inputs() {
     let mut instance = started(ME, &[]);

@@ -1,4 +1,4 @@
-//! Allowed values of a variable, and messages for others.
+//! Tests of the allowed values of a variable, and of the messages about other values.
 
 use super::*;
 use crate::number::{is_finite, text};
@@ -100,7 +100,7 @@ fn values_of_another_type_are_refused() {
     assert_eq!(why(&a_real("m"), Integer(1)), "p = 1 (allowed: any finite number)");
 }
 
-/// An input may change at most so fast that it crosses its allowed range in 1 ns.
+/// The largest rate of an input is that with which it crosses its allowed range in 1 ns.
 #[test]
 fn rates_are_bounded_by_the_range() {
     let free = a_real("m");
@@ -154,7 +154,7 @@ fn parameters_are_read_and_set_at_their_places_in_the_model() {
                 continue;
             }
         };
-        // A value of another type changes nothing.
+        // If the value has another type, nothing changes.
         let other = if matches!(old, Some(Boolean(_))) { Real(0.0) } else { Boolean(true) };
         v.set_parameter(&mut parameters, scalar.element, other);
         assert_eq!(v.parameter_value(&mut parameters, scalar.element), old);

@@ -1,5 +1,5 @@
-//! Tests an instance in an invented version of FMI that differs from 2.0 as 3.0 does: all types share one space of value
-//! references, which does not begin at 0, and the host can handle events also in Co-Simulation.
+//! Tests of an instance in an invented version of FMI that differs from 2.0 in the same way as 3.0: all types share one
+//! range of value references, which does not begin at 0, and the host can handle events also in Co-Simulation.
 
 use super::*;
 use crate::call::{CType, Call, Events, InstanceState, typed};
@@ -64,12 +64,12 @@ impl Version for Other {
     }
 
     fn scalar<M: Model>(reference: u32, _: Option<CType>) -> Result<&'static Scalar<M>, String> {
-        let index = reference.checked_sub(FIRST).ok_or("they begin at 100")?;
+        let index = reference.checked_sub(FIRST).ok_or("value references begin at 100")?;
         M::table().scalars.get(index as usize).ok_or("no such variable".into())
     }
 }
 
-/// A test version of FMI has other function names, value references from 100 on, and another handling of events.
+/// The test version of FMI has other function names, value references from 100 on, and another handling of events.
 #[test]
 fn names_references_and_event_handling_depend_on_the_fmi_version() {
     let mut instance = Instance::<Vessels, Other>::new(CS);
@@ -80,12 +80,15 @@ fn names_references_and_event_handling_depend_on_the_fmi_version() {
     let scalar = &TABLE.scalars[sum as usize];
     assert_eq!((Other::reference(scalar), Fmi2::reference(scalar)), (sum + FIRST, sum));
     assert_eq!(instance.get(&GET_FLOAT, sum + FIRST), Ok(Value::Real(7.0)));
-    assert_eq!(refused(instance.get(&GET_FLOAT, sum)), "otherGetFloat: they begin at 100");
+    assert_eq!(
+        refused(instance.get(&GET_FLOAT, sum)),
+        "otherGetFloat: value references begin at 100"
+    );
     assert_eq!(
         refused(instance.do_step(0.0, -1.0)),
         "otherDoStep: communicationStepSize = -1.0 s (allowed: greater than 0, finite)"
     );
-    // The present inputs move no valve: the host has not handled an event yet.
+    // The present inputs do not move the valve, because the host has not handled an event yet.
     let references = ["z", "open"].map(|name| TABLE.find(name).unwrap() + FIRST);
     instance.set(&GET_FLOAT, &references[..1], |_| Value::Real(3.0)).unwrap();
     assert_eq!(instance.get(&GET_FLOAT, references[1]), Ok(Value::Boolean(true)));

@@ -1,8 +1,8 @@
-//! A test model with everything that the runtime supports: two leaking vessels on a platform that can rise.
+//! A test model that uses all features of the runtime: two leaking vessels on a platform that can rise.
 //!
-//! A level x rises by the inflow q and falls by the leak, x' = q - k x. While q changes with the slope s,
-//! x(h) = x e + q (1 - e) / k + s (h - (1 - e) / k) / k with e = exp(-k h). If the platform is higher than [`OPENS`], a valve opens and
-//! spills half of the first vessel.
+//! A level x rises by the inflow q and falls by the leak, x' = q - k x. If q changes with the slope s, x(h) = x e + q (1 -
+//! e)/k + s (h - (1 - e)/k)/k with e = exp(-k h). If the platform is higher than [`OPENS`], a valve opens and half of the
+//! first vessel is spilt.
 
 use crate::clock::Instant;
 use crate::model::{Dynamics, Model};
@@ -68,7 +68,7 @@ pub struct Outputs {
     valve: i32,
 }
 
-/// The vessels; their levels are stored in the reverse of the host's order.
+/// The vessels. Their levels are stored in the opposite order of the host's.
 #[derive(Clone, Debug)]
 pub struct Vessels {
     k: f64,

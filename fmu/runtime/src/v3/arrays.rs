@@ -1,8 +1,8 @@
-//! The layout in which each entry of the table is one variable: finds the scalars of a value reference.
+//! The layout of variables in which each entry of the table is one variable: the scalars of each value reference.
 //!
-//! An instance knows only scalars. This module translates a host's arrays to scalars: an array is the list of
-//! its elements in row-major order, with the present sizes of its structural parameters. An element outside
-//! these sizes keeps its start value.
+//! An instance only has scalars. This module translates a host's arrays to scalars: an array is the list of its
+//! elements in row-major order, with the present sizes of its structural parameters. An element outside these sizes
+//! keeps its start value.
 
 use super::references::{scalar_reference, time_reference, type_of};
 use crate::call::CType;
@@ -10,24 +10,24 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Dimension, Value, Variable};
 
-/// The scalars of each array variable, with the array sizes that the structural parameters have at
-/// present.
+/// The scalars of each array variable, for the present array sizes, which the structural parameters determine.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
     /// Value references that the scalars have in the layout of scalars, variable by variable.
     scalars: Vec<u32>,
     ends: Vec<usize>,
     types: Vec<CType>,
-    /// For each scalar the number of its array and its position among the array's elements, counted
-    /// from 1; position 0 says that the scalar is outside the array's present size.
+    /// For each scalar the number of its array and its position in the array, counted from 1. Position 0 means that the
+    /// scalar is outside the array's present size.
     places: Vec<(u32, usize)>,
-    /// Numbers of the continuous states that exist with the present array sizes, counted among the
-    /// states of the largest arrays, in the order in which the host reads them.
+    /// Numbers of the continuous states that exist with the present array sizes, in the order in which the host reads them.
+    /// They count the states of the largest arrays.
     states: Vec<usize>,
 }
 
 impl Arrays {
-    /// Creates the arrays with the sizes in an instance's parameters, which are in the order of the table.
+    /// Creates the arrays with the sizes that the parameters of an instance give. `parameters` are in the order of the
+    /// table.
     pub fn new<M: Model>(parameters: &[Value]) -> Arrays {
         let table = M::table();
         let mut arrays = Arrays::default();
@@ -64,15 +64,15 @@ impl Arrays {
         arrays
     }
 
-    /// Returns the scalars of the variable with this value reference, by the value references that they
-    /// have in the layout of scalars; `None` if there is no such variable.
+    /// Returns the scalars of the variable with this value reference, as the value references that they have in the layout
+    /// of scalars. `None` if there is no such variable.
     pub fn scalars(&self, reference: u32) -> Option<&[u32]> {
         let n = (reference as usize).checked_sub(1)?;
         let begin = if n == 0 { 0 } else { *self.ends.get(n - 1)? };
         self.scalars.get(begin..*self.ends.get(n)?)
     }
 
-    /// Returns the C type of a variable; variables that come after the table's are real.
+    /// Returns the C type of a variable. Variables that follow those of the table are real.
     pub fn c_type(&self, reference: u32) -> CType {
         let n = (reference as usize).wrapping_sub(1);
         self.types.get(n).copied().unwrap_or(CType::Real)
@@ -88,15 +88,15 @@ impl Arrays {
         self.ends.is_empty()
     }
 
-    /// Returns the array of a scalar and the scalar's position in the array, counted from 1, or `None` if it is
+    /// Returns the number of a scalar's array and the scalar's position in the array, counted from 1; `None` if it is
     /// outside the present size.
     pub fn place(&self, scalar: u32) -> Option<(u32, usize)> {
         let place = *self.places.get((scalar as usize).checked_sub(1)?)?;
         (place.1 > 0).then_some(place)
     }
 
-    /// Returns the numbers of the continuous states that exist with the present array sizes,
-    /// counted among the states of the largest arrays, in the order in which the host reads them.
+    /// Returns the numbers of the continuous states that exist with the present array sizes, in the order in which the host
+    /// reads them. They count the states of the largest arrays.
     pub fn states(&self) -> &[usize] {
         &self.states
     }
@@ -115,8 +115,7 @@ fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     }
 }
 
-/// Returns the lengths of a variable along its dimensions. `size` returns the value of a structural
-/// parameter by its name.
+/// Returns the lengths of a variable along its dimensions. `size` returns the value of the structural parameter with a name.
 pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
     let length = |dimension: &Dimension| match dimension {
         Dimension::Fixed(length) | Dimension::Used(_, length) => *length,
@@ -141,14 +140,13 @@ pub fn reference<M: Model>(variable: &Variable<M>) -> u32 {
     place.map_or(0, |place| place as u32 + 1)
 }
 
-/// Returns the value reference of the independent variable, which follows the table; the next one is the
-/// array of event indicators.
+/// Returns the value reference of the independent variable, which follows those of the table. The next reference is that of
+/// the array of event indicators.
 pub fn time<M: Model>() -> u32 {
     M::table().variables.len() as u32 + 1
 }
 
-/// Name of the array variable of event indicators, which FMI 3.0 requires besides the variables of
-/// the table.
+/// Name of the array variable of event indicators, which FMI 3.0 requires in addition to the variables of the table.
 pub const INDICATORS: &str = "event_indicator";
 
 /// Returns the name of a variable by its value reference; `None` if there is none.
@@ -176,7 +174,7 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
 }
 
-/// Returns the arrays for this layout, or `None` if scalars are the variables.
+/// Returns the arrays, if they are the variables in this layout; `None` if scalars are the variables.
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }
@@ -192,7 +190,7 @@ mod tests {
         all
     }
 
-    /// The variables of the test model are numbered from 1: level, square, der(level), q, rows, w, m, k, time,
+    /// The variables of the test model have the numbers 1 to 10: level, square, der(level), q, rows, w, m, k, time,
     /// indicators. With 3 trays the time is scalar number 25.
     #[test]
     fn an_array_has_the_number_of_elements_that_its_size_parameter_gives() {
@@ -220,8 +218,8 @@ mod tests {
         assert!(Arrays::default().is_empty());
     }
 
-    /// A value reference of a scalar is mapped to its array and index; beyond the present size of the array the result is
-    /// None.
+    /// The value reference of a scalar is mapped to its array and its index in the array. Beyond the present size of the
+    /// array the result is None.
     #[test]
     fn a_scalar_has_an_array_and_an_index_within_its_size() {
         let arrays = Arrays::new::<Trays>(&parameters(2));

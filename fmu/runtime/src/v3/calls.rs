@@ -1,4 +1,4 @@
-//! The functions of FMI 3.0 with the states in which each may be called, and the differences from FMI 2.0.
+//! The functions of FMI 3.0 with the instance states in which each is allowed, and the differences from FMI 2.0.
 
 use super::host::Host;
 use super::references::{scalar_reference, type_of, wrong_reference};
@@ -11,7 +11,7 @@ use crate::version::Version;
 pub(super) const GET: u16 = ANY;
 pub(super) const SET: u16 = I | M | S | E | C;
 
-/// Functions of FMI 3.0 with the instance states that allow them, as far as they are not in [`Version`].
+/// Functions of FMI 3.0 that are not in [`Version`], with the instance states in which they are allowed.
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
@@ -27,7 +27,7 @@ mod list {
     pub static SET_BOOLEAN:         Call = typed(CType::Boolean, "fmi3SetBoolean", SET);
     pub static GET_UINT64:          Call = typed(CType::Size, "fmi3GetUInt64", GET | CONFIGURATION);
     pub static SET_UINT64:          Call = typed(CType::Size, "fmi3SetUInt64", SET | CONFIGURATION);
-    // The same functions for structural parameters, which are integers in the table.
+    // The same functions for structural parameters, whose type in the table is integer.
     pub static GET_SIZE:            Call = typed(CType::Integer, "fmi3GetUInt64", GET | CONFIGURATION);
     pub static SET_SIZE:            Call = typed(CType::Integer, "fmi3SetUInt64", CONFIGURATION);
     pub static NUMBER_OF_DEPENDENCIES: Call = typed(CType::Real, "fmi3GetNumberOfVariableDependencies", ANY);
@@ -41,7 +41,7 @@ mod list {
     pub static ENTER_CONFIGURATION: Call = Call::new("fmi3EnterConfigurationMode", I);
     pub static EXIT_CONFIGURATION:  Call = Call::new("fmi3ExitConfigurationMode", CONFIGURATION);
     pub static EVALUATE_DISCRETE_STATES: Call = Call::new("fmi3EvaluateDiscreteStates", M | E);
-    // The standard allows these two in fewer states, but fmusim 0.8 calls them in continuous-time mode.
+    // The standard allows these two functions in fewer states, but fmusim 0.8 calls them in continuous-time mode.
     pub static NUMBER_OF_INDICATORS: Call = me(Call::new("fmi3GetNumberOfEventIndicators", ANY | CONFIGURATION));
     pub static NUMBER_OF_STATES:    Call = me(Call::new("fmi3GetNumberOfContinuousStates", ANY | CONFIGURATION));
     pub static ENTER_STEP:          Call = cs(Call::new("fmi3EnterStepMode", E));
@@ -63,7 +63,7 @@ impl Version for Fmi3 {
     const FIRST_EVENT: InstanceState = InstanceState::Event;
     const SETS_STATES: bool = true;
 
-    // FMI 3.0 has no setupExperiment: fmi3EnterInitializationMode takes its arguments.
+    // FMI 3.0 has no setupExperiment; fmi3EnterInitializationMode has its arguments.
     const SETUP_EXPERIMENT:       &'static Call = &Call::new("fmi3EnterInitializationMode", I);
     const ENTER_INITIALIZATION:   &'static Call = &Call::new("fmi3EnterInitializationMode", I);
     const EXIT_INITIALIZATION:    &'static Call = &Call::new("fmi3ExitInitializationMode", M);
@@ -72,7 +72,7 @@ impl Version for Fmi3 {
     const SET_STATE:              &'static Call = &Call::new("fmi3SetFMUState", ANY);
     const DIRECTIONAL_DERIVATIVE: &'static Call = &typed(CType::Real, "fmi3GetDirectionalDerivative", M | RUN);
 
-    // In FMI 3.0 inputs get slopes by intermediate updates.
+    // In FMI 3.0 intermediate updates set the slopes of inputs.
     const SET_INPUT_DERIVATIVES:  &'static Call = &cs(typed(CType::Real, "fmi3SetFloat64", INTERMEDIATE));
     const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(typed(CType::Real, "fmi3GetOutputDerivatives", S | T | INTERMEDIATE));
     const DO_STEP:                &'static Call = &cs(Call::new("fmi3DoStep", S));

@@ -1,5 +1,5 @@
-//! Translates the host's value references to scalars of the table, and checks that a call has as
-//! many values as scalars.
+//! Translation of the host's value references to scalars of the table, with a check that a call has as many values as
+//! scalars.
 
 use std::borrow::Cow;
 
@@ -12,7 +12,7 @@ use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::{Dimension, Value};
 
-/// Checks, if every variable is a scalar, that the host passes one value for each value reference.
+/// Checks that the host passes one value for each value reference, if every variable is a scalar.
 #[inline]
 pub(super) fn check_count(call: &Call, references: usize, values: usize) -> Result<(), Fault> {
     if references == values {
@@ -46,7 +46,7 @@ pub(super) fn scalars_of<'a, M: Model>(
     }
 }
 
-/// Returns the scalars of array variables, which must have the C type of the call.
+/// Returns the scalars of array variables. Their type must be the C type of the call.
 pub(super) fn expand<M: Model>(
     arrays: &Arrays,
     call: &Call,
@@ -113,8 +113,8 @@ pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     }
 }
 
-/// Sets everything that is sized by the changed structural parameters to its start values. If the
-/// host had set other values, a warning in its log says that they are lost.
+/// Sets all variables whose size depends on the changed structural parameters to their start values. If the host had set
+/// other values, a warning in its log states that they are lost.
 pub(super) fn start_resized<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

@@ -4,7 +4,7 @@ use super::arrays::Arrays;
 use super::types::*;
 use crate::model::Model;
 
-/// Data about the host that an instance of FMI 3.0 needs.
+/// Data about the host that an instance of FMI 3.0 stores.
 #[allow(missing_docs)]
 pub struct Host<M: Model> {
     pub(super) environment: fmi3InstanceEnvironment,
@@ -12,8 +12,7 @@ pub struct Host<M: Model> {
     pub(super) early_return_allowed: bool,
     pub(super) required: Vec<fmi3ValueReference>,
     pub(super) phase: Phase,
-    /// Values that the host has set for inputs at the end of the next part of a step, in an
-    /// intermediate update.
+    /// Values of inputs that the host has set in an intermediate update, for the end of the following part of the step.
     pub(super) ends: M::Inputs,
     pub(super) set: Vec<fmi3ValueReference>,
     pub(super) indicators: Vec<f64>,

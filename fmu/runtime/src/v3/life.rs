@@ -19,8 +19,8 @@ use crate::model::Model;
 use crate::table::Layout;
 use crate::version::Version;
 
-/// Wraps the host's logger. In a message for the host the character '#' would begin a reference to
-/// a variable, so that it is doubled.
+/// Returns a logger that calls the host's logger. Each '#' in a message is doubled, because for the host it would begin a
+/// reference to a variable.
 fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) -> Option<Logger> {
     let logger = logger?;
     Some(Box::new(move |status, category, message| unsafe {
@@ -64,11 +64,11 @@ pub(super) unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Returns the layout of the variables, scalars or arrays, in the model description with this
-/// instantiationToken, and the part of the variables that the description contains.
+/// Returns the layout of the variables (scalars or arrays) in the model description with this instantiationToken, and the
+/// part of the variables that the description contains.
 ///
 /// # Errors
-/// If the token or the instance's name is not acceptable.
+/// If the token or the instance's name is not accepted.
 fn check_token<M: Model>(
     name: Option<String>,
     token: Option<String>,
@@ -99,11 +99,11 @@ pub(super) struct Stepping {
     pub(super) update: fmi3IntermediateUpdateCallback,
 }
 
-/// Creates an instance for Co-Simulation. `variables` are the value references of the variables
-/// that the host requires within steps, and their number.
+/// Creates an instance for Co-Simulation. `variables` are the value references of the variables that the host requires
+/// within steps, and their number.
 ///
 /// # Errors
-/// If one of them cannot be read or set within a step.
+/// If one of the variables cannot be read or set within a step.
 pub(super) unsafe fn co_simulation<M: Model>(
     arrays: Option<&Arrays>,
     with: Stepping,

@@ -5,7 +5,7 @@ use crate::model::Model;
 use crate::table::Scalar;
 use crate::variable::{Causality, Kind, Variable};
 
-/// Returns the value reference of a scalar: its position among the scalars, from 1.
+/// Returns the value reference of a scalar: its position among the scalars, counted from 1.
 #[inline]
 pub(super) fn scalar_reference<M: Model>(scalar: &Scalar<M>) -> u32 {
     scalar.index + 1
@@ -59,7 +59,7 @@ pub(super) fn wrong_reference<M: Model>(
     }
 }
 
-/// A variable of FMI 3.0 that the table does not contain: the time or an event indicator.
+/// A variable of FMI 3.0 that is not in the table: the time or an event indicator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Extra {
@@ -76,8 +76,8 @@ pub(super) fn extra_variable<M: Model>(reference: u32) -> Option<Extra> {
     }
 }
 
-/// Returns the names of the variables that the table does not contain, time and event indicators,
-/// in the order of their value references.
+/// Returns the names of the variables that are not in the table (time and event indicators) in the order of their value
+/// references.
 pub fn extra_names<M: Model>() -> Vec<String> {
     let indicators = 1..=M::table().about.event_indicators;
     let indicators = indicators.map(|n| format!("event_indicator[{n}]"));
@@ -95,8 +95,8 @@ fn extra_name<M: Model>(reference: u32) -> Option<String> {
     extra_names::<M>().into_iter().nth(place as usize)
 }
 
-/// Returns true if hosts may read or set a variable within a step. An input whose course follows from other inputs cannot
-/// be set, because it has no independent value at the end of the step.
+/// Returns true if hosts may read or set a variable within a step. An input that is determined by other inputs cannot be
+/// set, because it has no independent value at the end of the step.
 pub fn has_intermediate_update<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Output)
         && variable.c_type() == CType::Real

@@ -1,4 +1,4 @@
-//! Steps of FMI 3.0 Co-Simulation, with intermediate update and early return.
+//! Steps of FMI 3.0 Co-Simulation, with intermediate updates and early return.
 
 #![allow(unsafe_code)]
 
@@ -58,7 +58,7 @@ struct Wish {
     early_return: Option<f64>,
 }
 
-/// Calls the host's intermediateUpdate at `time`. No reference into the instance exists during the call,
+/// Calls the host's callback intermediateUpdate at `time`. During the call there must be no reference into the instance,
 /// because the host calls the FMU from within its callback.
 unsafe fn intermediate_update<M: Model>(
     instance: fmi3Instance,
@@ -139,9 +139,8 @@ impl Answers {
     }
 }
 
-/// Makes one step. If the host allows early return, the step stops at an event and sets
-/// `eventHandlingNeeded`, which is also set for an event at the end of the step. The FMU keeps no past, so
-/// `noSetFMUStatePriorToCurrentPoint` has no effect.
+/// Makes one step. If the host allows early return, the step stops at an event. `eventHandlingNeeded` is set for an event
+/// within the step or at its end. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU stores no past states.
 pub(super) unsafe fn do_step<M: Model>(
     instance: fmi3Instance,
     (at, h): (fmi3Float64, fmi3Float64),
@@ -186,7 +185,7 @@ unsafe fn write_step_results<M: Model>(
     log.report_step_warning(instance);
 }
 
-/// Makes one step with intermediate updates: at its start, when the host may set the inputs for its end and
+/// Makes one step with two intermediate updates: at its start, when the host may set the inputs for the end of the step and
 /// request an early return, and at its end.
 unsafe fn step_with_updates<M: Model>(
     instance: fmi3Instance,
@@ -214,7 +213,8 @@ unsafe fn step_with_updates<M: Model>(
     if ramps != fmi3OK {
         return ramps;
     }
-    // The return time may be anywhere in the step; a time before its start, and NaN, mean immediately.
+    // The return time may be any time in the step; a time before the start of the step, or NaN, means that the
+    // step ends at once.
     let (mut is_early, mut moves) = (false, true);
     let placed = unsafe {
         perform::<M, Fmi3>(instance, call, |component| {

@@ -90,8 +90,8 @@ fn extra_value<M: Model>(
     }
 }
 
-/// Checks that a variable may be read or set within a step: the host must have required it at instantiation,
-/// and `phase` must be the present phase of the intermediate update.
+/// Checks that a variable may be read or set within a step: the host must have declared it at instantiation
+/// (requiredIntermediateVariables), and `phase` must be the present phase of the intermediate update.
 #[cold]
 pub(super) fn check_intermediate<M: Model>(
     component: &Component<M, Fmi3>,
@@ -167,8 +167,7 @@ fn set_arrays<M: Model>(
     Ok(())
 }
 
-/// Sets inputs within a step, that is, their values at the end of the part of the step that
-/// follows.
+/// Sets inputs within a step. The values apply to the end of the following part of the step.
 #[cold]
 fn set_ends<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -200,8 +199,8 @@ fn set_ends<M: Model>(
     Ok(())
 }
 
-/// Checks the arguments of a getter or setter for a type that no variable has: the call succeeds if
-/// it has no references, and otherwise fails.
+/// Checks the arguments of a getter or setter for a type that no variable has. The call succeeds if it has no value
+/// references, and otherwise fails.
 fn check_no_variable<M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
@@ -220,7 +219,7 @@ fn check_no_variable<M: Model>(
     }
 }
 
-/// Executes a getter or setter of a type that no variable of the FMU has, see [`check_no_variable`].
+/// Executes a getter or setter for a type that no variable has; see [`check_no_variable`].
 pub(super) unsafe fn access_no_variable<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
@@ -272,7 +271,7 @@ pub(super) unsafe fn set_sizes<M: Model>(
             if component.host.arrays.is_none() {
                 return check_no_variable(component, call, references, value_count);
             }
-            // A value above the largest integer is above the largest size.
+            // A value above the largest i32 is also above the largest size.
             let size = |n: &u64| Value::Integer(i32::try_from(*n).unwrap_or(i32::MAX));
             let values = array(call, "values", values, value_count)?;
             let values: Vec<_> = values.iter().map(size).collect();
