@@ -1,5 +1,5 @@
-//! HubSlosh as an FMU: its table of variables ([`table`]) and the runtime's `Model` for the plant
-//! ([`model`]). The physics is in the crate `plant`, FMI in the crate `runtime`.
+//! The FMU HubSlosh: its table of variables ([`table`]) and the implementation of the runtime's `Model` for the plant
+//! ([`model`]). The physics is in the crate `plant`, and FMI in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]
@@ -16,7 +16,7 @@ pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
-/// Creates an instance as a host would through FMI 2.0, for hosts and tests in Rust.
+/// Creates an instance as a host of FMI 2.0 does, for hosts and tests in Rust.
 pub fn instance(interface: Interface) -> Instance {
     Instance::new(interface)
 }
@@ -24,14 +24,13 @@ pub fn instance(interface: Interface) -> Instance {
 /// Restores an instance from the bytes of a saved state.
 ///
 /// # Errors
-///
 /// If the bytes are not a saved state; the text is the reason.
 pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     runtime::snapshot::from_bytes(bytes)
 }
 
 pub mod fmi2 {
-    // Parameter types of the standard's header.
+    // The parameter types are those of the standard's header.
     pub use runtime::v2::*;
 
     runtime::export_fmi2!(crate::HubSlosh);

@@ -11,7 +11,7 @@ use runtime::model::{StepEnd, StepFailure};
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// True after [`Dynamics::apply_present_inputs`], so that outputs belong to the present inputs.
+    /// True between [`Dynamics::apply_present_inputs`] and its reversal, so that outputs belong to the present inputs.
     present: bool,
 }
 
@@ -25,10 +25,9 @@ impl HubSlosh {
     }
 }
 
-/// The plant's parameters, together with integer twins, whose names end in `_kind`: of enumerations, for
-/// hosts that cannot set them (the number of the item, or 0 to use the enumeration), and of Booleans, for
-/// hosts that misread them (1 for false, 2 for true, or 0 to use the Boolean). By default the liquid is
-/// released at [`START_ANGLE`].
+/// The plant's parameters and integer twins, whose names end in `_kind`. A host that cannot set enumerations sets the twin
+/// to the number of the item instead, and a host that misreads Booleans sets it to 1 for false or 2 for true; if the twin is
+/// 0, it has no effect. By default the liquid is released at [`START_ANGLE`].
 #[derive(Clone, Debug)]
 pub struct Parameters {
     plant: plant::Parameters,
@@ -43,8 +42,8 @@ pub struct Parameters {
     pub imu_enabled_kind: i32,
 }
 
-/// Start value of `init.slosh_angle`, rad. It is 2 degrees, so that a first plot without settings shows the
-/// swinging liquid, the hub's response and the sticking bearing.
+/// Start value of `init.slosh_angle`, rad. It is 2 degrees, so that a first plot with default settings shows the moving
+/// liquid, the response of the hub and the sticking bearing.
 pub const START_ANGLE: f64 = 0.035;
 
 impl Default for Parameters {
@@ -81,12 +80,11 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the plant's parameters with the integer twins applied.
+    /// Returns the plant's parameters with the values of the integer twins applied.
     ///
     /// # Errors
-    ///
-    /// If an enumeration contradicts its twin. A Boolean may contradict its twin, because the hosts that need
-    /// the twin set the Boolean to any value.
+    /// If an enumeration contradicts its twin. A Boolean may contradict its twin, because hosts that need the twin set the
+    /// Boolean to any value.
     fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
         let mut p = self.plant;
         let start = plant::Parameters::default();

@@ -1,12 +1,11 @@
-//! Every variable of HubSlosh.fmu, each once.
+//! All variables of HubSlosh.fmu.
 //!
-//! A variable exists exactly when it has an entry here. The model description, the value
-//! references, get and set, start values, range checks, saved states and the GUID follow from this
-//! table. Start values come from `plant::Parameters::default()`, with the liquid released at
-//! `model::START_ANGLE`, and from `plant::Inputs::default()`.
+//! A variable exists if and only if it has an entry in this table. The model description, the value references, reading and
+//! setting, start values, range checks, saved states and the GUID follow from the table. Start values come from
+//! `plant::Parameters::default()`, with the liquid released at `model::START_ANGLE`, and from `plant::Inputs::default()`.
 //!
-//! Ranges exclude values that no plant can have, such as a negative inertia, and are wide
-//! otherwise. `Plant::new` checks combinations of parameters.
+//! The ranges exclude values that no plant can have, such as a negative inertia, and are wide otherwise. `Plant::new`
+//! checks combinations of parameters.
 
 use plant::{
     DampingLaw, FrictionModel, INDICATORS, LimitedBy, MODES, Ramp, SloshModel, SloshSource, x,
@@ -39,10 +38,9 @@ impl runtime::Model for HubSlosh {
 
 static SCALARS: [Scalar<HubSlosh>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// Direct dependencies. The hub's acceleration balances all torques, including the liquid's
-// restoring force, which is proportional to g_axial. Stuck friction carries the remainder.
-// Forces and torques of the liquid contain the hub's acceleration. Hub angle and rate enter
-// through the friction, wheel_speed through the wheel's limits.
+// Direct dependencies. The hub's acceleration depends on all torques, including the liquid's restoring force, which is
+// proportional to g_axial. While the hub sticks, the friction torque depends on them as well. Forces and torques of the
+// liquid contain the hub's acceleration. Hub angle and rate affect the friction, and wheel_speed affects the wheel's limits.
 #[rustfmt::skip]
 const ALL_TORQUES: &[&str] = &[
     "theta", "omega", "wheel_speed", "bristle",
@@ -82,8 +80,8 @@ const DYNAMICS: &[&str] = &[
 const LIQUID: &[&str] = &["tank.", "fluid.", "slosh."];
 // On a tilted bench the modes depend on the tank's initial position relative to gravity.
 const LIQUID_MODES: &[&str] = &["tank.", "fluid.", "slosh.", "bench.", "init.theta"];
-// The plant stores positions and velocities in space. The conversion from and to angles
-// couples the directions in the last digit.
+// The plant stores positions and velocities relative to inertial axes. The conversion to and from angles couples the two
+// directions in the last digit.
 const SLOSH_START: &[&str] = &["tank.", "slosh.", "bench.", "init."];
 
 const PER_MODE: &[Dimension] = &[Sized("slosh.modes", MODES)];
@@ -91,7 +89,7 @@ const TABLE_OF_MODES: &[Dimension] = &[Fixed(MODES)];
 
 type V = Variable<HubSlosh>;
 
-/// The variables. Outputs come first, in reading order, because hosts plot all of them.
+/// The variables. The outputs come first and in a useful order, because hosts plot all of them.
 #[rustfmt::skip]
 static VARIABLES: &[Variable<HubSlosh>] = &[
     // Outputs
@@ -210,7 +208,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "limited_by as an integer, for hosts that misread enumerations")
         .depends_on(RANGE),
     V::local_boolean("baffle.in_range", |o, _| o.discrete.baffle_in_range,
-        "True while the damping law of the ring baffle holds: the liquid's stroke at the ring is 0.64 to 6.4 times its width, the wave does not uncover it, and it covers less than a quarter of the section. True without a baffle")
+        "True while the damping law of the ring baffle holds: the liquid's stroke at the ring is 0.64 to 6.4 times its width, the wave does not uncover it, and it covers less than a quarter of the tank's cross-section. True without a baffle")
         .depends_on(WAVE_1),
     V::local_integer("baffle.in_range_kind", |o, _| i32::from(o.discrete.baffle_in_range),
         "baffle.in_range as an integer, for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
@@ -230,8 +228,8 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Mean deflection of the bearing's bristles, positive towards +theta; 0 unless friction.model = lugre")
         .nominal(1e-6).depends_on(&["bristle"]),
 
-    // The slosh modes' coordinates. The other continuous states are the outputs and locals
-    // marked is_state, and bristle.
+    // The coordinates of the slosh modes. The other continuous states are `bristle` and those outputs and locals
+    // that are marked `is_state`.
     V::state("slosh.q_radial", |n| x::SLOSH + 4 * n, "",
         "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused. Model spherical: stereographic, tangent of half the pendulum's angle from the vertical times the radial part of its direction (unit 1). Model liquid: displacement (m)")
         .shape(PER_MODE)
@@ -249,8 +247,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .shape(PER_MODE)
         .nominal(0.01).depends_on(&["slosh.v_tangential[]"]).initial_depends_on(SLOSH_START),
 
-    // The derivatives of the continuous states, in the order in which a Model Exchange host
-    // gets them
+    // The derivatives of the continuous states, in the order in which a Model Exchange host receives them.
     V::derivative("der(theta)", |_| x::THETA, "rad/s",
         "Derivative of theta: omega")
         .depends_on(&["omega"]).initial_depends_on(&["init.omega"]),
@@ -412,10 +409,10 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Damping ratio of a slosh mode, source table")
         .shape(TABLE_OF_MODES).range(0.0, 0.999),
     V::parameter("slosh.table.wave", |p, n| &mut p.slosh.table.wave[n], "m/rad",
-        "Surface elevation at the wall per slosh angle of a slosh mode, source table; 0: that of an upright cylinder of diameter tank.d")
+        "Surface elevation at the wall per slosh angle of a slosh mode, source table; 0: as in an upright cylinder of diameter tank.d")
         .shape(TABLE_OF_MODES).range(0.0, 1e4),
     V::parameter("slosh.table.wave_number", |p, n| &mut p.slosh.table.wave_number[n], "1/m",
-        "Wave number of a slosh mode, source table, for slosh.breaking_steepness: pi/L in a box of length L; 0: that of an upright cylinder of diameter tank.d")
+        "Wave number of a slosh mode, source table, for slosh.breaking_steepness: pi/L in a box of length L; 0: as in an upright cylinder of diameter tank.d")
         .shape(TABLE_OF_MODES).range(0.0, 1e6),
     V::parameter("slosh.table.nonlinear_inertia", |p, n| &mut p.slosh.table.nonlinear_inertia[n], "1",
         "Coefficient s of a slosh mode, source table and slosh.model = liquid: its inertia grows with 1 + s A^2 along the amplitude A. The amplitude changes the squared frequency of planar motion by (3 kappa/8 - s/2) A^2. 1 for a pendulum")
@@ -531,10 +528,10 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "wheel_speed at the start")
         .display_unit("rpm").range(-1e5, 1e5),
     V::parameter("wheel.speed_min", |p, _| &mut p.wheel.speed_min, "rad/s",
-        "Lowest wheel_speed; there the wheel gives only torque that increases it")
+        "Lowest wheel_speed; at this speed the wheel gives only torque that increases it")
         .display_unit("rpm").range(-1e5, 1e5),
     V::parameter("wheel.speed_max", |p, _| &mut p.wheel.speed_max, "rad/s",
-        "Highest wheel_speed; there the wheel gives only torque that decreases it")
+        "Highest wheel_speed; at this speed the wheel gives only torque that decreases it")
         .display_unit("rpm").range(-1e5, 1e5),
     V::parameter("wheel.tau_max", |p, _| &mut p.wheel.tau_max, "N.m",
         "Largest torque of the wheel in either direction")
@@ -584,7 +581,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Mass of the rigid liquid, which moves with the tank")
         .initial_depends_on(LIQUID_MODES),
     V::calculated("tank.bond", |m, _| m.calculated().bond, "1",
-        "Bond number: gravity over surface tension; the model holds far above 1")
+        "Bond number: gravity divided by surface tension; the model holds far above 1")
         .depends_on(&["g_axial"]).initial_depends_on(&["tank.", "fluid."]),
     V::calculated("slosh.mass", |m, n| m.calculated().mass[n], "kg",
         "Mass of a slosh mode's pendulum (modal mass); on a tilted bench, of the equivalent oblique pendulum; 0 for unused modes")
@@ -621,7 +618,10 @@ static DAMPING_LAW: Enumeration = Enumeration {
     name: "DampingLaw",
     description: "Drag coefficient c of a mode as a function of its natural frequency omega",
     items: &[
-        Item::new("laminar", "c ~ sqrt(omega): a laminar layer at the wall, for bare tanks"),
+        Item::new(
+            "laminar",
+            "c ~ sqrt(omega): a laminar layer at the wall, for tanks without baffles",
+        ),
         Item::new("constant_ratio", "c ~ omega: constant damping ratio"),
         Item::new(
             "by_source",
@@ -647,7 +647,7 @@ static FRICTION_MODEL: Enumeration = Enumeration {
 
 static REGIME: Enumeration = Enumeration {
     name: "Regime",
-    description: "Amplitude class of the wave at the wall, R being the tank's radius",
+    description: "Amplitude class of the wave at the wall; R is the tank's radius",
     items: &[
         Item::new("linear", "Below 0.15 R: linear theory holds"),
         Item::new("transitional", "0.15 R to 0.25 R"),

@@ -1,5 +1,5 @@
-//! Events in Co-Simulation of FMI 3.0 (FMI 3.0.2, 4.2.1). The motion is the same whether the FMU reports events to the
-//! host or not, and steps stop exactly at events. The reference is the FMI 2.0 interface.
+//! Tests of events in Co-Simulation of FMI 3.0 (FMI 3.0.2, section 4.2.1). The motion is the same whether the FMU reports
+//! events to the host or not, and steps stop exactly at events. The reference is the FMI 2.0 interface.
 
 use HubSlosh::HubSlosh as Model;
 use runtime::call::{Events, InstanceState, Interface};
@@ -58,7 +58,7 @@ fn set<V: Version>(instance: &mut Instance<Model, V>, name: &str, value: Value) 
     instance.set(call, &[reference::<V>(name)], |_| value).unwrap();
 }
 
-/// Start of a hub that reverses, sticks and breaks away many times, with a wheel near its limits and a gyro.
+/// Start values of a hub that reverses, sticks and breaks away many times, with a wheel near its limits and a gyro.
 const LIVELY: &[(&str, Value)] = &[
     ("slosh.model", Value::Integer(4)),
     ("slosh.modes", Value::Integer(2)),
@@ -95,7 +95,7 @@ fn torque(step: usize) -> f64 {
     0.06 * (0.7 * step as f64).sin()
 }
 
-/// Variables that are compared at communication points: the continuous ones, the gyro's reading and the
+/// Variables that are compared at communication points: the continuous variables, the gyro's reading and the
 /// number of contact changes.
 const LOOKED_AT: [&str; 12] = [
     "theta",
@@ -177,12 +177,12 @@ fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
         }
         assert_eq!(&(reals(&mut three), discrete(&mut three)), expected, "step {n}");
     }
-    // 70 samples of the gyro, and contacts and limits besides.
+    // The events are 70 samples of the gyro, changes of the contact, and limits of the wheel.
     assert!(early > 80, "{early} early returns");
 }
 
-/// FMI 3.0 with event mode but without early return: the motion is that of FMI 2.0 bit for bit, and the end of a step
-/// reports events within the step.
+/// In FMI 3.0 with event mode but without early return, the motion is bit-identical to that of FMI 2.0, and the events
+/// within a step are reported at its end.
 #[test]
 fn a_host_that_forbids_early_return_gets_the_same_motion_and_learns_of_events_at_the_end() {
     let expected = trajectory();
@@ -242,7 +242,7 @@ fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
             h = end - at;
             last = Some(at);
             handle(&mut three);
-            assert_eq!(real(&mut three, "event_time"), at, "the present one");
+            assert_eq!(real(&mut three, "event_time"), at, "event_time must be the present time");
         }
         if let Some(last) = last {
             stops += 1;
@@ -261,14 +261,18 @@ fn torque_set_in_event_mode_that_breaks_stiction_makes_the_hub_slip() {
     three.step_to_event(0.0, 0.5, true).unwrap();
     three.enter_event_mode().unwrap();
     set(&mut three, "tau_cmd", Value::Real(0.5));
-    assert_eq!(get(&mut three, "stuck"), Value::Boolean(true), "shown by the update alone");
+    assert_eq!(
+        get(&mut three, "stuck"),
+        Value::Boolean(true),
+        "stuck must change only with the update"
+    );
     three.new_discrete_states().unwrap();
     assert_eq!(get(&mut three, "stuck"), Value::Boolean(false));
     let count = get(&mut three, "event_count");
     three.new_discrete_states().unwrap();
-    assert_eq!(get(&mut three, "event_count"), count, "once is enough");
+    assert_eq!(get(&mut three, "event_count"), count, "a second update must have no effect");
     assert_eq!(real(&mut three, "event_time"), 0.5);
-    // In Step Mode the same torque is an event at the very start of the step.
+    // In Step Mode the same torque causes an event at the start of the step.
     let mut three: Three = initialised(Events::Reported, &values);
     handle(&mut three);
     set(&mut three, "tau_cmd", Value::Real(0.5));
@@ -288,7 +292,7 @@ fn a_state_saved_at_an_event_continues_the_same_motion() {
     let mut at = 0.0;
     while three.step_to_event(at, 1.0 - at, true).unwrap().early {
         at = three.time();
-        // At the event, in event mode and after it.
+        // The state is saved at the event, in event mode and after event mode.
         for handled in 0..3 {
             match handled {
                 1 => three.enter_event_mode().unwrap(),
@@ -309,7 +313,7 @@ fn a_state_saved_at_an_event_continues_the_same_motion() {
         }
     }
     let plain: Three = initialised(Events::InStep, LIVELY);
-    assert!(three.restore(&plain).is_err(), "its host handles events otherwise");
+    assert!(three.restore(&plain).is_err(), "the saved state's host handles events in another way");
 }
 
 /// With `solver.max_steps` = 10 a long step of HubSlosh returns fmi3Discard; a shorter step from the same time succeeds.
@@ -349,7 +353,8 @@ fn continuous_states_cannot_be_set_in_co_simulation() {
     assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
 }
 
-/// Returns work_axial and omega_imu after 1 s of steps of 20 ms with a g_axial that jumps from step to step and is held.
+/// Returns work_axial and omega_imu after 1 s in steps of 20 ms, with a g_axial that jumps between steps and is constant
+/// within them.
 fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     let mut instance = Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);
     set(&mut instance, "imu.enabled", Value::Boolean(true));
@@ -366,8 +371,8 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     ["work_axial", "omega_imu"].map(|name| real(&mut instance, name))
 }
 
-/// The reference adds up its steps as the FMU does. In earlier versions the work was off by up to 1.5e-4 J,
-/// and at 1e9 s samples were a step late.
+/// The reference adds up its step sizes as the FMU does. In earlier versions the error of the work was up to 1.5e-4 J, and
+/// at 1e9 s gyro samples were one step late.
 #[test]
 fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock() {
     fn compare<V: Version>() {
@@ -384,7 +389,7 @@ fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock(
     compare::<Fmi3>();
 }
 
-/// The energy of a line that is twisted by 1e308 rad is not finite.
+/// The energy of a suspension line that is twisted by 1e308 rad is not finite.
 #[test]
 fn an_initial_state_too_large_for_the_equations_is_refused_by_the_name_of_its_parameter() {
     fn refused<V: Version>() {

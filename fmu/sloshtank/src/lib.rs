@@ -1,5 +1,5 @@
-//! SloshTank as an FMU: one sloshing tank on a spacecraft that the host simulates. Its variables are in
-//! [`table`], its physics in the crate `craft`, FMI in the crate `runtime`.
+//! The FMU SloshTank: one sloshing tank on a spacecraft that the host simulates. The table of variables is in [`table`], the
+//! physics in the crate `craft`, and FMI in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]
@@ -10,7 +10,7 @@ pub mod table;
 pub use model::Model;
 
 pub mod fmi2 {
-    // Parameter types of the standard's header.
+    // The parameter types are those of the standard's header.
     pub use runtime::v2::*;
 
     runtime::export_fmi2!(crate::Model);

@@ -8,9 +8,8 @@ use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
 
-/// Largest `coupling_ratio`, the added mass of the liquid over the mass of the host, without a
-/// warning. If host and tank exchange forces once a step and extrapolate on both sides, the
-/// exchange is stable up to 2/sqrt(3) - 1 = 0.155.
+/// Largest `coupling_ratio` (added mass of the liquid divided by the mass of the host) without a warning. If host and tank
+/// exchange forces once a step and both extrapolate, the exchange is stable up to 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
 const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
@@ -25,25 +24,25 @@ const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True while the present inputs are applied. The outputs for the model's range of validity are
-    /// then evaluated with the present inputs, and otherwise keep the values of the last event.
+    /// True while the present inputs are applied. The outputs on the ranges of validity are then computed from the present
+    /// inputs; otherwise they keep the values of the last event.
     present: bool,
-    /// True after a tank without a model of detached liquid has left its range.
+    /// True after a tank without a model of detached liquid has left its range of validity.
     has_left_range: bool,
     /// True after the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
 impl Model {
-    /// Returns the largest eigenvalue of the host's inverse mass matrix multiplied by the added mass, or 0 if
-    /// the host's mass is unknown.
+    /// Returns the coupling ratio: the largest eigenvalue of M_host^-1 M_a, where M_host is the host's mass matrix and M_a
+    /// the added mass. Returns 0 if the host's mass is unknown.
     pub fn coupling_ratio(&self) -> f64 {
         self.coupling_ratio
     }
 }
 
-/// The tank's parameters, with counts as integers for FMI. `coupling_kind` is the integer twin of the
-/// enumeration `coupling`, for hosts that cannot set enumerations; 0 to use the enumeration.
+/// The tank's parameters, with counts as integers for FMI. A host that cannot set enumerations sets `coupling_kind`, the
+/// integer twin of the enumeration `coupling`, to the number of the item; if it is 0, it has no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     tank: TankParameters,
@@ -78,10 +77,9 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the tank's parameters with the integer twins applied.
+    /// Returns the tank's parameters with the values of the integer twins applied.
     ///
     /// # Errors
-    ///
     /// If an enumeration contradicts its twin.
     fn resolved(&self) -> Result<TankParameters, Vec<String>> {
         let mut p = self.tank;
@@ -114,8 +112,8 @@ impl Parameters {
     }
 }
 
-/// Inputs of the tank: the motion of the host, by default rest without specific force. The slope of
-/// the angular rate omega within a step is always omega_dot, whatever slope the host sets.
+/// Inputs of the tank: the motion of the host, by default rest without specific force. The slope of the angular velocity
+/// omega within a step is always omega_dot, whatever slope the host sets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     pub tank: TankInputs,
@@ -155,15 +153,15 @@ impl Dynamics for Model {
         }
         let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
-        // With a model of detached liquid host.mass is required, and the host uses bias and added_mass in
-        // any case.
+        // With a model of detached liquid host.mass is required, so that the warning cannot be switched off; such a host
+        // uses bias and added_mass anyway.
         if !is_split || ratio <= LIMIT || self.tank.has_ball() {
             return warnings;
         }
         warnings.push(format!(
             "coupling_ratio = {ratio:.3}: a host that applies force and torque directly diverges, at any communication \
-             step, above 1 (values held) and above 1/3 or {LIMIT} (values extrapolated on one side or both). Use bias \
-             and added_mass instead; then leave host.mass at 0 to silence this warning"
+             step, if the ratio is above 1 (values held), above 1/3 (extrapolated by the host or the tank) or above {LIMIT} \
+             (extrapolated by both). Use bias and added_mass instead; then leave host.mass at 0 to suppress this warning"
         ));
         warnings
     }
@@ -244,8 +242,8 @@ impl Dynamics for Model {
     }
 
     fn set_dependent_slopes(inputs: &mut Inputs, h: f64) -> bool {
-        // With this slope omega at the end of the step is omega + omega_dot h + omega_dot' h^2/2. If that
-        // overflows, the step is refused.
+        // With this slope the omega at the end of the step is omega + omega_dot h + omega_dot' h^2/2. If this overflows,
+        // the step is refused.
         let rate = &inputs.tank.omega_dot;
         let slope = [0, 1, 2].map(|i| rate.value[i] + rate.slope[i] * h / 2.0);
         inputs.omega_slope = slope.map(|x| if x.is_finite() { x } else { 0.0 });

@@ -1,5 +1,4 @@
-//! Every variable of SloshTank.fmu, once. Start values are those of
-//! `craft::TankParameters::default()`; the host is at rest.
+//! All variables of SloshTank.fmu. The start values are those of `craft::TankParameters::default()`, with the host at rest.
 
 use craft::{Coupling, MODES, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, join, scalar_count, scalars};
@@ -13,8 +12,8 @@ pub static TABLE: Table<Model> = Table::new(
     About {
         model: "SloshTank",
         version: env!("CARGO_PKG_VERSION"),
-        description: "One tank of sloshing liquid on somebody else's spacecraft: its wrench, and the \
-                      added mass that breaks the algebraic loop",
+        description: "One tank of sloshing liquid on a spacecraft that the host simulates: its force and torque, \
+                      and the added mass with which the host needs no algebraic loop",
         events: "",
         event_indicators: 2,
         saved_words: TankState::WORDS + 1,
@@ -31,9 +30,9 @@ impl runtime::Model for Model {
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// With coupling = split the added mass depends on neither a nor omega_dot, and the bias depends on
-// them only through the drag, weakly. A host that evaluates both at its latest a therefore has no
-// algebraic loop. With the other couplings the bias contains a and omega_dot of the previous step.
+// With coupling = split the added mass depends neither on a nor on omega_dot, and the bias depends on them only weakly,
+// through the drag. If a host computes both with its last a, it therefore has no algebraic loop. With the other couplings
+// the bias contains a and omega_dot of the previous step.
 const WRENCH: &[&str] = &[
     "tank.p",
     "tank.p_dot",
@@ -103,7 +102,7 @@ impl Tanks for Model {
     }
 }
 
-/// The variables. Outputs come first, in reading order.
+/// The variables. The outputs come first, in a useful order.
 static VARIABLES: &[V] = &join::<
     _,
     { OUTPUTS.len() + TANK_LOCALS.len() + MOTIONS.len() + TANK_PARAMETERS.len() + OTHERS.len() },
@@ -133,10 +132,10 @@ const OUTPUTS: &[V] = &[
         "Bias wrench for the right-hand side of the host's equations, host axes: force (1 to 3, N) and torque about O (4 to 6, N.m). The wrench on the host is bias - added_mass [a; omega_dot]. With coupling = split, bias depends on a and omega_dot only through the drag, by about 1e-4 of the bobs' mass times a change of a, so one evaluation is enough. With tank.damping_law = constant it depends on neither. With coupling = rigid_body it suits a host with the constant added_mass in its mass, centre of mass and inertia, also in centrifugal and gyroscopic terms")
         .shape(&[Fixed(6)]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
-        "Symmetric 6 x 6 added-mass matrix about O for the left-hand side of the host's equations, host axes, upper triangle by rows (kg, kg.m, kg.m2). With coupling = split it depends only on tank.p, tank.liquid and, for detached liquid, tank.ball.position. With coupling = lumped or rigid_body it is constant, that of rigid liquid and each bob at its hinge at the start. There the bob of a planar mode counts twice, with 2 m l^2 about the axes in its plane. A bob with nonlinear_inertia or nonlinear_stiffness counts twice, with 2 m r^2 about every axis (r: distance from the hinge)")
+        "Symmetric 6 x 6 added-mass matrix about O for the left-hand side of the host's equations, host axes, upper triangle by rows (kg, kg.m, kg.m2). With coupling = split it depends only on tank.p, tank.liquid and, for detached liquid, tank.ball.position. With coupling = lumped or rigid_body it is constant: the matrix of the rigid liquid and of each bob at its hinge, at the start. In this matrix the bob of a planar mode counts twice, with 2 m l^2 about the axes in its plane. A bob with nonlinear_inertia or nonlinear_stiffness counts twice, with 2 m r^2 about every axis (r: distance from the hinge)")
         .shape(&[Fixed(TRIANGLE)]).depends_on(PLACES).initial_depends_on(EVERYTHING),
     V::output("impulse", |o, n| o.impulse[n], "",
-        "Sum of the impulses of detached liquid on the host since the start, host axes at the time of each: force (1 to 3, N.s) and torque about O (4 to 6, N.m.s). After each step or event the host adds M^-1 times the increase to its velocity and rate, M being its 6 x 6 mass matrix about O (host.mass to host.Jyz). Always 0 if tank.ball.travel is 0")
+        "Sum of the impulses of detached liquid on the host since the start, host axes at the time of each: force (1 to 3, N.s) and torque about O (4 to 6, N.m.s). After each step or event the host adds M^-1 times the increase to its velocity and angular velocity, where M is its 6 x 6 mass matrix about O (host.mass to host.Jyz). Always 0 if tank.ball.travel is 0")
         .shape(&[Fixed(6)]).depends_on(&[]),
 
     // Inputs

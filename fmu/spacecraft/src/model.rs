@@ -8,12 +8,11 @@ use runtime::model::StepFailure;
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// True while the present inputs are applied, so that outputs belong to them. In Co-Simulation
-    /// a jump of the wheels' momentum or of an outflow acts when it is applied, not at the next
-    /// step.
+    /// True while the present inputs are applied, so that outputs belong to the present inputs. In Co-Simulation a jump of
+    /// the wheels' momentum or of a mass flow acts when it is applied, and not only at the next step.
     present: bool,
     wheels: Wheels,
-    /// True after a tank without a model of detached liquid has left its range.
+    /// True after a tank without a model of detached liquid has left its range of validity.
     has_left_range: bool,
     /// True after the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
@@ -27,10 +26,10 @@ const LUMP: &str = "the liquid of a tank leaves the bottom and moves on as detac
                     and momenta of crossings are valid. Impact forces, and the motion after an impact, are right only \
                     to an order of magnitude";
 
-/// Detects a Model Exchange host that omits the wheels' reaction −h_w' from the torque: h_wheels changes
-/// about an axis about which torque has always been 0. `torque` is true for each axis about which torque has
-/// been different from 0; `moved` counts the steps in which h_wheels changed without torque. One such step
-/// may be the end of a ramp whose torque has already ended.
+/// Detects a Model Exchange host that leaves the reaction −h_w' of the wheels out of the torque: h_wheels changes along an
+/// axis on which torque has always been 0. `torque` is true for each axis on which torque has been different from 0, and
+/// `moved` counts the steps in which h_wheels changed without torque. One such step is accepted, because it may be the end
+/// of a ramp whose torque has already ended.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
     torque: [bool; 3],
@@ -58,9 +57,9 @@ impl Wheels {
     }
 }
 
-/// The craft's parameters, with counts as integers for FMI. `mount_kind` and `damping_law_kind` are the
-/// integer twins of the enumerations `mount` and `tank[].damping_law`, for hosts that cannot set
-/// enumerations; 0 to use the enumeration.
+/// The craft's parameters, with counts as integers for FMI. A host that cannot set enumerations sets `mount_kind` and
+/// `damping_law_kind`, the integer twins of the enumerations `mount` and `tank[].damping_law`, to the number of the item; a
+/// twin that is 0 has no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,
@@ -98,10 +97,9 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the craft's parameters with the integer twins applied.
+    /// Returns the craft's parameters with the values of the integer twins applied.
     ///
     /// # Errors
-    ///
     /// If an enumeration contradicts its twin.
     fn resolved(&self) -> Result<craft::Parameters, Vec<String>> {
         let mut p = self.craft;

@@ -1,8 +1,7 @@
-//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`:
-//! the craft is at rest.
+//! All variables of Spacecraft.fmu. The start values are those of `craft::Parameters::default()`, with the craft at rest.
 //!
-//! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, … with
-//! the indices tank, mode, axis.
+//! Array elements have structured names as FMI defines them: the elements of `tank[].p` with the shape 4, 3, 3 are
+//! `tank[1].p[1,1]`, … with the indices tank, mode, axis.
 
 use craft::{APPENDAGES, MODES, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, join, scalar_count, scalars};
@@ -35,8 +34,8 @@ const DESCRIPTION: &str = "A rigid spacecraft in six degrees of freedom with up 
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// Direct dependencies. The accelerations balance all forces. Tension, drag and centring of the
-// pendulums depend on their directions and rates, gravity on a pivot depends on the attitude.
+// Direct dependencies. The accelerations depend on all forces. Tension, drag and centring force of the pendulums depend on
+// their directions and rates, and gravity on a pivot depends on the attitude.
 const MOTION: &[&str] = &[
     "q",
     "omega",
@@ -157,7 +156,7 @@ impl Tanks for Model {
     }
 }
 
-/// The variables. Outputs come first, in reading order.
+/// The variables. The outputs come first, in a useful order.
 static VARIABLES: &[V] = &join::<
     _,
     { OUTPUTS.len() + TANK_LOCALS.len() + MOTIONS.len() + TANK_PARAMETERS.len() + OTHERS.len() },

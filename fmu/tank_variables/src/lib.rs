@@ -1,5 +1,5 @@
-//! Variables of a tank, once for both FMUs with tanks: Spacecraft, which has several, and SloshTank, which has one. Each FMU's
-//! table takes them by [`tank_parameters!`] and [`tank_locals!`]. Meanings and units stand in the descriptions.
+//! Variables of a tank for both FMUs with tanks: Spacecraft, which has several tanks, and SloshTank, which has one. The
+//! table of each FMU includes them by [`tank_parameters!`] and [`tank_locals!`]. Meanings and units are in the descriptions.
 
 #![no_std]
 
@@ -8,7 +8,7 @@ pub use runtime::variable::Dimension::{self, Fixed};
 use runtime::variable::Item;
 pub use runtime::variable::{Enumeration, Variable};
 
-/// A model with tanks, whose indices count from 0. Integers are stored as the host sets them.
+/// A model with tanks, whose indices count from 0. Integer parameters are stored as the host has set them.
 #[allow(missing_docs)]
 pub trait Tanks: runtime::Dynamics {
     fn tank(p: &Self::Parameters, i: usize) -> &Tank;
@@ -24,7 +24,10 @@ pub static DAMPING_LAW: Enumeration = Enumeration {
     name: "DampingLaw",
     description: "Drag coefficient c of a mode as a function of its natural frequency omega",
     items: &[
-        Item::new("laminar", "c ~ sqrt(omega): a laminar layer at the wall, for bare tanks"),
+        Item::new(
+            "laminar",
+            "c ~ sqrt(omega): a laminar layer at the wall, for tanks without baffles",
+        ),
         Item::new("constant_ratio", "c ~ omega: constant damping ratio"),
         Item::new("constant", "c constant, independent of the specific force"),
     ],
@@ -32,7 +35,7 @@ pub static DAMPING_LAW: Enumeration = Enumeration {
 
 pub static REGIME: Enumeration = Enumeration {
     name: "Regime",
-    description: "Amplitude class of the wave at the wall, R being the free surface's radius",
+    description: "Amplitude class of the wave at the wall; R is the free surface's radius",
     items: &[
         Item::new("linear", "Below 0.15 R: linear theory holds"),
         Item::new("transitional", "0.15 R to 0.25 R"),
@@ -77,22 +80,22 @@ pub fn set_damping_law<M: Tanks>(p: &mut M::Parameters, tank: usize, number: i32
     }
 }
 
-/// Returns the indices, from 0, of the tank, the mode and the point of the fill table that belong
-/// to element `n` of an array over tanks, modes and points.
+/// Returns the indices of the tank, the mode and the point of the fill table that belong to element `n` of an array over
+/// tanks, modes and points. All count from 0.
 pub const fn point(n: usize) -> (usize, usize, usize) {
     (n / (POINTS * MODES), n / POINTS % MODES, n % POINTS)
 }
 
-/// Returns the indices, from 0, of the tank, the mode and the axis that belong to element `n` of an
-/// array over tanks, modes and axes.
+/// Returns the indices of the tank, the mode and the axis that belong to element `n` of an array over tanks, modes and axes.
+/// All count from 0.
 pub const fn place(n: usize) -> (usize, usize, usize) {
     (n / (3 * MODES), n / 3 % MODES, n % 3)
 }
 
 /// Declares a tank's local variables from `wave_height` to `spin_number`.
 ///
-/// `$tank` is the name of a tank, `$tanks` the dimension over the tanks if there are several. `$angles` and `$motion` are
-/// the variables on which the slosh angles and the range of the model depend.
+/// `$tank` is the name of a tank, and `$tanks` the dimension over the tanks if there are several. `$angles` are the
+/// variables on which the slosh angles depend, and `$motion` those on which the ranges of validity depend.
 #[macro_export]
 #[rustfmt::skip]
 macro_rules! tank_locals {
@@ -132,8 +135,8 @@ macro_rules! tank_locals {
 
 /// Declares a tank's parameters.
 ///
-/// `$tank` is the name of a tank, `$tanks` the dimension over the tanks if there are several, `$mode` the dimension over
-/// the modes. `$axes` are the axes in which the tank is mounted, and `$detached` says when the liquid may detach.
+/// `$tank` is the name of a tank, `$tanks` the dimension over the tanks if there are several, and `$mode` the dimension over
+/// the modes. `$axes` are the axes in which the tank is mounted, and `$detached` is a text on when the liquid may detach.
 #[macro_export]
 #[rustfmt::skip]
 macro_rules! tank_parameters {
@@ -210,7 +213,7 @@ macro_rules! tank_parameters {
             V::integer(concat!($tank, ".damping_law_kind"), |p, n| M::damping_law_kind(p, n),
                 concat!($tank, ".damping_law as an integer, for hosts that cannot set enumerations: 0 takes ", $tank, ".damping_law, other values are its item numbers. Setting ", $tank, ".damping_law to a different item is an error"))
                 .between(0, DAMPING_LAW.items.len() as i32).shape(PER_TANK),
-            V::parameter(concat!($tank, ".g_floor"), |p, n| &mut M::tank_mut(p, n).g_floor, "m/s2", "Specific force along the tank's axis around which the drag stops following it; 0: 1e-4 g_ref")
+            V::parameter(concat!($tank, ".g_floor"), |p, n| &mut M::tank_mut(p, n).g_floor, "m/s2", "Specific force along the tank's axis below which the drag hardly depends on the specific force; 0: 1e-4 g_ref")
                 .shape(PER_TANK).range(0.0, 1e6),
             V::parameter(concat!($tank, ".zeta_amplitude"), |p, n| &mut M::tank_mut(p, n / MODES).zeta_amplitude[n % MODES], "1/rad", "Growth of a mode's damping ratio with its amplitude A: zeta(A) = zeta + zeta_amplitude A; A combines angle and rate over natural frequency in both directions")
                 .shape(PER_MODE).range(0.0, 10.0),
@@ -218,25 +221,25 @@ macro_rules! tank_parameters {
                 .shape(PER_MODE).range(0.0, 10.0),
             V::parameter(concat!($tank, ".breaking_steepness"), |p, n| &mut M::tank_mut(p, n / MODES).breaking_steepness[n % MODES], "1", "Steepness k a at which a mode's waves begin to break: wave number k times elevation a at the wall. The FMU takes the k a of an upright cylinder, in mode 1 1.54 times the slosh angle in rad. For a box set 1.21 times its steepness. Measured values in water are 0.60 to 0.66. Above 0 the mode is out of range beyond it (limited_by = breaking), and it has no other effect if zeta_breaking is 0")
                 .shape(PER_MODE).range(0.0, 10.0),
-            V::parameter(concat!($tank, ".nonlinear_inertia"), |p, n| &mut M::tank_mut(p, n / MODES).nonlinear_inertia[n % MODES], "1", "Third-order coefficient s of a slosh mode's inertia. The slosh angle A changes the frequency of a planar wave by the share (3 kappa/8 - s/2) A^2/2. The default, a pendulum, is 1. A negative value, for shallow liquid, bounds the slosh angle")
+            V::parameter(concat!($tank, ".nonlinear_inertia"), |p, n| &mut M::tank_mut(p, n / MODES).nonlinear_inertia[n % MODES], "1", "Third-order coefficient s of a slosh mode's inertia. The slosh angle A changes the frequency of a planar wave by the relative amount (3 kappa/8 - s/2) A^2/2. The default, a pendulum, is 1. A negative value, for shallow liquid, bounds the slosh angle")
                 .shape(PER_MODE).range(-1e3, 1e3),
-            V::parameter(concat!($tank, ".nonlinear_stiffness"), |p, n| &mut M::tank_mut(p, n / MODES).nonlinear_stiffness[n % MODES], "1", "Third-order coefficient kappa of a slosh mode's stiffness. The slosh angle A changes the frequency of a rotary wave by the share (kappa/4 - t) A^2, with t = rotary_inertia. The default, a pendulum, is 1")
+            V::parameter(concat!($tank, ".nonlinear_stiffness"), |p, n| &mut M::tank_mut(p, n / MODES).nonlinear_stiffness[n % MODES], "1", "Third-order coefficient kappa of a slosh mode's stiffness. The slosh angle A changes the frequency of a rotary wave by the relative amount (kappa/4 - t) A^2, with t = rotary_inertia. The default, a pendulum, is 1")
                 .shape(PER_MODE).range(-1e3, 1e3),
             V::parameter(concat!($tank, ".nonlinear_inertia_2"), |p, n| &mut M::tank_mut(p, n / MODES).nonlinear_inertia_2[n % MODES], "1", "Coefficient s_2 of a slosh mode beyond the third order: kinetic energy m s_2 |q|^2 (q.q')^2/(2 l^4) with the displacement q and the length l. 0 for a pendulum; tanks with a fill table have none")
                 .shape(PER_MODE).range(-1e5, 1e5),
             V::parameter(concat!($tank, ".nonlinear_stiffness_2"), |p, n| &mut M::tank_mut(p, n / MODES).nonlinear_stiffness_2[n % MODES], "1", "Coefficient kappa_2 of a slosh mode beyond the third order: the bob is l kappa_2 (|q|/l)^6/16 higher. 0 for a pendulum; tanks with a fill table have none")
                 .shape(PER_MODE).range(-1e5, 1e5),
-            V::parameter(concat!($tank, ".rotary_inertia"), |p, n| &mut M::tank_mut(p, n / MODES).rotary_inertia[n % MODES], "1", "Coefficient t of a slosh mode's rotary motion: kinetic energy m t (q x q')^2/(2 l^2), with q' against axes that do not turn about the tank's axis. The slosh angle A changes the frequency of a rotary wave by the share (kappa/4 - t) A^2. 0 for a pendulum; tanks with a fill table have none")
+            V::parameter(concat!($tank, ".rotary_inertia"), |p, n| &mut M::tank_mut(p, n / MODES).rotary_inertia[n % MODES], "1", "Coefficient t of a slosh mode's rotary motion: kinetic energy m t (q x q')^2/(2 l^2), with q' relative to axes that do not turn about the tank's axis. The slosh angle A changes the frequency of a rotary wave by the relative amount (kappa/4 - t) A^2. 0 for a pendulum; tanks with a fill table have none")
                 .shape(PER_MODE).range(-1e5, 1e5),
             V::parameter(concat!($tank, ".rotary_inertia_2"), |p, n| &mut M::tank_mut(p, n / MODES).rotary_inertia_2[n % MODES], "1", "Coefficient t_2 of a slosh mode's rotary motion: kinetic energy m t_2 |q|^2 (q x q')^2/(2 l^4). 0 for a pendulum; tanks with a fill table have none")
                 .shape(PER_MODE).range(-1e5, 1e5),
             V::parameter(concat!($tank, ".gyroscopic"), |p, n| &mut M::tank_mut(p, n / MODES).gyroscopic[n % MODES], "1", concat!("Gyroscopic coefficient C of a slosh mode in liquid that spins at the rate W = ", $tank, ".spin[3]/spin_inertia. Seen from the tank a wave has the frequencies C W +- sqrt(C^2 W^2 + omega_0^2), against the spin and with it. C is 0.42 in deep and 0.84 in shallow liquid. 1 with gyroscopic_stiffness 0: a pendulum in space, which takes no part in the spin. Without effect if spin_inertia is 0; not for planar modes"))
                 .shape(PER_MODE).range(-10.0, 10.0),
-            V::parameter(concat!($tank, ".gyroscopic_stiffness"), |p, n| &mut M::tank_mut(p, n / MODES).gyroscopic_stiffness[n % MODES], "1", "Stiffness that the spin of the liquid adds to a slosh mode with gyroscopic other than 1: its share of W^2 in omega_0^2 + gyroscopic_stiffness W^2, which replaces omega_0^2 in the frequencies")
+            V::parameter(concat!($tank, ".gyroscopic_stiffness"), |p, n| &mut M::tank_mut(p, n / MODES).gyroscopic_stiffness[n % MODES], "1", "Stiffness that the spin of the liquid adds to a slosh mode with gyroscopic other than 1: omega_0^2 + gyroscopic_stiffness W^2 replaces omega_0^2 in the frequencies")
                 .shape(PER_MODE).range(-1e3, 1e3),
-            V::parameter(concat!($tank, ".angle_limit"), |p, n| &mut M::tank_mut(p, n / MODES).angle_limit[n % MODES], "rad", "Slosh angle above which a mode is out of range (limited_by = third_order): the smaller of the angles at which its frequency errs by 0.3 % and a forced response by 3 %. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
+            V::parameter(concat!($tank, ".angle_limit"), |p, n| &mut M::tank_mut(p, n / MODES).angle_limit[n % MODES], "rad", "Slosh angle above which a mode is out of range (limited_by = third_order): the smaller of the angles at which its frequency errs by 0.3 % and a forced response by 3 %. 0: not known; mode 1 of a tank with diameter above 0 then has the limit of an upright cylinder")
                 .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
-            V::parameter(concat!($tank, ".swirl_limit"), |p, n| &mut M::tank_mut(p, n / MODES).swirl_limit[n % MODES], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because a forced response errs by 3 % or its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
+            V::parameter(concat!($tank, ".swirl_limit"), |p, n| &mut M::tank_mut(p, n / MODES).swirl_limit[n % MODES], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because a forced response errs by 3 % or its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has the limit of an upright cylinder")
                 .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
             V::parameter(concat!($tank, ".g_bond"), |p, n| &mut M::tank_mut(p, n).g_bond, "m/s2", "Specific force along the tank's axis below which surface tension matters that the parameters do not include (limited_by = bond_number); 0: not known")
                 .shape(PER_TANK).range(0.0, 1e6),
@@ -246,10 +249,10 @@ macro_rules! tank_parameters {
                 concat!("Distance along the tank's axis that the detached liquid's centre can move, from bottom to top; 0: the liquid never detaches. Above 0, all liquid becomes one body if thrust pulls it off the bottom or the bobs pass 45 degrees (mean by modal mass). The liquid flies, bounces off the wall and settles. ", $detached))
                 .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
             V::parameter(concat!($tank, ".ball.radius"), |p, n| &mut M::tank_mut(p, n).ball.radius, "m",
-                "Largest distance of the detached liquid's centre from the tank's axis; 0: the surface within reach has, at the bottom, the curvature of the path of the pendulums' common centre")
+                "Largest distance of the detached liquid's centre from the tank's axis; 0: computed so that the surface that this centre can reach has, at the bottom, the curvature of the path of the pendulums' common centre")
                 .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
             V::parameter(concat!($tank, ".ball.restitution"), |p, n| &mut M::tank_mut(p, n).ball.restitution, "1",
-                "Coefficient of restitution of the detached liquid's impacts on the wall: normal speed after over before; a guess unless measured")
+                "Coefficient of restitution of the detached liquid's impacts on the wall: normal speed after the impact divided by the speed before it; a guess unless measured")
                 .shape(PER_TANK).range(0.0, 1.0),
             V::parameter(concat!($tank, ".ball.contact_speed"), |p, n| &mut M::tank_mut(p, n).ball.contact_speed, "m/s",
                 "Speed after an impact below which detached liquid that is pressed to the wall stays on it")
@@ -267,12 +270,12 @@ macro_rules! tank_parameters {
                 "Share of the spin across the tank's axis that belongs to the angular momentum: 2 a c/(a^2 + c^2) in a full spheroid with the semi-axes a, a, c, 1 in a partly full tank")
                 .shape(PER_TANK).range(0.0, 1.0),
             V::parameter(concat!($tank, ".spin_decay"), |p, n| &mut M::tank_mut(p, n / 2).spin_decay[n % 2], "1/s",
-                "Rate at which wall friction decreases the rotation of the liquid against the tank, about its axis and across it: about sqrt(nu Omega)/R times 2.9 and 2.6 in a full sphere")
+                "Rate at which wall friction decreases the rotation of the liquid relative to the tank, about its axis and across it: about sqrt(nu Omega)/R times 2.9 and 2.6 in a full sphere")
                 .shape(TANK_PAIR).range(0.0, 1e3),
             V::parameter(concat!($tank, ".slip_0"), |p, n| &mut M::tank_mut(p, n / 3).slip_0[n % 3], "rad/s",
-                "Rotation of the liquid against the tank at the start, tank axes; 0: the liquid rotates with the tank")
+                "Angular velocity of the liquid relative to the tank at the start, tank axes; 0: the liquid rotates with the tank")
                 .display_unit("deg/s").shape(TANK_VECTOR).range(-1e3, 1e3),
-            V::integer(concat!($tank, ".fill.points"), |p, n| M::points(p, n), "Number of points in the tank's fill table; 0: the liquid stays. From 2 on the tank can drain, and the table gives its modes and rigid liquid, interpolated monotonically with two continuous derivatives. The start values are the default tank at depths of 0.1 to 1.2 m")
+            V::integer(concat!($tank, ".fill.points"), |p, n| M::points(p, n), "Number of points in the tank's fill table; 0: the tank does not drain. From 2 on the tank can drain, and the table gives its modes and rigid liquid, interpolated monotonically with two continuous derivatives. The start values are the default tank at depths of 0.1 to 1.2 m")
                 .between(0, POINTS as i32).shape(PER_TANK),
             V::parameter(concat!($tank, ".liquid_0"), |p, n| &mut M::tank_mut(p, n).liquid_0, "kg", "Mass of the whole liquid at the start, used if fill.points is above 0")
                 .shape(PER_TANK).range(0.0, 1e9),
@@ -300,7 +303,7 @@ macro_rules! tank_parameters {
                 .shape(TABLE_OF_MODE).range(-1e3, 1e3),
             V::parameter(concat!($tank, ".fill.angle_limit"), |p, n| { let (i, m, k) = point(n); &mut M::tank_mut(p, i).fill.angle_limit[m][k] }, "rad", "angle_limit of a slosh mode at each point of the fill table, interpolated linearly; 0 where it is not known, then angle_limit holds")
                 .display_unit("deg").shape(TABLE_OF_MODE).range(0.0, 1.6),
-            V::parameter(concat!($tank, ".fill.swirl_limit"), |p, n| { let (i, m, k) = point(n); &mut M::tank_mut(p, i).fill.swirl_limit[m][k] }, "rad", "swirl_limit of a slosh mode at each point of the fill table, likewise")
+            V::parameter(concat!($tank, ".fill.swirl_limit"), |p, n| { let (i, m, k) = point(n); &mut M::tank_mut(p, i).fill.swirl_limit[m][k] }, "rad", "swirl_limit of a slosh mode at each point of the fill table, interpolated linearly; 0 where it is not known, then swirl_limit holds")
                 .display_unit("deg").shape(TABLE_OF_MODE).range(0.0, 1.6),
             V::parameter(concat!($tank, ".p_0"), |p, n| { let (i, m, k) = place(n); &mut M::tank_mut(p, i).p_0[m][k] }, "1",
                 "Unit vector from hinge to bob at the start, tank axes; the FMU normalises it, for a planar mode within its plane")

@@ -1,9 +1,9 @@
-//! Reasons why an integrator refuses a time step of the simulation.
+//! Reasons why an integrator refuses a step.
 
 use alloc::string::String;
 
-/// Reason for refusing a step; its text is for the user. The state is then the same as before the step. Times
-/// are in s since the start of the call or, after [`StepError::delayed`], since another instant.
+/// Reason why a step is refused; its text is for the user. The state is then the same as before the step. Times are in s
+/// since the start of the call, or after [`StepError::delayed`] since another instant.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepError {
     Length {
@@ -12,9 +12,8 @@ pub enum StepError {
     NotFinite {
         time: f64,
     },
-    /// The call needs more internal integration steps than `solver.max_steps`, and has reached
-    /// `time`. `advice` tells the user of this model what to change other than the communication
-    /// step and `solver.max_steps`.
+    /// The call needs more internal integration steps than `solver.max_steps`, and has reached `time`. `advice` is the end
+    /// of the message: what the user of this model can change other than the communication step and `solver.max_steps`.
     TooManySteps {
         time: f64,
         max_steps: usize,
@@ -56,8 +55,8 @@ impl core::fmt::Display for StepError {
 impl core::error::Error for StepError {}
 
 impl StepError {
-    /// Returns the same error with `begin`, s, added to its time, so that a time since the start of a stretch
-    /// becomes a time since the start of the call.
+    /// Returns the same error with `begin`, s, added to its time. A time since the start of a stretch thus becomes a time
+    /// since the start of the call.
     pub fn delayed(mut self, begin: f64) -> StepError {
         if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
             *time += begin;

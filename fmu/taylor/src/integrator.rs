@@ -1,12 +1,13 @@
 //! Taylor-series integrator with events.
 //!
-//! Over one step the whole motion is a power series in time (`series.rs`). The order grows until successive terms at the step's
-//! end are below the tolerance. If the highest order is not enough, the step is cut to the length at which this order is enough.
-//! Short steps are therefore cheap, and no step is rejected. The series is as exact within the step as at its end. A step ends
-//! exactly where it should, and events are roots of polynomials (`root.rs`), found without stepping back.
+//! In one step the whole motion is a power series in time (`series.rs`). The order is increased until successive terms at
+//! the step's end are below the tolerance. If the highest order is not enough, the step is shortened to the length for which
+//! it is enough. Short steps are therefore cheap, and no step is rejected. The series is as exact within the step as at its
+//! end. A step ends exactly at the requested time, and events are roots of polynomials (`root.rs`), so that no step is
+//! repeated to find them.
 //!
-//! [`advance`] begins a series at each call. [`advance_kept`] continues the series of the call before, so that its
-//! results do not depend on where calls end.
+//! [`advance`] starts a new series in each call. [`advance_kept`] continues the series of the previous call, so that results
+//! do not depend on the times at which calls end.
 //!
 //! Source: Jorba & Zou, Experimental Mathematics 14 (2005).
 
@@ -16,8 +17,8 @@ use crate::error::StepError;
 use crate::for_each_order;
 use crate::series::ORDER;
 
-/// Allowed error of one internal step over the allowed error of the whole motion. It is less than 1
-/// because the errors of some thousand steps add up until the liquid's damping removes them.
+/// Allowed error of one internal step, divided by the allowed error of the whole motion. It is less than 1 because the
+/// errors of some thousand steps add up until the liquid's damping removes them.
 pub const STEP_SHARE: f64 = 1e-2;
 
 /// Smallest rate, rad/s, to which an allowed error is relative. Rates below it are negligible.
@@ -26,33 +27,32 @@ pub const RATE_FLOOR: f64 = 1e-6;
 /// Largest magnitude of a state. Above it energies and forces may overflow although the states do not.
 pub const MAX_MAGNITUDE: f64 = 1e30;
 
-/// Longest expansion, s, so that its powers up to the highest order do not overflow.
+/// Longest expansion, s, for which the powers of the length up to the highest order do not overflow.
 const LONGEST: f64 = 1e9;
 
 const MIN_ORDER: usize = 5;
 
-/// Ratio of two terms of a power series, two orders apart, below which the terms that follow may be
-/// predicted from the decay of the terms so far.
+/// Largest ratio of two terms of a power series, two orders apart, for which the following terms are predicted from the
+/// decay of the previous terms.
 const DECAY: f64 = 0.1;
 
-/// Allowed magnitude of a predicted term of the series over the allowed magnitude of a computed
-/// term.
+/// Allowed magnitude of a predicted term of the series, divided by the allowed magnitude of a computed term.
 const PREDICTED_SHARE: f64 = 0.25;
 
-/// Largest last computed term of a series, relative to its allowed magnitude, from which the terms
-/// that follow may be predicted.
+/// Largest magnitude of the last computed term of a series, divided by its allowed magnitude, for which the
+/// following terms are predicted.
 const LARGEST_LAST: f64 = 30.0;
 
-/// Length of a step, s, from which on the step may err by the whole allowed error. A shorter step of a kept [`Expansion`] may err
-/// only in proportion to its length, because the errors of more steps add up. Ends of calls are compared with the right-hand side
-/// after this length.
+/// Length of a step, s, from which on the step may have the whole allowed error. In a kept [`Expansion`] the allowed error
+/// of a shorter step is proportional to its length, because the errors of more steps add up. After steps of this length the
+/// derivatives at the end of a call are compared with the right-hand side.
 const FULL_LENGTH: f64 = 0.1;
 
-/// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with
-/// half the length.
+/// Largest defect of a step, divided by the allowed error of its terms. A step with a larger defect is repeated
+/// with half the length.
 const DEFECT: f64 = 10.0;
 
-/// Counter of the internal steps that one call has `taken` and may take at most (`max`).
+/// Counter of the internal steps of one call: `taken` is the number of steps so far, and `max` the largest allowed number.
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
     taken: usize,
@@ -61,12 +61,12 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Creates a counter for `max` steps. `advice` is the remedy for the user if they do not suffice.
+    /// Creates a counter for at most `max` steps. `advice` is for the user if they are not enough.
     pub const fn new(max: usize, advice: &'static str) -> Steps {
         Steps { taken: 0, max, advice }
     }
 
-    /// Counts `number` more steps, or other work of the same cost, at `time`.
+    /// Counts `number` more steps, or other work of the same cost, at the time `time`.
     ///
     /// # Errors
     /// If the limit is exceeded.
@@ -86,25 +86,25 @@ impl Steps {
     }
 }
 
-/// Criterion by which the power series of a motion is long enough: with `Terms`, the given number
-/// of successive terms has to be negligible. With `Decay`, two successive terms have to be, which
-/// may be predicted from the decay of the terms before them. One negligible term is not enough,
-/// because a motion that starts at rest is even in time, so that every second term is zero.
+/// Criterion by which the power series of a motion is long enough. `Terms` requires the given number of successive
+/// negligible terms. `Decay` requires two successive negligible terms, which may be predicted from the decay of the previous
+/// terms. One negligible term is not enough, because a motion that starts at rest is an even function of time, so that every
+/// second term is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Convergence {
     Terms(usize),
     Decay,
 }
 
-/// Returns true if the series may end with term n: terms n and n - 1 are negligible, or terms n and n + 1,
-/// or terms n + 1 and n + 2. Terms after n are predicted. The arguments are the ratios of terms n, n - 1,
-/// n - 2, n - 3 to their tolerance.
+/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and n
+/// + 1, or n + 1 and n + 2. Terms after n are predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
+/// divided by its tolerance.
 ///
-/// The prediction takes the slower of two decays over two orders: t_(n+1) = t_(n-1) max(t_n/t_(n-2),
-/// t_(n-1)/t_(n-3)), and t_(n+2) from t_n.
+/// For the prediction the slower of two decays over two orders is used: t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)),
+/// and t_(n+2) follows from t_n.
 #[inline(always)]
 fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
-    // NaN is not negligible; non-finite states end the step.
+    // NaN is not negligible; another check ends the step if states are not finite.
     if now <= 1.0 && one <= 1.0 {
         return true;
     }
@@ -114,22 +114,22 @@ fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
     decays && is_small(one) && (now <= 1.0 || now <= LARGEST_LAST && is_small(now))
 }
 
-/// A motion that can be expanded in a power series, as [`advance`] needs it. Lengths and times are in s.
+/// A motion that [`advance`] can expand in a power series. Lengths of steps and times are in s.
 pub trait Motion {
-    /// True to compile expansions with the sums of every order written out, which is about twice as fast but
-    /// larger code.
+    /// True if expansions are compiled with the sums of every order written out, which is about twice as fast
+    /// but gives larger code.
     const UNROLLED: bool = true;
 
-    /// Starts the expansion at the current states, `t` after the start of the call.
+    /// Starts the expansion at the present states, at the time `t` after the start of the call.
     fn start(&mut self, t: f64);
 
     /// Computes coefficient n of every quantity from coefficients up to n of the states, and then coefficient
     /// n + 1 of the states.
     fn rates(&mut self, n: usize);
 
-    /// Sets the magnitudes to which errors of a step of length `h` are relative, from coefficients 0 and 1,
-    /// with the relative error `allowed`. Returns the time, at most `h`, over which the series is valid, from
-    /// coefficients 0 to 2 of every quantity. A function with a rounded corner has singularities near the
+    /// Sets the magnitudes to which the errors of a step of length `h` are relative, from coefficients 0 and 1; `allowed` is
+    /// the allowed relative error. Returns the time, at most `h`, over which the series is valid, from coefficients 0 to 2
+    /// of every quantity. It is shorter than `h` for example if a function with a rounded corner has singularities near the
     /// real axis, which later coefficients may not show.
     fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64;
 
@@ -152,9 +152,8 @@ pub trait Motion {
         ORDER
     }
 
-    /// Returns the error of the series of functions with rounded corners, relative to the allowed
-    /// error, at `h` after the start of the expansion. The error is the difference between the
-    /// series up to order n and the function itself.
+    /// Returns the error of the series of functions with rounded corners at the time `h` after the start of the expansion,
+    /// divided by the allowed error. The error is the difference between the series up to order n and the function itself.
     #[inline(always)]
     fn defect(&self, _n: usize, _h: f64) -> f64 {
         0.0
@@ -167,9 +166,9 @@ pub trait Motion {
         None
     }
 
-    /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call, by the series up to
-    /// order n. If the last call of [`Motion::event`] has found an event, the event is at `h`. Returns `Continue` if the call
-    /// goes on, otherwise `Break` with the elapsed length.
+    /// Advances the states to the time `h` after the start of the expansion (which was `t` after the start of the call), by
+    /// the series up to order n. If the last call of [`Motion::event`] has found an event, the event is at `h`. Returns
+    /// `Continue` if the call goes on, otherwise `Break` with the elapsed time.
     ///
     /// # Errors
     /// If the states at `h` are not finite, or the model is not valid for them.
@@ -182,18 +181,16 @@ pub trait Motion {
     ) -> Result<ControlFlow<f64>, StepError>;
 }
 
-/// A motion whose expansion further calls of [`advance_kept`] continue.
+/// A motion whose expansion can be continued by further calls of [`advance_kept`].
 pub trait KeptMotion: Motion {
     fn expansion(&mut self) -> &mut Expansion;
 
-    /// Stores the derivatives of the states that the series up to order n have at `h` after the start of the
-    /// expansion.
+    /// Stores the derivatives of the states at the time `h` after the start of the expansion, from the series up to order n.
     #[inline(always)]
     fn store_slopes(&mut self, _n: usize, _h: f64) {}
 
-    /// Returns the error of the states over the time `h`, relative to the allowed error, that
-    /// follows from the difference between the derivatives that [`KeptMotion::store_slopes`] has
-    /// stored and the derivatives by the right-hand side.
+    /// Returns the error of the states over the time `h`, divided by the allowed error, that follows from the difference
+    /// between the derivatives that [`KeptMotion::store_slopes`] has stored and those of the right-hand side.
     #[inline(always)]
     fn slope_defect(&self, _h: f64) -> f64 {
         0.0
@@ -208,9 +205,8 @@ pub trait KeptMotion: Motion {
     fn keep(&mut self) {}
 }
 
-/// Progress of an expansion of the length `h`, s, after order n: h^(n + 1) is `power`, `terms` are the last
-/// terms relative to their allowed errors, the newest first, and `negligible` is the number of successive
-/// negligible terms at the end.
+/// Progress of an expansion of the length `h`, s, after order n. `power` is h^(n + 1), `terms` are the last terms divided by
+/// their allowed errors, the newest first, and `negligible` is the number of successive negligible terms at the end.
 struct Progress {
     h: f64,
     power: f64,
@@ -257,8 +253,8 @@ fn expand_order<M: Motion>(
     }
 }
 
-/// Expands the motion up to `h` ahead. Returns the order and the length, at most `h`, for which the omitted
-/// terms are below the tolerance.
+/// Expands the motion for at most `h`. Returns the order, and the length, at most `h`, for which the omitted terms
+/// are below the tolerance.
 #[inline(always)]
 fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     let mut progress =
@@ -284,8 +280,8 @@ fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     (highest, length(&norms, highest, progress.h))
 }
 
-/// Advances the motion by exactly `h` > 0 from the time `begin`. If the motion ends the call itself
-/// ([`Motion::take`]), returns the elapsed length. After an error the states are unusable.
+/// Advances the motion by exactly `h` > 0 from the time `begin`. If the motion ends the call itself ([`Motion::take`]),
+/// returns the elapsed time. If an error is returned, the states are invalid.
 ///
 /// # Errors
 /// See [`StepError`].
@@ -323,11 +319,11 @@ pub fn advance<M: Motion>(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Adds `t`, s, to a time that is kept as two numbers: the rounded sum and the rounding error of
-/// that sum. Many small steps then add up without error.
+/// Adds `t`, s, to a time that consists of two numbers: the rounded sum and the rounding error of this sum. Many small steps
+/// can thus be added without error.
 #[inline(always)]
 pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
-    // Knuth's sum of two numbers and its rounding error, then Dekker's.
+    // This is Knuth's sum of two numbers and its rounding error, followed by Dekker's sum.
     let sum = time + t;
     let added = sum - time;
     let rest = rest + ((time - (sum - added)) + (t - added));
@@ -335,19 +331,19 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
     [total, rest - (total - sum)]
 }
 
-/// An expansion that calls of [`advance_kept`] continue while the inputs are held. Each call computes as many orders as its end
-/// needs. The state at an instant depends only on the start of the expansion and on the time since this start, not on the
-/// instants in between at which calls have ended.
+/// An expansion that calls of [`advance_kept`] continue while the inputs are constant. Each call computes as many orders as
+/// its end needs. The state at an instant depends only on the start of the expansion and on the time since this start, and
+/// not on the times at which earlier calls have ended.
 #[derive(Clone, Debug)]
 pub struct Expansion {
     orders: usize,
-    /// Number of the lowest orders whose coefficients were overwritten, because the motion was used for something else
-    /// after the expansion.
+    /// Number of the lowest orders whose coefficients were overwritten, because other functions have used the
+    /// motion after the expansion.
     overwritten: usize,
     norms: [f64; ORDER + 1],
     radius: f64,
     end: Option<(usize, f64)>,
-    /// Time after the start up to which a call may end without a comparison with the right-hand side, s.
+    /// Time after the start of the expansion, s, up to which a call may end without a comparison with the right-hand side.
     verified: f64,
 }
 
@@ -371,7 +367,7 @@ impl Expansion {
         (self.orders, self.overwritten, self.end, self.verified) = (0, 0, None, FULL_LENGTH);
     }
 
-    /// Records that coefficients below `order` of all quantities, and coefficient `order` of the states, are
+    /// Records that the coefficients below `order` of all quantities, and coefficient `order` of the states, were
     /// overwritten. `order` is at most 4.
     #[inline(always)]
     pub fn overwrite(&mut self, order: usize) {
@@ -380,8 +376,8 @@ impl Expansion {
     }
 }
 
-/// Computes again the coefficients of the expansion that other uses of the motion have overwritten.
-/// The expansion starts `t`, s, after the start of the call.
+/// Computes the overwritten coefficients of the expansion again. The expansion starts at the time `t`, s, after the
+/// start of the call.
 // Only four orders are compiled: all of them would be a sixth of the binary.
 #[inline(never)]
 fn repair<M: KeptMotion>(motion: &mut M, t: f64) {
@@ -412,9 +408,9 @@ fn compute_order<M: KeptMotion>(motion: &mut M, n: usize, tolerance: f64) {
     motion.expansion().orders = n + 1;
 }
 
-/// Search for the order up to which a series is exact at `t` after the start of the expansion: `power` is t^n over the share of
-/// the allowed error, `terms` are the last terms relative to their allowed errors, the newest first, and `negligible` is the number
-/// of successive negligible terms at the end.
+/// Search for the order up to which a series is exact at the time `t` after the start of the expansion. `power` is t^n
+/// divided by the fraction of the allowed error, `terms` are the last terms divided by their allowed errors, the newest
+/// first, and `negligible` is the number of successive negligible terms at the end.
 struct Search {
     t: f64,
     tolerance: f64,
@@ -426,8 +422,8 @@ struct Search {
 }
 
 impl Search {
-    /// Adds the term of order n + 1 to the search; the norm of its coefficient is in `expansion`.
-    /// Returns `Break` with the order up to which the series is exact if the search ends.
+    /// Adds the term of order n + 1 to the search; the norm of its coefficient is in `expansion`. If the search ends,
+    /// returns `Break` with the order up to which the series is exact.
     #[inline(always)]
     fn add_term(&mut self, expansion: &Expansion, n: usize) -> ControlFlow<Option<usize>> {
         if n < 2 {
@@ -480,11 +476,11 @@ impl Search {
     }
 }
 
-/// Returns the order up to which the series is exact at `t` after the start of the expansion. The longer `t`, the higher the
-/// order. The result is `None` if no order is high enough.
+/// Returns the order up to which the series is exact at the time `t` after the start of the expansion. The order increases
+/// with `t`. Returns `None` if no order is high enough.
 #[inline(always)]
 fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usize> {
-    // 1 over the share of the allowed error
+    // This is 1 divided by the allowed fraction of the error.
     let share = if t < FULL_LENGTH { FULL_LENGTH / t } else { 1.0 };
     let mut search = Search {
         t,
@@ -495,7 +491,7 @@ fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usi
         terms: [f64::INFINITY; 4],
         negligible: 0,
     };
-    // A loop of its own, because the orders written out lie far apart in memory.
+    // The loop is separate, because the functions of the single orders are far apart in memory.
     for n in 0..motion.expansion().orders {
         if let ControlFlow::Break(end) = search.add_term(motion.expansion(), n) {
             return end;
@@ -529,8 +525,8 @@ fn whole_expansion<M: KeptMotion>(
     Ok((n, length))
 }
 
-/// Returns the length of a step, s, at which the last two terms of the series up to order n just
-/// meet the tolerance, at most `longest`.
+/// Returns the length of a step, s, for which the last two terms of the series up to order n are just below the
+/// tolerance; at most `longest`.
 fn length(norms: &[f64; ORDER + 1], n: usize, longest: f64) -> f64 {
     let length = |n: usize| {
         let term = norms[n];
@@ -539,32 +535,32 @@ fn length(norms: &[f64; ORDER + 1], n: usize, longest: f64) -> f64 {
     longest.min(length(n)).min(length(n - 1))
 }
 
-/// Returns the order with which a motion needs the fewest operations per time. The length of an expansion of
-/// order n with the allowed error e is the radius of convergence times e^(1/n), and its cost increases with
-/// n^2, so the order is near -ln(e)/2 (Jorba & Zou). Costs that increase less, such as of solving for
-/// accelerations, make a higher order worth while.
+/// Returns the order with which a motion needs the fewest operations per time. For the allowed error e, the length of an
+/// expansion of order n is the radius of convergence times e^(1/n), and its cost increases with n^2. The best order is
+/// therefore near -ln(e)/2 (Jorba & Zou). If a part of the cost increases less, such as the solution for the accelerations,
+/// a higher order is better.
 #[inline(always)]
 fn highest_order<M: Motion>(motion: &M, tolerance: f64) -> usize {
     if motion.convergence() != Convergence::Decay {
         return motion.highest_order();
     }
-    // -log2(e), rounded
+    // This is -log2(e), rounded.
     let bits = 1023 - ((STEP_SHARE * tolerance).to_bits() >> 52 & 0x7ff) as usize;
     (5 + 35 * bits / 100).clamp(MIN_ORDER + 3, motion.highest_order())
 }
 
-/// Returns the largest allowed defect of the derivatives at the end of a series. At small tolerances it is the rounding error of
-/// the derivatives.
+/// Returns the largest allowed defect of the derivatives at the end of a series. At small tolerances it is the rounding
+/// error of the derivatives.
 #[inline(always)]
 fn largest_slope_defect(tolerance: f64) -> f64 {
     const ROUNDING: f64 = 1e-13;
     DEFECT * (1.0 + ROUNDING / (STEP_SHARE * tolerance))
 }
 
-/// Advances the motion to the time `clock` since the inputs are held: within the expansion if the expansion is exact at this
-/// time, otherwise by further expansions. `start` is the time of the expansion's start with its rounding error. `clock` comes
-/// without its rounding error, because this error depends on the lengths of the calls. Before the call the states are those at
-/// the start of the expansion, after the call those at `clock`.
+/// Advances the motion to the time `clock` after the inputs became constant: within the expansion if it is exact at this
+/// time, otherwise by further expansions. `start` is the time at the start of the expansion with its rounding error. `clock`
+/// has no rounding error, because this error would depend on the lengths of the calls. Before the call the states must be
+/// those at the start of the expansion; after the call they are those at `clock`.
 ///
 /// # Errors
 /// See [`StepError`].
@@ -584,7 +580,7 @@ pub fn advance_kept<M: KeptMotion>(
         steps.add_steps(1, begin + moved)?;
         let t = (clock - start[0]) - start[1];
         if t <= 0.0 {
-            return Ok(()); // an event at the end
+            return Ok(()); // an event has ended the call
         }
         if motion.expansion().orders == 0 {
             motion.start(moved);
@@ -600,7 +596,7 @@ pub fn advance_kept<M: KeptMotion>(
         };
         let mut event = motion.event(n, length);
         if event.is_some() {
-            // The series of the whole expansion has the same root for every end of the call.
+            // The series of the whole expansion is used, because it has the same root whenever the call ends.
             (n, length) = whole_expansion(motion, tolerance, (begin + moved, steps))?;
             event = motion.event(n, length).map(|event| event.min(t));
             length = length.min(t);
@@ -624,7 +620,7 @@ pub fn advance_kept<M: KeptMotion>(
         if is_verified {
             return Ok(());
         }
-        // The derivatives at the end are needed for the next expansion, too.
+        // The next expansion needs the derivatives at the end, too.
         if event.is_none() {
             motion.start(moved + length);
             motion.rates(0);
@@ -655,7 +651,7 @@ mod tests {
     use crate::root::first_root;
     use crate::series::{self, Series, ZERO};
 
-    /// The oscillator x' = v, v' = -x between walls. At x = `wall`, if it is set, v changes its sign.
+    /// The oscillator x' = v, v' = -x between walls. If `wall` is set, v changes its sign at x = `wall`.
     struct Oscillator {
         now: [f64; 2],
         x: Series,
@@ -725,7 +721,7 @@ mod tests {
         fn event(&mut self, n: usize, h: f64) -> Option<f64> {
             let mut above = self.x;
             above[0] -= self.wall?;
-            // On the wall the root at 0 is in the past.
+            // If the oscillator starts on the wall, the root at 0 is in the past.
             let behind = usize::from(above[0] <= 1e-15);
             first_root(&above[behind..=n], h)
         }
@@ -786,8 +782,8 @@ mod tests {
                 for h in [1e-3, 0.1, 2.0, 50.0] {
                     let mut motion = Oscillator::new(convergence);
                     motion.advance(h, tolerance).unwrap();
-                    // The error of one step is a hundredth; 50 s take up to thirty steps. 1e-14:
-                    // rounding.
+                    // The error of one step is a hundredth of the tolerance, and 50 s take up to thirty steps. 1e-14
+                    // allows for rounding errors.
                     let error = motion.error(h);
                     assert!(error < tolerance + 1e-14, "{convergence:?} {tolerance} {h}: {error}");
                 }
@@ -795,7 +791,8 @@ mod tests {
         }
     }
 
-    /// Reads off the order at which an expansion with the terms 0.1^n/n! ends, from n = 4 on.
+    /// The order at which an expansion with the terms 0.1^n/n! ends, from n = 4 on, is compared with the order that
+    /// follows from the terms.
     #[test]
     fn an_expansion_ends_at_the_order_whose_terms_are_negligible() {
         let order = |convergence, tolerance: f64| {
@@ -805,13 +802,15 @@ mod tests {
             assert_eq!((h, motion.rates), (0.1, n));
             n
         };
-        // Terms from 4 on: 4.2e-6, 8.3e-8, 1.4e-9, 2.0e-11, 2.5e-13. The allowed error is a hundredth of the tolerance.
+        // The terms from order 4 on are 4.2e-6, 8.3e-8, 1.4e-9, 2.0e-11 and 2.5e-13. The allowed error is a
+        // hundredth of the tolerance.
         assert_eq!(order(Convergence::Terms(2), 1e-3), 5);
         assert_eq!(order(Convergence::Terms(3), 1e-3), 6);
         assert_eq!(order(Convergence::Terms(4), 1e-3), 7);
         assert_eq!(order(Convergence::Terms(2), 1e-4), 6);
         assert_eq!(order(Convergence::Terms(2), 1e-6), 7);
-        // Term 5 is negligible, and term 6 is predicted by two orders' decay to be below a quarter.
+        // Term 5 is negligible, and term 6 is predicted, from the decay over two orders, to be below a quarter
+        // of the allowed error.
         assert_eq!(order(Convergence::Decay, 1e-3), 5);
         assert_eq!(order(Convergence::Decay, 1e-5), 5);
         assert_eq!(order(Convergence::Decay, 1e-6), 6);
@@ -821,16 +820,16 @@ mod tests {
     /// in units of the allowed error.
     #[test]
     fn a_series_ends_when_its_next_two_terms_are_negligible_or_predicted_to_be() {
-        // Both are computed.
+        // Both terms are computed.
         assert!(are_negligible([1.0, 1.0, 9.0, 9.0]));
         assert!(!are_negligible([1.1, 0.1, 9.0, 9.0]));
-        // 2 x 0.5/20 = 0.05 and 2 x 2/30 are below a quarter, after decays of ten and more.
+        // The predicted terms, 2 x 0.5/20 = 0.05 and 2 x 2/30, are below a quarter, and the decays are tenfold and more.
         assert!(are_negligible([0.5, 2.0, 20.0, 30.0]));
         assert!(are_negligible([0.5, 2.0, 9.0, 30.0]));
-        // No decay over two orders, of one term and of the other.
+        // One of the two terms does not decay enough over two orders, and then the other.
         assert!(!are_negligible([0.5, 2.0, 4.0, 30.0]));
         assert!(!are_negligible([0.05, 2.0, 20.0, 19.0]));
-        // Sufficient decay, but from too large a term: 4 x 1/12 and 8 x 8/81.
+        // The decay is sufficient, but the predicted terms 4 x 1/12 and 8 x 8/81 are too large.
         assert!(!are_negligible([1.0, 4.0, 12.0, 400.0]));
         assert!(!are_negligible([0.1, 8.0, 20.0, 81.0]));
         assert!(!are_negligible([f64::NAN, 0.0, 0.0, 0.0]));
@@ -870,7 +869,7 @@ mod tests {
     #[test]
     fn the_decay_of_terms_counts_from_the_second_term_and_a_zero_step_is_refused() {
         let mut terms = [0.0; ORDER + 1];
-        // The decay from term 2 to term 4 is known at order 5.
+        // At order 5 the decay from term 2 to term 4 is known.
         terms[2..6].copy_from_slice(&[60.0, 30.0, 3.0, 0.1]);
         assert_eq!(expand(&mut Given(terms), 1.0, 1e-8), (5, 1.0));
         terms[2] = 29.0;
@@ -890,7 +889,7 @@ mod tests {
             assert_eq!(n, highest);
             let term = |n: usize| motion.coefficient_norm(n) * h.powi(n as i32);
             let largest = f64::max(term(n), term(n - 1));
-            // One of the two is at its limit, to the rounding of a power.
+            // One of the two terms is at its limit, except for the rounding of a power.
             assert!((largest - 1.0).abs() < 1e-12, "{largest}");
         }
     }
@@ -925,7 +924,7 @@ mod tests {
         let StepError::TooManySteps { time, max_steps: 3, advice: "; rest" } = error else {
             panic!("{error}");
         };
-        // Three steps of about 2 s.
+        // Three steps are about 2 s long each.
         assert!(time > 9.0 && time < 20.0, "{time}");
         let mut steps = Steps::new(5, "");
         steps.add_steps(3, 0.0).unwrap();
@@ -940,7 +939,7 @@ mod tests {
         assert_eq!(motion.advance(1.0, 1e-8), Err(StepError::NotFinite { time: 0.5 }));
         let mut motion = Oscillator::new(Convergence::Decay);
         assert_eq!(motion.advance(f64::INFINITY, 1e-8).map_err(|_| ()), Err(()));
-        // With zero allowed error no step has a length.
+        // If the allowed error is zero, no step has a positive length.
         let mut motion = Oscillator::new(Convergence::Decay);
         assert_eq!(motion.advance(1.0, 0.0), Err(StepError::NotFinite { time: 7.0 }));
     }
@@ -952,8 +951,8 @@ mod tests {
         assert_eq!(expand(&mut motion, 1e300, 1e-8), (5, LONGEST));
     }
 
-    /// An oscillator with its kept expansion, the states `begin` at the start of the expansion, and the times of the last call's
-    /// end, `clock`, and of the expansion's `start`.
+    /// An oscillator with its kept expansion. `begin` are the states at the start of the expansion, `clock` is the time at
+    /// the end of the last call, and `start` the time at the start of the expansion.
     struct Kept {
         motion: Oscillator,
         begin: [f64; 2],
@@ -1027,8 +1026,8 @@ mod tests {
         }
     }
 
-    /// Calls of any length end at the same bits, before and after reflections at the wall, and within the tolerance. Coefficients
-    /// that other uses of the motion have overwritten are computed again.
+    /// Whatever the lengths of the calls are, they end with bit-identical states, before and after reflections at the wall,
+    /// and within the tolerance. Coefficients that other functions have overwritten are computed again.
     #[test]
     fn evaluating_a_power_series_in_several_calls_changes_no_bit_of_the_motion() {
         for convergence in [Convergence::Decay, Convergence::Terms(2)] {
@@ -1049,7 +1048,7 @@ mod tests {
                 if wall.is_none() {
                     let error = whole.motion.error(20.0);
                     assert!(error < 10.0 * tolerance, "{convergence:?} {tolerance}: {error}");
-                    // Orders of a call that ends within an expansion are computed once.
+                    // The orders that several calls within one expansion need are computed only once.
                     assert!(many.motion.rates < 2 * whole.motion.rates + 20 * 64);
                 }
             }
@@ -1066,7 +1065,7 @@ mod tests {
         assert_eq!(orders(0.02, 1e-4), MIN_ORDER);
         assert!(orders(0.02, 1e-10) < orders(0.5, 1e-10));
         assert!(orders(0.02, 1e-8) < orders(0.02, 1e-12));
-        // Over several expansions all have the order with the fewest operations.
+        // In several successive expansions, each has the order with the fewest operations.
         let highest = [1e-6, 1e-10, 1e-14].map(|tolerance| orders(50.0, tolerance));
         assert!(highest[0] < highest[1] && highest[2] <= ORDER, "{highest:?}");
     }
@@ -1077,12 +1076,12 @@ mod tests {
         let sum = (0..10).fold([0.0; 2], |sum, _| add_time(sum, 0.1));
         assert_eq!(sum[0], 1.0);
         let back = add_time(sum, -1.0);
-        // Ten times the rounding error of 0.1, which is 5.55e-18.
+        // The remainder is ten times the rounding error of 0.1, which is 5.55e-18.
         assert!((back[0] / 5.55e-17 - 1.0).abs() < 1e-2, "{back:?}");
     }
 
-    /// The motion y' = sqrt((t - 1)^2 + eps^2). Far from t = 1 its coefficients beyond the first two are of
-    /// order eps^2, so they do not show the corner. If `compares` is false, the end of a series is not compared
+    /// The motion y' = sqrt((t - 1)^2 + eps^2). Far from t = 1 its coefficients beyond the first two are of order eps^2, so
+    /// that they do not show the corner. If `compares` is false, the derivatives at the end of a series are not compared
     /// with the right-hand side.
     struct Corner {
         now: [f64; 2],
@@ -1156,7 +1155,7 @@ mod tests {
         }
     }
 
-    /// The integral is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 + eps^2).
+    /// The exact integral is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 + eps^2) and s = t - 1.
     #[test]
     fn a_series_that_does_not_show_a_corner_is_repeated_shorter() {
         let error = |tolerance: f64, compares: bool| {

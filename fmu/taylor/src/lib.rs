@@ -1,12 +1,12 @@
-//! Numerical core of the models: power series, integrators and event times, without physics.
+//! Numerical methods of the models: power series, integrators and event times. This crate contains no physics.
 //!
-//! A model writes its right-hand side once, as rules for power series ([`series`], [`plane`], [`space`]), and
-//! implements [`integrator::Motion`]. [`integrator::advance`] integrates it. Functions of the states at an instant are
-//! written over [`number::Number`]: the same formula gives value and derivative along a direction. [`runge_kutta`]
-//! integrates rates that are not expanded.
+//! A model writes its right-hand side once, as rules for power series ([`series`], [`plane`], [`space`]), and implements
+//! [`integrator::Motion`], which [`integrator::advance`] integrates. Functions of the states at an instant are generic over
+//! [`number::Number`], so that the same formula gives a value and its directional derivative. [`runge_kutta`] integrates
+//! equations that are not written as power series.
 //!
-//! `error.rs` has the reasons for a refused step. `integrator.rs` decides when a series has converged, how long a step
-//! is, and how many steps are allowed. `root.rs` finds the time of an event.
+//! `error.rs` defines the reasons for a refused step. `integrator.rs` determines when a series has converged, the length of
+//! a step, and how many steps are allowed. `root.rs` finds the times of events.
 
 #![cfg_attr(not(test), no_std)]
 

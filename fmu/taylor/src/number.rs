@@ -1,10 +1,9 @@
-//! Number types for formulas that are written once, for values and for derivatives along a
-//! direction.
+//! Number types with which a formula is written once, for values and for directional derivatives.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Number type over which a formula is written once: [`f64`] evaluates its value, [`Dual`] its derivative
-/// along a direction.
+/// Number type over which a formula is generic: with [`f64`] the formula gives its value, with [`Dual`] its directional
+/// derivative.
 pub trait Number:
     Copy
     + Add<Output = Self>
@@ -15,21 +14,21 @@ pub trait Number:
     + Neg<Output = Self>
 {
     fn constant(value: f64) -> Self;
-    /// Returns a number made from coefficients 0 and 1 of a quantity's power series. A [`Dual`]
-    /// takes coefficient 1 as its derivative; an `f64` drops it.
+    /// Returns a number from coefficients 0 and 1 of a quantity's power series. A [`Dual`] takes coefficient 1 as its
+    /// derivative; an `f64` ignores it.
     fn with_slope(value: f64, slope: f64) -> Self;
-    /// Returns the number that the formula was evaluated for: the value of an `f64`, the derivative of a
-    /// [`Dual`].
+    /// Returns the result of the formula: the value of an `f64`, or the derivative of a [`Dual`].
     fn result(self) -> f64;
     fn value(self) -> f64;
-    /// Returns the larger of the number and a constant. The value is computed as a maximum, not as a choice of two numbers,
-    /// because a compiler turns 1/choice into a choice of two quotients and divides by a zero that was not chosen.
+    /// Returns the larger of the number and `floor`. The value is computed as a maximum and not as a choice between
+    /// two numbers, because a compiler turns 1/choice into a choice between two quotients and may divide by a zero
+    /// that is not chosen.
     fn at_least(self, floor: f64) -> Self {
         let slope = if self.value() < floor { 0.0 } else { self.result() };
         Self::with_slope(f64::max(self.value(), floor), slope)
     }
-    /// Returns the number over a divisor that is not negative; 0 if the divisor is 0. The divisor is replaced by a maximum,
-    /// because a compiler that computes both sides of a choice would divide by 0.
+    /// Returns the number divided by `divisor`, which must not be negative; 0 if the divisor is 0. The divisor is replaced
+    /// by a maximum, because a compiler may compute both sides of a choice and thus divide by 0.
     fn over_or_zero(self, divisor: Self) -> Self {
         let numerator = if divisor.value() > 0.0 { self } else { Self::constant(0.0) };
         numerator / divisor.at_least(f64::MIN_POSITIVE)
@@ -95,7 +94,7 @@ impl Number for f64 {
     }
 }
 
-/// A value with its derivative along a direction: value + slope s + O(s^2).
+/// A value with its directional derivative: value + slope s + O(s^2).
 #[derive(Clone, Copy, Debug)]
 pub struct Dual {
     value: f64,
@@ -239,7 +238,7 @@ mod tests {
         for (i, dual) in formulas(Dual::with_slope(x, slope)).iter().enumerate() {
             assert_eq!(dual.value(), at(0.0)[i], "{i}");
             let expected = (at(h)[i] - at(-h)[i]) / (2.0 * h);
-            // h^2 times the third derivative, and rounding over h.
+            // The error is h^2 times the third derivative, plus rounding divided by h.
             assert!((dual.result() - expected).abs() < 1e-9, "{i}: {} {expected}", dual.result());
         }
     }

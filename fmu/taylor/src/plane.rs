@@ -1,11 +1,11 @@
-//! Power series of vectors in the plane: functions return coefficient n of the result, as in `series.rs`. Most rules
-//! treat both components equally, so that a processor computes both at once.
+//! Power series of vectors in the plane. Functions return coefficient n of the result, as in `series.rs`. Most rules treat
+//! both components equally, so that a processor computes both at once.
 
 use crate::number::Number;
 use crate::series::{self, EMPTY, ORDER, Series};
 
-/// Returns the sum of `term(j)` over 0 <= j <= n. The terms at both ends, which have the newest coefficients, are added last, as
-/// in `series.rs`.
+/// Returns the sum of `term(j)` over 0 <= j <= n. The first and the last term, which contain the newest coefficients, are
+/// added last, as in `series.rs`.
 #[inline(always)]
 fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
@@ -13,14 +13,14 @@ fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     if n == 0 { sum } else { add(sum, term(n)) }
 }
 
-/// Coefficients of a vector in the plane, in memory aligned for both components at once.
+/// Coefficients of a vector in the plane, aligned in memory so that a processor loads both components at once.
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Vector2([[f64; 2]; ORDER + 1]);
 
 pub const ZERO_VECTOR2: Vector2 = Vector2([[0.0; 2]; ORDER + 1]);
 
-/// Returns both components at the start of an expansion as numbers, see [`series::number`].
+/// Returns both components at the start of an expansion as numbers; see [`series::number`].
 pub fn numbers<T: Number>(a: &Vector2) -> [T; 2] {
     [0, 1].map(|i| T::with_slope(a[0][i], a[1][i]))
 }
@@ -54,8 +54,8 @@ pub fn mul_part(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     series::sum(n, |j| a[j] * b[n - j][i])
 }
 
-/// Returns coefficient n of the product of a number a and a vector b, without the term a_n b_0, which may not be known
-/// yet.
+/// Returns coefficient n of the product of a number a and a vector b, without the term a_n b_0, because a_n may
+/// not be known yet.
 #[inline(always)]
 pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     let mut sum = [EMPTY; 2];
@@ -65,8 +65,8 @@ pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     sum
 }
 
-/// Returns coefficient n of the product of a number a and component i of a vector b, without the term that contains a_n
-/// (see [`scale_head`]).
+/// Returns coefficient n of the product of a number a and component i of a vector b, without the term that
+/// contains a_n; see [`scale_head`].
 #[inline(always)]
 pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let mut sum = EMPTY;
@@ -99,7 +99,7 @@ pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
     x + y
 }
 
-/// Evaluates the power series of several vectors, taken up to order n, at the time t.
+/// Evaluates the power series of several vectors, up to order n, at the time t.
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; K] {
     let n = n.min(ORDER);

@@ -1,6 +1,6 @@
 use crate::vector::Vec3;
 
-/// A number or a vector that is linear in time: `value` now, plus `slope` (per second) times t, s.
+/// A number or a vector that is linear in time: `value` + `slope` t, with the time t in s and the slope per second.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Ramp<T = f64> {
     pub value: T,
@@ -21,7 +21,7 @@ impl Ramp {
         (self.value + self.slope * t / 2.0) * t
     }
 
-    /// Returns the same quantity with the origin of time shifted to `t`, s.
+    /// Returns the same function of time with its origin of time shifted to `t`, s.
     pub fn shifted(self, t: f64) -> Ramp {
         Ramp { value: self.value_at(t), slope: self.slope }
     }

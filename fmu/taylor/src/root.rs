@@ -1,21 +1,23 @@
-//! First root of a polynomial, the time of an event within a step.
+//! First root of a polynomial, which is the time of an event within a step.
 
 use crate::series::ORDER;
 
-/// Number of steps with one bound over the whole interval, before [`first_root`] changes to bounds over parts of the interval.
+/// Number of iterations with one bound for the whole interval, after which [`first_root`] uses bounds for parts of the
+/// interval.
 const COARSE_STEPS: usize = 200;
 
-/// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has fallen to zero, and
-/// `None` if it stays positive. `a` has at most 2 [`ORDER`] + 1 coefficients, as the product of two series.
+/// Returns the first t in (0, h] at which the polynomial `a`, which is positive at t = 0, has fallen to zero; `None` if it
+/// stays positive. `a` has at most 2 [`ORDER`] + 1 coefficients, as the product of two series.
 ///
-/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t + s) >= f + f' s - M s^2 / 2. The
-/// root of that parabola is a step that cannot pass the first zero. The steps converge to this zero quadratically, like Newton's
-/// method.
+/// At a point with the value f > 0 and the slope f', a bound M of |f''| over [0, h] gives f(t + s) >= f + f' s - M
+/// s^2/2. The root of this parabola is a step that cannot pass the first zero. The steps converge to the zero
+/// quadratically, as in Newton's method.
 ///
-/// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps become too short.
-/// Then the polynomial is expanded about t, and M is a bound over a part of the interval about as long as the step. Such a step
-/// is at least a fixed share of the distance to the nearest complex root, so the number of steps grows with the logarithm of the
-/// accuracy. The search ends only with a root, to rounding, or with the proof that the polynomial has no root up to h.
+/// M is small enough if the terms a_n h^n decay, as those of a converged series do. If they grow, these steps are too short.
+/// Then the polynomial is expanded about t, and M is a bound for a part of the interval that is about as long as the step.
+/// Such a step is at least a fixed fraction of the distance to the nearest complex root, so that the number of steps grows
+/// with the logarithm of the accuracy. The search ends only with a root, to rounding, or with the proof that the polynomial
+/// has no root up to h.
 pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     let (mut power, mut lowest) = (1.0, a[0]);
     for x in &a[1..] {
@@ -31,7 +33,7 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
         power *= h;
     }
     let mut t = 0.0;
-    // Far from a tangency about five steps are enough.
+    // If the minimum is not close to zero, about five iterations are enough.
     for _ in 0..COARSE_STEPS {
         let (mut f, mut slope) = (0.0, 0.0);
         for x in a.iter().rev() {
@@ -42,7 +44,7 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
             return Some(t);
         }
         let fall = libm::sqrt(slope * slope + 2.0 * bend * f) - slope;
-        // Linear and not falling.
+        // The polynomial is linear and does not fall.
         if fall <= 0.0 {
             return None;
         }
@@ -58,8 +60,7 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     first_root_from(t, a, h)
 }
 
-/// Returns the same as [`first_root`] for a polynomial without a zero before `t`, with bounds over parts of
-/// the interval.
+/// Returns the result of [`first_root`] for a polynomial without a zero before `t`, with bounds for parts of the interval.
 #[cold]
 fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     if a.iter().any(|x| !x.is_finite()) {
@@ -69,7 +70,7 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
         let mut about = [0.0; 2 * ORDER + 1];
         let about = &mut about[..a.len()];
         about.copy_from_slice(a);
-        // Coefficients of f(t + s) in powers of s.
+        // Coefficients of f(t + s) in powers of s:
         for first in 0..a.len() {
             for k in (first..a.len() - 1).rev() {
                 about[k] += about[k + 1] * t;
@@ -89,13 +90,13 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     }
 }
 
-/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero; it is at least a fixed share of
-/// the longest such length. If there is no zero up to `left`, the length is more than `left`.
+/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero. The length is at least a fixed fraction of the
+/// longest such length. If there is no zero up to `left`, the length is more than `left`.
 fn step_before_zero(a: &[f64], left: f64) -> f64 {
     let slope = a.get(1).copied().unwrap_or(0.0);
     let (mut length, mut longest): (f64, f64) = (left, 0.0);
     loop {
-        // Upper bound of -f'' over the length.
+        // Upper bound of -f'' over this length:
         let (mut power, mut bend) = (1.0, 0.0);
         for (j, x) in a.iter().enumerate().skip(2) {
             bend -= (j * (j - 1)) as f64 * x.min(0.0) * power;
@@ -117,17 +118,17 @@ mod tests {
 
     #[test]
     fn first_root_finds_the_first_of_two_close_roots() {
-        // (t - 0.5)(t - 0.5001)(t - 0.9), negated to start positive
+        // The polynomial is -(t - 0.5)(t - 0.5001)(t - 0.9), which is positive at 0.
         let (a, b, c) = (0.5, 0.5001, 0.9);
         let p = [a * b * c, -(a * b + b * c + c * a), a + b + c, -1.0];
-        // Condition of the root: rounding 1e-16 over the slope 4e-5.
+        // The error of the root is the rounding error 1e-16 divided by the slope 4e-5.
         assert!((first_root(&p, 1.0).unwrap() - 0.5).abs() < 1e-11);
         assert_eq!(first_root(&p, 0.4999), None);
     }
 
     #[test]
     fn first_root_passes_over_a_minimum_that_stays_positive() {
-        // (t - 0.5)^2 + 1e-9
+        // The polynomial is (t - 0.5)^2 + 1e-9.
         assert_eq!(first_root(&[0.25 + 1e-9, -1.0, 1.0], 1.0), None);
         assert_eq!(first_root(&[1.0, 0.0, 0.0], 1.0), None);
     }
@@ -138,33 +139,33 @@ mod tests {
         assert_eq!(first_root(&[2.0, -1.0], 2.0), Some(2.0));
         assert_eq!(first_root(&[2.0, -1.0], 1.9), None);
         assert_eq!(first_root(&[2.0, 1.0], 9.0), None);
-        // 1 - t^2, and 1 + t - t^2, which rises before it falls
+        // The polynomials are 1 - t^2, and 1 + t - t^2, which rises before it falls.
         assert!((first_root(&[1.0, 0.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-15);
         let golden = 0.5 + 1.25f64.sqrt();
         assert!((first_root(&[1.0, 1.0, -1.0], 9.0).unwrap() - golden).abs() < 1e-15);
-        // (1 - t)(2 - t)(3 - t)
+        // The polynomial is (1 - t)(2 - t)(3 - t).
         assert!((first_root(&[6.0, -11.0, 6.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-14);
         assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
     }
 
-    /// For h = 3 the last term of 1 - t^18 is 4e8 times the first one, for h = 1e9 it is 1e162 times as
-    /// large.
+    /// The last term of 1 - t^18 is 4e8 times the first term for h = 3, and 1e162 times the first term for h = 1e9.
     #[test]
     fn the_first_root_is_found_also_for_growing_terms() {
         let mut a = [0.0; 19];
         (a[0], a[18]) = (1.0, -1.0);
         for h in [1.2, 3.0, 10.0, 1e9] {
             let root = first_root(&a, h).unwrap();
-            // Rounding of 1e-16 over the slope 18.
+            // The error of the root is the rounding error 1e-16 divided by the slope 18.
             assert!((root - 1.0).abs() < 1e-15, "{h}: {root:e}");
         }
-        // A lump that leaves a nearby wall: 1e-10 - 1e-9 t + 1e-2 t^2 has no root. With - t^3 it has one after 10 ms.
+        // The distance of detached liquid from a near wall, 1e-10 - 1e-9 t + 1e-2 t^2, has no root. With - t^3 in addition
+        // it has one after 10 ms.
         assert_eq!(first_root(&[1e-10, -1e-9, 1e-2], 10.0), None);
         let root = first_root(&[1e-10, -1e-9, 1e-2, -1.0], 10.0).unwrap();
         assert!((root - 1e-2).abs() < 2e-6, "{root}");
     }
 
-    /// The rounding of the value, 1e-16, decides between no root and a double root.
+    /// The rounding error of the value, 1e-16, decides between no root and a double root.
     #[test]
     fn a_minimum_just_above_zero_is_no_root_and_one_just_below_is() {
         for h in [1.0, 10.0, 1e3] {
@@ -173,7 +174,7 @@ mod tests {
                 assert_eq!(first_root(&parabola(above), h), None, "{h} {above}");
                 let root = first_root(&parabola(-above), h).unwrap();
                 let want = 0.5 - above.sqrt();
-                // Rounding of the value over the slope 2 sqrt(above).
+                // The error of the root is the rounding error of the value divided by the slope 2 sqrt(above).
                 assert!((root - want).abs() < 1e-15 / above.sqrt(), "{h} {above}: {root}");
             }
         }
@@ -187,8 +188,8 @@ mod tests {
         }
     }
 
-    /// The search for the first root of polynomials of degree 8 is compared with samples of the polynomials: no root is
-    /// missed, and every result is a root. The terms decay, like those of a converged series, or grow up to 8^8.
+    /// The first roots of polynomials of degree 8 are compared with samples of the polynomials: no root is missed, and every
+    /// result is a root. The terms decay, as those of a converged series do, or grow up to 8^8.
     #[test]
     fn no_sample_before_the_first_root_is_below_zero() {
         let mut seed = 1u64;
@@ -203,7 +204,7 @@ mod tests {
             for k in 0..4500 {
                 let growth = [0.8, 0.8, 0.8, 3.0, 8.0][k % 5];
                 let mut a: [f64; 9] = core::array::from_fn(|_| between_ones());
-                // Near 0, so that roots are close together.
+                // The value at 0 is small, so that roots are close together.
                 a[0] = 0.03 * (1.0 + a[0]);
                 for (n, x) in a.iter_mut().enumerate() {
                     *x *= libm::pow(growth / h, n as f64);
@@ -217,7 +218,7 @@ mod tests {
                 }
                 if let Some(root) = root {
                     found += 1;
-                    // Rounding of the sum.
+                    // The tolerance is the rounding error of the sum.
                     let size = a.iter().rev().fold(0.0, |sum, x| sum * root + x.abs());
                     assert!(value(root).abs() < 1e-14 * size, "{a:?} {h}: {root}");
                 }

@@ -1,6 +1,6 @@
-//! Integration by embedded Runge-Kutta methods, for rates that are too many to expand in power series by hand: craft with tanks
-//! that drain. Short steps use a method of order 5, which evaluates the rates 6 times, longer steps a method of order 8 with 12
-//! evaluations. A step whose estimated error exceeds the tolerance is rejected.
+//! Integration by embedded Runge-Kutta methods, for equations that are too long to be written as rules for power series:
+//! craft with tanks that drain. Short steps use a method of order 5 with 6 evaluations of the rates, and longer steps a
+//! method of order 8 with 12 evaluations. A step whose estimated error exceeds the tolerance is rejected.
 //!
 //! ```text
 //! k_s = rates(t + c_s h, x + h sum of a_sj k_j),   k_0 = rates(t, x)
@@ -15,42 +15,42 @@ use core::ops::Range;
 use crate::error::StepError;
 use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
 
-/// A first-order system x' = rates(t, x) that [`advance`] integrates. Times t are in s; their origin is the origin of
-/// [`advance`]'s times.
+/// A first-order system x' = rates(t, x) that [`advance`] integrates. Times t are in s and have the same origin as
+/// the times of [`advance`].
 pub trait System<const D: usize> {
     /// Returns the index ranges of the states that are in use; all other states stay as they are.
     fn moving(&self) -> &[Range<usize>] {
         &[Range { start: 0, end: D }]
     }
 
-    /// Writes the rates x' of all states in use to `rate`, which holds zeros or other rates of the system.
+    /// Writes the rates x' of all states in use to `rate`. Its other elements may have any value.
     fn write_rates(&self, t: f64, x: &[f64; D], rate: &mut [f64; D]);
 
-    /// Returns for each state the magnitude to which a step's error is relative, from states and rates at its
-    /// start `t`; `h` is the rest of the stretch, s.
+    /// Returns for each state the magnitude to which the error of a step is relative, from states and rates at the start `t`
+    /// of the step. `h` is the remaining length of the stretch, s.
     fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
 }
 
-/// Smallest error to which a step is controlled, relative to its scale and to 1 rad, rad/s, m or m/s. Below
-/// it, cancellation of large terms in the rates may dominate.
+/// Smallest error to which a step is controlled, relative to its scale and to 1 rad, rad/s, m or m/s. Smaller errors may be
+/// dominated by cancellation of large terms in the rates.
 const ROUNDING: f64 = 2e-14;
 
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
-/// Errors of a step that are smaller count as this value. Because of [`LONGER`] this has no effect on the step's length, but it
-/// avoids 1/0 and powers of numbers near the largest, which end the process of a host that traps them.
+/// Smaller errors of a step are replaced by this value. Because of [`LONGER`] this has no effect on the length of the next
+/// step, but it avoids a division by 0 and powers that overflow, which end the process of a host that traps them.
 const LEAST_ERROR: f64 = 1e-30;
 
-/// Errors that are larger count as this value, whose square does not overflow.
+/// Larger errors of a step are replaced by this value, whose square does not overflow.
 const LARGEST_ERROR: f64 = 1e100;
 
-/// Weights of some rates k_s in a sum, with their indices s.
+/// Weights of some of the rates k_s in a sum, each with its index s.
 type Weights = &'static [(usize, f64)];
 
-/// An embedded method with `S` evaluations of the rates: c and a of every evaluation but the first, b, and e twice. The first
-/// estimate of the error is multiplied by its ratio to the root of the sum of its own square and a hundredth of the square of
-/// the second. It counts `margin` times. `order` is the power of h to which it is proportional.
+/// An embedded method with `S` evaluations of the rates: c and a of every evaluation but the first, b, and e of two error
+/// estimates. The first estimate is multiplied by its ratio to the root of the sum of its own square and a hundredth of the
+/// square of the second estimate, and then by `margin`. `order` is the power of h to which the result is proportional.
 struct Method<const S: usize> {
     stages: &'static [(f64, Weights)],
     result: Weights,
@@ -59,7 +59,7 @@ struct Method<const S: usize> {
     order: f64,
 }
 
-/// Cash and Karp's method of order 5, with an estimate of order 4.
+/// Cash and Karp's method of order 5, with an error estimate of order 4.
 const SHORT: Method<6> = Method {
     stages: &[
         (0.2, &[(0, 0.2)]),
@@ -92,8 +92,8 @@ const SHORT: Method<6> = Method {
     order: 5.0,
 };
 
-/// Dormand and Prince's method of order 8, with estimates of orders 5 and 3. Their combination is about the error itself, while
-/// the estimate of [`SHORT`] is 5 to 50 times its error. The margin makes up for this.
+/// Dormand and Prince's method of order 8, with error estimates of orders 5 and 3. The combined estimate is about as large
+/// as the error itself, while the estimate of [`SHORT`] is 5 to 50 times its error; the margin compensates for this.
 const LONG: Method<12> = Method {
     stages: &[
         (0.05260015195876773, &[(0, 0.05260015195876773)]),
@@ -213,13 +213,13 @@ const LONG: Method<12> = Method {
     order: 8.0,
 };
 
-/// Returns true if a step of `h` seconds is likely to err by less than `error` with [`SHORT`], relative to the motion. The error of
-/// a step is about (h/1 s)^5 for slosh at 2 m/s2.
+/// Returns true if the error of a step of `h` seconds with [`SHORT`], relative to the motion, is probably below `error`. For
+/// slosh at 2 m/s2 this error is about (h/1 s)^5.
 fn is_short(h: f64, error: f64) -> bool {
     h < 1.0 && h * h * h * h * h < error
 }
 
-/// Copies the ranges `moving` of an array one after the other to the start of `packed`; returns their length.
+/// Copies the ranges `moving` of the array `x` one after the other to the start of `packed`. Returns their total length.
 fn pack<const D: usize>(moving: &[Range<usize>], x: &[f64; D], packed: &mut [f64; D]) -> usize {
     moving.iter().fold(0, |at, part| {
         packed[at..at + part.len()].copy_from_slice(&x[part.clone()]);
@@ -227,7 +227,7 @@ fn pack<const D: usize>(moving: &[Range<usize>], x: &[f64; D], packed: &mut [f64
     })
 }
 
-/// Copies packed elements back to their ranges `moving` of an array.
+/// Copies the elements of `packed` back to their ranges `moving` of the array `x`.
 fn unpack<const D: usize>(moving: &[Range<usize>], packed: &[f64; D], x: &mut [f64; D]) {
     moving.iter().fold(0, |at, part| {
         x[part.clone()].copy_from_slice(&packed[at..at + part.len()]);
@@ -235,7 +235,7 @@ fn unpack<const D: usize>(moving: &[Range<usize>], packed: &[f64; D], x: &mut [f
     });
 }
 
-/// Sets `sum` to the weighted sum of rates k. It takes two rates at once, because this saves loads and stores of the sum.
+/// Sets `sum` to the weighted sum of rates k. Two rates are added at once, which saves loads and stores of the sum.
 fn combine<const D: usize>(weights: Weights, k: &[[f64; D]], sum: &mut [f64]) {
     sum.fill(0.0);
     let k = |stage: usize, n: usize| k[stage][..n].iter();
@@ -254,7 +254,7 @@ fn combine<const D: usize>(weights: Weights, k: &[[f64; D]], sum: &mut [f64]) {
     }
 }
 
-/// State and rates at the start of a step, the states in use, packed, and the errors allowed for them.
+/// State and rates at the start of a step, the states in use (packed), and their allowed errors.
 struct Start<'a, const D: usize> {
     x: &'a [f64; D],
     packed: &'a [f64],
@@ -262,8 +262,8 @@ struct Start<'a, const D: usize> {
     allowed: &'a [f64],
 }
 
-/// Tries a step of length h from a start at the time t. Returns the state at its end, with its error relative to the allowed
-/// error, or `None` if a state diverges.
+/// Tries a step of length h from a start at the time t. Returns the state at its end, and its error divided by the allowed
+/// error; `None` if a state diverges.
 fn try_step<const D: usize, const S: usize>(
     system: &impl System<D>,
     method: &Method<S>,
@@ -292,15 +292,15 @@ fn try_step<const D: usize, const S: usize>(
         let sum = &mut sum[..if weights.is_empty() { 0 } else { n }];
         combine(weights, &k, sum);
         let errors = sum.iter().zip(start.allowed).map(|(sum, allowed)| (h * sum).abs() / allowed);
-        // NaN counts as an unbounded error.
+        // NaN counts as the largest error.
         errors.fold(0.0, |most, off| if off <= most { most } else { f64::min(off, LARGEST_ERROR) })
     });
     let error = f64::max(error, LEAST_ERROR);
     Some((now, method.margin * error * (error / libm::hypot(error, 0.1 * second))))
 }
 
-/// Length `h`, s, of the next step, counter of the `steps` that were tried, and whether a step of [`SHORT`] was rejected. An
-/// integration carries them from one stretch of a call to the next.
+/// Step control of a call, which is carried from one stretch to the next: length `h`, s, of the next step, counter of the
+/// `steps` that were tried, and true if a step of [`SHORT`] was rejected.
 pub struct Pace {
     steps: Steps,
     h: f64,
@@ -308,17 +308,17 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Starts the pace of a call that advances by `h` (s). The first step tries the whole length.
+    /// Creates the step control of a call that advances by `h` (s). The first step tries the whole length.
     pub fn new(h: f64, steps: Steps) -> Pace {
         Pace { steps, h, is_fast: false }
     }
 }
 
-/// Advances x from `begin` to `end`, s, in as many steps as the tolerance needs. The estimated error determines the length
-/// of the next step, and the states at its start determine the error scale.
+/// Advances x from `begin` to `end`, s, in as many steps as the tolerance requires. The estimated error determines the
+/// length of the next step, and the states at its start determine the error scale.
 ///
 /// # Errors
-/// [`StepError::NotFinite`] and [`StepError::TooManySteps`], whose time has the same origin as `begin`; x is then unusable.
+/// [`StepError::NotFinite`] and [`StepError::TooManySteps`], whose times have the same origin as `begin`; x is then invalid.
 pub fn advance<const D: usize>(
     system: &impl System<D>,
     x: &mut [f64; D],
@@ -352,8 +352,7 @@ pub fn advance<const D: usize>(
             let change = 0.9 * libm::pow(error, -1.0 / order);
             let best = h * change.clamp(SHORTER, LONGER);
             if error <= 1.0 {
-                // A step cut short by the end of a stretch tells less about the next step than the step
-                // before.
+                // A step that ends with the stretch says less about the length of the next step than the step before.
                 pace.h = if is_last { f64::max(best, pace.h) } else { best };
                 t = if is_last { end } else { t + h };
                 break moved;
@@ -377,7 +376,7 @@ mod tests {
     use super::*;
     use core::cell::Cell;
 
-    /// Kepler's problem, x'' = -x/|x|^3, on an ellipse; `growth` adds growth x to the rates.
+    /// Kepler's problem, x'' = -x/|x|^3, on an ellipse. `growth` adds growth x to the rates.
     struct Orbit {
         growth: f64,
         evaluations: Cell<usize>,
@@ -404,7 +403,7 @@ mod tests {
 
     const STEPS: Steps = Steps::new(100_000, "");
 
-    /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1, whose revolution takes 2 pi.
+    /// State at the apoapsis of an ellipse with eccentricity 0.6 and semi-axis 1, on which a revolution takes 2 pi.
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
     #[test]
@@ -414,12 +413,12 @@ mod tests {
             let (orbit, mut x) = (Orbit::new(), START);
             let end = core::f64::consts::TAU;
             advance(&orbit, &mut x, (0.0, end), tolerance, &mut Pace::new(end, STEPS)).unwrap();
-            // A step may have an error of a hundredth of the tolerance. Errors grow tenfold and more along the orbit.
+            // A step may have an error of a hundredth of the tolerance. The motion amplifies errors tenfold and more.
             let off = (0..4).map(|i| (x[i] - START[i]).abs()).fold(0.0, f64::max);
             assert!(off < 3.0 * tolerance, "{tolerance}: {off}");
             works[k] = orbit.evaluations.get();
         }
-        // Number of evaluations by the step control. A change here changes the cost of every run.
+        // These are the numbers of evaluations. If they change, the cost of every simulation changes.
         assert_eq!(works, [374, 585, 895, 1256]);
     }
 
@@ -436,7 +435,7 @@ mod tests {
         }
     }
 
-    /// Returns the error of one step of Kepler's problem, and its estimate, both relative to 1.
+    /// Returns the error of one step of Kepler's problem, and the estimate of this error, both relative to 1.
     fn error_and_estimate<const S: usize>(method: &Method<S>, h: f64) -> [f64; 2] {
         let (orbit, mut exact) = (Orbit::new(), START);
         advance(&orbit, &mut exact, (0.0, h), 1e-14, &mut Pace::new(h / 4.0, STEPS)).unwrap();
@@ -447,8 +446,8 @@ mod tests {
         [(0..4).map(|i| (x[i] - exact[i]).abs()).fold(0.0, f64::max), estimate]
     }
 
-    /// Half a step has an error at least 2^(p + 1) times smaller, if p is the order of the method. A wrong digit of a coefficient
-    /// would lower the order.
+    /// Halving the step reduces the error by a factor of at least 2^(p + 1), where p is the order of the method. A wrong
+    /// digit of a coefficient would lower the order.
     #[test]
     fn errors_of_steps_have_the_orders_of_their_methods_and_are_below_their_estimates() {
         let short = [0.4, 0.2].map(|h| error_and_estimate(&SHORT, h));
@@ -462,7 +461,8 @@ mod tests {
         }
     }
 
-    /// The error scale is asked for with the rest of the stretch, and states that are not in use do not move.
+    /// The function that returns the error scale gets the remaining length of the stretch, and states that are not in
+    /// use do not change.
     #[test]
     fn states_that_are_not_in_use_stay_as_they_are() {
         struct Quartic;
@@ -486,7 +486,7 @@ mod tests {
         assert_eq!([x[0], x[2], x[4]], [7.0, 8.0, 9.0]);
     }
 
-    /// The system x' = x with errors relative to `scale`; it counts the steps that have begun.
+    /// The system x' = x with errors relative to `scale`. It counts the steps that have begun.
     struct Growth {
         scale: f64,
         starts: Cell<usize>,
@@ -515,7 +515,7 @@ mod tests {
         }
     }
 
-    /// With negligible errors the steps are 1, 4, 16, ... milliseconds long, and the sixth reaches the end.
+    /// If errors are negligible, the steps are 1, 4, 16, ... milliseconds long, and the sixth step reaches the end.
     #[test]
     fn a_step_is_at_most_four_times_as_long_as_the_one_before() {
         let system = Growth { scale: 1e6, starts: Cell::new(0) };

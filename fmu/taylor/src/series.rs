@@ -1,12 +1,12 @@
 //! Power series in time: x(t) = x_0 + x_1 t + x_2 t^2 + ...
 //!
-//! A function such as `mul(n, a, b)` returns coefficient n of the result, here of the product a b, from the
-//! coefficients up to n of its arguments.
+//! A function such as `mul(n, a, b)` returns coefficient n of its result, here of the product a b, from the coefficients of
+//! its arguments up to n.
 //!
-//! Equations of motion are written once, as rules for coefficient n of each quantity from the
-//! coefficients up to n of the quantities on which it depends. Order 0 of a rule is the quantity
-//! itself at an instant. All orders together are the Taylor expansion for the integrator. Order 1
-//! along a direction is the directional derivative.
+//! Equations of motion are written once, as rules for coefficient n of each quantity from the coefficients up to n
+//! of the quantities on which it depends. For n = 0 a rule gives the quantity itself at an instant. All orders
+//! together are the Taylor expansion for the integrator. If coefficient 1 of the states is set to a direction, order
+//! 1 is the directional derivative.
 //!
 //! Source of the rules: the product (Cauchy) rule, and for f(u) the differential equation that f
 //! satisfies. See Jorba & Zou, Experimental Mathematics 14 (2005).
@@ -20,8 +20,8 @@ pub type Series = [f64; ORDER + 1];
 
 pub const ZERO: Series = [0.0; ORDER + 1];
 
-/// Returns the quantity at the start of an expansion as a number. A [`Dual`](crate::number::Dual) takes
-/// coefficient 1 as its derivative along the direction.
+/// Returns the quantity at the start of an expansion as a number. A [`Dual`](crate::number::Dual) takes coefficient 1
+/// as its directional derivative.
 pub fn number<T: Number>(a: &Series) -> T {
     T::with_slope(a[0], a[1])
 }
@@ -35,8 +35,8 @@ pub(crate) const RECIPROCAL: [f64; ORDER + 2] = {
     table
 };
 
-// The rules are always inlined. If the order n is a constant, the compiler writes every sum out
-// (see `integrator.rs`), otherwise they are loops.
+// The rules are always inlined. If the order n is a constant, the compiler writes out every sum (see `integrator.rs`);
+// otherwise the sums are loops.
 
 /// Returns coefficient n of a constant: the constant at order 0, otherwise 0.
 #[inline(always)]
@@ -50,15 +50,16 @@ pub fn next(n: usize, rate: f64) -> f64 {
     rate * RECIPROCAL[n + 1]
 }
 
-// Each sum ends with its newest coefficients, number n. They come from other sums of this order,
-// and a processor adds up the rest while it waits for them. In rules that are loops, slices avoid a
-// bounds check of every index.
+// Each sum adds the terms with the newest coefficients, number n, last. These coefficients come from other sums of
+// this order, and the processor computes the rest while it waits for them. Loops use slices, which avoids a bounds
+// check of every index.
 
-/// Start value of a sum. Adding -0 never changes a value, so the compiler can drop the addition, whereas +0
+/// Start value of a sum. Adding -0 never changes a value, so that the compiler can omit the addition, whereas +0
 /// turns -0 into +0.
 pub(crate) const EMPTY: f64 = -0.0;
 
-/// Returns the sum of `term(j)` over 0 <= j <= n. The terms at both ends, which have the newest coefficients, are added last.
+/// Returns the sum of `term(j)` over 0 <= j <= n. The first and the last term, which contain the newest
+/// coefficients, are added last.
 #[inline(always)]
 pub(crate) fn sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
     let sum = (1..n).fold(EMPTY, |sum, j| sum + term(j)) + term(0);
@@ -71,7 +72,7 @@ pub fn mul(n: usize, a: &Series, b: &Series) -> f64 {
     sum(n, |j| a[j] * b[n - j])
 }
 
-/// Returns coefficient n of a b without its term a_0 b_n, for rules in which b_n is not known yet.
+/// Returns coefficient n of a b without its term a_0 b_n, for rules in which b_n is not yet known.
 #[inline(always)]
 pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
     let mut sum = EMPTY;
@@ -129,15 +130,14 @@ pub fn sin_cos(n: usize, a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f
     if n == 0 { libm::sincos(a) } else { (chain(n, a, a_d, c), -chain(n, a, a_d, s)) }
 }
 
-/// Returns a time, s, over which x_0 + x_1 t + x_2 t^2 stays within `distance` > 0 of x_0, also for complex
-/// t; infinity if x does not change. For a linear x it is the longest such time. `slope` and `bend` are |x_1|
-/// and |x_2|.
+/// Returns a time, s, over which x_0 + x_1 t + x_2 t^2 stays within `distance` > 0 of x_0, also for complex t; infinity if x
+/// does not change. If x is linear, it is the longest such time. `slope` and `bend` are |x_1| and |x_2|.
 pub fn time_within(distance: f64, slope: f64, bend: f64) -> f64 {
     let speed = slope + libm::sqrt(slope * slope + 4.0 * bend * distance);
     if speed > 0.0 { 2.0 * distance / speed } else { f64::INFINITY }
 }
 
-/// Evaluates an expression with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
+/// Evaluates an expression with `$N` set to the constants 0, 1, ... [`ORDER`] - 1, one after the other.
 #[macro_export]
 macro_rules! for_each_order {
     ($N:ident => $do:block) => {
@@ -151,7 +151,7 @@ macro_rules! for_each_order {
     };
 }
 
-/// Makes an array of the functions `$T::$f::<N>` for N = 0, 1, ... [`ORDER`] - 1.
+/// Creates an array of the functions `$T::$f::<N>` for N = 0, 1, ... [`ORDER`] - 1.
 #[macro_export]
 macro_rules! at_each_order {
     ($T:ident :: $f:ident) => {
@@ -195,7 +195,7 @@ mod tests {
         [0.3, 1.0, -0.5].get(n).copied().unwrap_or(0.0)
     }
 
-    // At t = 0.1 the truncation error is below rounding; a few ulp remain.
+    // At t = 0.1 the truncation error is below rounding, so that a few units in the last place remain.
     const ULPS: f64 = 4e-16;
 
     #[test]
@@ -213,7 +213,7 @@ mod tests {
         for n in 0..ORDER {
             root[n] = sqrt(n, u(n), &root);
         }
-        // u is 0 at t = -0.26, so the series converges more slowly than the others.
+        // The root vanishes at t = -0.26, so that its series converges more slowly than the others.
         let found = values([&root], ORDER, 0.02)[0];
         assert!((found - f64::sqrt(0.3198)).abs() < 4.0 * ULPS);
     }

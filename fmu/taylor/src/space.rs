@@ -1,9 +1,9 @@
 //! Power series of vectors in space and of quaternions. Functions return coefficient N of the result, for example `cross` returns
 //! coefficient N of the vector product. Functions named `…_coefficient` compute it in a loop for any order n.
 //!
-//! The rules are the product (Cauchy) rule. Each sum has its newest coefficients last, as in `series.rs`. The order N
-//! is a constant parameter of a rule. The compiler then writes sums of vectors out before it inlines them, which saves
-//! a seventieth of the instructions of a step.
+//! The rules are the product (Cauchy) rule. Each sum adds its newest coefficients last, as in `series.rs`. The order N is a
+//! constant parameter of a rule, so that the compiler writes out sums of vectors before it inlines them, which saves a
+//! seventieth of the instructions of a step.
 
 use crate::series::{EMPTY, ORDER, RECIPROCAL, Series};
 use crate::vector::{self, Vec3};
@@ -17,8 +17,8 @@ pub fn next<const N: usize>(rate: Vec3) -> Vec3 {
     vector::scale(RECIPROCAL[N + 1], rate)
 }
 
-/// Coefficients of two vectors that most rules treat equally: `[n][i]` is component i of both, so that a
-/// processor computes both at once, from aligned memory.
+/// Coefficients of two vectors that most rules treat equally: `[n][i]` is component i of both vectors. A processor loads
+/// both from aligned memory and computes both at once.
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Pair([[[f64; 2]; 3]; ORDER + 1]);
@@ -71,8 +71,8 @@ pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
 /// Returns coefficient N of the six different products of a vector's components: xx, yy, zz, xy, xz, yz.
 #[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
-    // Terms j and N - j together: 2 a_j b_(N-j) for a square, a_j b_(N-j) + a_(N-j) b_j for the
-    // other products.
+    // Terms j and N - j are added together: 2 a_j b_(N-j) for a square, and a_j b_(N-j) + a_(N-j) b_j for the other
+    // products.
     let mut sum = [EMPTY; 6];
     for j in (0..N.div_ceil(2)).rev() {
         let (a, b) = (a[j], a[N - j]);
@@ -96,7 +96,7 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     sum
 }
 
-/// Returns the products of [`products`], computed in a loop for any order n, which is smaller code.
+/// Returns the products of [`products`], computed in a loop for any order n, which gives smaller code.
 pub fn product_coefficients(n: usize, a: &Vector) -> [f64; 6] {
     let mut sum = [EMPTY; 6];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
@@ -117,7 +117,7 @@ pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of a b, with b a vector, without its term a_N b_0, which may not be known yet.
+/// Returns coefficient N of a b, where b is a vector, without its term a_N b_0, because a_N may not be known yet.
 #[inline(always)]
 pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     let mut sum = [EMPTY; 3];
@@ -154,9 +154,9 @@ pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). The result stays a
-/// pair, because a compiler would otherwise vectorise across the components. The function is not inlined: its
-/// lanes would be regrouped with the surrounding code, which takes a tenth more instructions.
+/// Returns coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). The result is a pair, because a
+/// compiler would otherwise vectorise across the components. The function is not inlined, because the compiler would combine
+/// its vector lanes with the surrounding code, which takes a tenth more instructions.
 #[inline(never)]
 pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     let mut sum = [[EMPTY; 2]; 3];
@@ -213,8 +213,8 @@ pub fn cross_ramp<const N: usize>(a: &Vector, ramp: &[Vec3; 2]) -> Vec3 {
     if N == 0 { first } else { vector::add(first, vector::cross(a[N - 1], ramp[1])) }
 }
 
-/// Coefficients of a quaternion (a, b, c, d), stored as the pairs whose multiples by the components of w give
-/// its rate: (-b, a), (c, d), (-d, c), (a, b).
+/// Coefficients of a quaternion (a, b, c, d), stored as the pairs from which its rate is computed by multiplication with the
+/// components of w: (-b, a), (c, d), (-d, c), (a, b).
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Attitude([[[f64; 2]; 4]; ORDER + 1]);
@@ -255,7 +255,7 @@ impl Attitude {
 /// function is not inlined, for the same reason as [`cross_pair`].
 #[inline(never)]
 pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
-    // Not `EMPTY`: a body at rest has the rate 0, not -0.
+    // `EMPTY` is not used, because a body at rest must have the rate 0 and not -0.
     let (mut ab, mut cd) = ([0.0; 2], [0.0; 2]);
     for j in 0..N + 1 {
         let (q, [x, y, z]) = (&q.0[N - j], &w.0[j]);
@@ -302,7 +302,7 @@ mod tests {
         let (q, y_t) = (q.value(ORDER, t), value(&y, ORDER, t));
         let (sin, cos) = (f64::sin(size * t / 2.0), f64::cos(size * t / 2.0));
         let exact = [cos, rate[0] / size * sin, rate[1] / size * sin, rate[2] / size * sin];
-        // |w| t = 0.4: the truncation error is below rounding, a few ulp remain.
+        // Since |w| t = 0.4, the truncation error is below rounding, so that a few units in the last place remain.
         for (got, exact) in q.iter().zip(exact) {
             assert!((got - exact).abs() < 4e-16, "{got} {exact}");
         }

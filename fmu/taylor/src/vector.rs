@@ -1,5 +1,5 @@
-//! Column vectors of three components, matrices by rows, and unit quaternions with the scalar first, over values or
-//! derivatives.
+//! Column vectors of three components, matrices by rows, and unit quaternions with the scalar first. Most functions are
+//! generic over values and derivatives.
 
 use crate::number::Number;
 
@@ -9,7 +9,7 @@ pub type Mat3<T = f64> = [[T; 3]; 3];
 
 pub type Quaternion<T = f64> = [T; 4];
 
-/// Returns three components of an array from index `at` on as a vector.
+/// Returns three components of an array, from the index `at` on, as a vector.
 #[inline(always)]
 pub fn part(x: &[f64], at: usize) -> Vec3 {
     [x[at], x[at + 1], x[at + 2]]
@@ -54,8 +54,7 @@ pub fn constant<T: Number>(a: Vec3) -> Vec3<T> {
     a.map(T::constant)
 }
 
-/// Returns the magnitude of the largest component. Unlike `f64::max` it does not lose a NaN, which must end
-/// the step.
+/// Returns the magnitude of the largest component. Unlike with `f64::max` a NaN is not lost, because it must end the step.
 #[inline(always)]
 pub fn largest(a: Vec3) -> f64 {
     let larger = |a: f64, b: f64| if b > a { b } else { a };
@@ -67,8 +66,8 @@ pub fn norm<T: Number>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
-/// Returns the matrix of a rotation. If q turns from frame B to frame A, the matrix maps components in B to
-/// components in A.
+/// Returns the matrix of a rotation. If q rotates from frame B to frame A, the matrix maps components in B to components in
+/// A.
 #[inline(always)]
 pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
     let [w, x, y, z] = *q;
@@ -90,21 +89,21 @@ pub fn unit_quaternion<T: Number>(q: Quaternion<T>) -> Quaternion<T> {
     q.map(|x| x * share)
 }
 
-/// Returns the derivative of q/|q| in the direction dq, where `unit` is q/|q|.
+/// Returns the derivative of q/|q| for a change of q by dq, where `unit` is q/|q|.
 pub fn unit_quaternion_slope(unit: &Quaternion, q: &Quaternion, dq: &Quaternion) -> Quaternion {
     let dot = |a: &Quaternion, b: &Quaternion| (0..4).map(|i| a[i] * b[i]).sum::<f64>();
     let (along, size) = (dot(unit, dq), libm::sqrt(dot(q, q)));
     core::array::from_fn(|i| (dq[i] - unit[i] * along) / size)
 }
 
-/// Returns the direction p and its rate p', corrected to |p| = 1 and p.p' = 0.
+/// Returns the direction p and its rate p', corrected so that |p| = 1 and p.p' = 0.
 #[inline(always)]
 pub fn on_sphere<T: Number>(p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
     let unit = scale(norm(p).recip(), p);
     [unit, sub(p_d, scale(dot(unit, p_d), unit))]
 }
 
-/// Returns the derivative of [`on_sphere`] in the direction (dp, dp').
+/// Returns the derivative of [`on_sphere`] for a change of p and p' by dp and dp'.
 pub fn on_sphere_slope(p: Vec3, p_d: Vec3, dp: Vec3, dp_d: Vec3) -> [Vec3; 2] {
     let [unit, _] = on_sphere(p, p_d);
     let d_unit = scale(1.0 / norm(p), sub(dp, scale(dot(unit, dp), unit)));
@@ -163,7 +162,7 @@ mod tests {
         let [p, p_d] = on_sphere(A, B);
         assert!((norm(p) - 1.0).abs() < 1e-15 && dot(p, p_d).abs() < 1e-15);
         assert!(norm(cross(p, A)) < 1e-15 && dot(p, A) > 0.0);
-        // Only the component along p is removed from the rate.
+        // The correction removes only the component along p from the rate.
         assert!(norm(sub(sub(B, p_d), scale(dot(p, B), p))) < 1e-15);
     }
 
