@@ -1,5 +1,4 @@
-//! Compiles the hostile host for the fuzzer, with the official headers of FMI 2.0 and 3.0, which
-//! `.ci/fuzz` finds.
+//! Compiles the hostile host for the fuzzer, with the official headers of FMI 2.0 and 3.0. `.ci/fuzz` provides the headers.
 
 const SOURCES: [&str; 3] = ["host.c", "calls2.c", "calls3.c"];
 

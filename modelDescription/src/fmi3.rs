@@ -1,6 +1,6 @@
-//! Writes modelDescription.xml of FMI 3.0 from the variable table. With scalars the variables have the names
-//! of FMI 2.0; with arrays an entry of the table is one variable. Then follow the independent variable and
-//! the event indicators, which are not variables in FMI 2.0.
+//! Writes the modelDescription.xml of FMI 3.0 from the table of variables. In the layout with scalars the variables have the
+//! names of FMI 2.0; in the layout with arrays each entry of the table is one variable. The independent variable and the
+//! event indicators, which are not variables in FMI 2.0, follow after the table's variables.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ fn array<M: Model>(v: &'static Variable<M>) -> Element {
         .filter_map(|element| v.start(&mut parameters, &mut inputs, element))
         .map(text)
         .collect();
-    // A single value holds for all elements.
+    // A single value applies to all elements.
     if starts.iter().all(|start| *start == starts[0]) {
         starts.truncate(1);
     }
@@ -133,8 +133,8 @@ fn entry<M: Model>(name: &str) -> Option<&'static Variable<M>> {
     M::table().variables.iter().find(|v| v.name == name)
 }
 
-/// Returns the elements that an entry has with the start values of structural parameters, as row-major
-/// indices of the largest array.
+/// Returns the elements that an entry has with the start values of structural parameters, as row-major indices
+/// in the largest array.
 fn elements<M: Model>(v: &Variable<M>) -> Vec<usize> {
     let all = Arrays::new::<M>(&M::table().starts());
     let scalars = all.scalars(arrays::reference(v)).unwrap_or_default().iter();
@@ -150,7 +150,7 @@ fn entry_element<M: Model>(
 ) -> Element {
     let is_structural = layout == Layout::Arrays && M::table().is_structural(v);
     let (causality, initial) = match v.causality {
-        // `initial="exact"` is the default for an input, and CasADi refuses to read it.
+        // `initial="exact"` is the default of an input, and CasADi does not accept it.
         Causality::Input => ("input", None),
         Causality::Output => ("output", Some("calculated")),
         Causality::Local => ("local", Some("calculated")),
@@ -212,8 +212,8 @@ fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
     }
 }
 
-/// Returns the event indicators as elements of ModelStructure. They are declared to depend on all inputs and
-/// states, because the dependencies of an indicator change with the contact and the limits in effect.
+/// Returns the event indicators as elements of ModelStructure. They are declared to depend on all inputs and states, because
+/// their real dependencies change with the contact and with the limits that apply.
 fn event_indicators<M: Model>(layout: Layout) -> impl Iterator<Item = Element> {
     let is_known = |s: &&'static Scalar<M>| {
         s.variable.causality == Causality::Input || s.variable.state.is_some()

@@ -1,8 +1,8 @@
-//! Draws the FMU's icon from `modelDescription/icon/icon.svg`, because importers expect a PNG and only few
-//! can display an SVG.
+//! Draws the FMU's icon from `modelDescription/icon/icon.svg`, because FMI importers expect a PNG and few can display an
+//! SVG.
 //!
-//! `icon/SHA256SUMS` identifies the drawing from which the committed picture was made. Drawing needs the
-//! feature `icon`, because its library takes longer to compile than everything else.
+//! `icon/SHA256SUMS` contains the hash of the drawing from which the committed picture was made. The feature `icon` is
+//! needed to draw, because its library takes longer to compile than everything else.
 
 use sha2::{Digest, Sha256};
 
@@ -39,7 +39,7 @@ mod tests {
         let shown = std::fs::read(format!("{FOLDER}/icon.png")).unwrap();
         let shown = resvg::tiny_skia::Pixmap::decode_png(&shown).unwrap();
         let drawn = draw(&std::fs::read_to_string(format!("{FOLDER}/icon.svg")).unwrap()).unwrap();
-        // Other processors may round differently and shade edges differently by a step or two.
+        // Other processors may round differently, which changes the shades at edges by one or two steps.
         let pixels = shown.data().iter().zip(drawn.data());
         assert_eq!(pixels.filter(|(a, b)| a.abs_diff(**b) > 2).count(), 0);
     }

@@ -1,7 +1,7 @@
-//! Writes modelDescription.xml from an FMU's variable table.
+//! Writes the modelDescription.xml of FMI 2.0 from the table of variables of an FMU.
 //!
-//! This crate does not know single variables; the table describes them. The XML is committed, so that a
-//! change of the interface shows in a diff.
+//! This crate contains nothing about single variables, which the table describes. The XML is committed, so that a change of
+//! the interface is visible in a diff.
 
 mod element;
 pub mod fmi3;
@@ -31,11 +31,10 @@ pub fn path<M: Model>() -> PathBuf {
     folder::<M>().join("modelDescription.xml")
 }
 
-/// Date of the release. It is not the date of the build, because the same commit must always give the same
-/// bytes.
+/// Date of the release, and not of the build, because builds of the same commit must give the same bytes.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
-/// Default stop time, s, with 20 s at the gyro's 50 Hz.
+/// Default stop time, s. A simulation of 20 s has 1000 samples of the gyro at 50 Hz.
 const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
@@ -258,24 +257,23 @@ impl List {
     }
 }
 
-/// Longest list of dependencies of an initial value that is written completely. The values that depend on
-/// accelerations depend on nearly all parameters, and their lists would make up most of the file.
+/// Largest number of dependencies of an initial value that are written. Values that depend on accelerations depend on nearly
+/// all parameters, and their lists would be the largest part of the file.
 const LONGEST: usize = 100;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Long {
-    /// The list is left out, so that a host assumes a dependency on everything. However, the list of an
-    /// output is kept if the output does not depend on all inputs, because otherwise a host would see an
-    /// algebraic loop that does not exist.
+    /// The list is left out, so that a host assumes that the value depends on everything. The list of an output is
+    /// nevertheless written if the output does not depend on all inputs, because otherwise a host would find an algebraic
+    /// loop that does not exist.
     Nothing,
     /// The dependencies without their kinds, so that a host assumes `dependent`, which is correct.
     Dependencies,
 }
 
-/// Returns the elements of a list of ModelStructure in the order of their numbers, each with the numbers of
-/// the scalars on which it depends. An array depends on everything on which one of its elements depends.
-/// `element` and `attribute` are the names in this version of FMI; `long` determines how long lists of
-/// initial values are written.
+/// Returns the elements of a list of ModelStructure in the order of their numbers, each with the numbers of the scalars on
+/// which it depends. An array depends on everything on which one of its elements depends. `element` and `attribute` are the
+/// names in this version of FMI, and `long` determines if long lists of dependencies of initial values are written.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,

@@ -1,6 +1,5 @@
-//! Rewrites the committed files that are generated: each FMU's modelDescription.xml, page of variables and
-//! names for the harness from its variable table, and with the feature `icon` the icon's picture from its
-//! drawing.
+//! Writes the committed files that are generated from the variable table of each FMU: modelDescription.xml, the page of
+//! variables, and the names for the harness. With the feature `icon` it also draws the icon.
 
 use model_description::{fmi3, names, path, variables, xml};
 use runtime::Model;

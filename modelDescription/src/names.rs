@@ -1,5 +1,5 @@
-//! Writes the harness's module with an FMU's names: variables, items of enumerations and array sizes, from
-//! the variable table.
+//! Writes a module of the harness with the names of an FMU (variables, items of enumerations, array sizes),
+//! from the variable table.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -43,8 +43,8 @@ impl Module {
     }
 }
 
-/// Returns the text of the module: a constant for each variable except derivatives, in a submodule for each
-/// part of its name.
+/// Returns the text of the module: a constant for each variable except derivatives. Each part of a variable's
+/// name is a submodule.
 pub fn module<M: Model>() -> String {
     let table = M::table();
     let mut root = Module::default();
@@ -81,8 +81,8 @@ pub fn module<M: Model>() -> String {
     text
 }
 
-/// Returns the largest value of an integer parameter if it is the length of an array. Parameters that stand
-/// for an enumeration or a Boolean are left out.
+/// Returns the largest value of an integer parameter if it is the length of an array. Returns `None` for integer twins
+/// of enumerations and Booleans.
 fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     let Kind::Integer { max: Some(max), .. } = variable.kind else { return None };
     let lengths = |v: &Variable<M>| v.shape.iter().any(|d| i32::try_from(d.most()) == Ok(max));

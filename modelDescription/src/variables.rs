@@ -1,4 +1,4 @@
-//! Writes the documentation's page of all variables from the FMU's variable table.
+//! Writes the documentation page with all variables from the variable table of an FMU.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -108,8 +108,8 @@ fn has_slosh_model<M: Model>() -> bool {
     M::table().variables.iter().any(|v| v.name == "slosh.model")
 }
 
-/// Returns the start values of all elements: a single value if they are equal, or the first block if all
-/// blocks along the first index are equal.
+/// Returns the start values of all elements. If all elements have the same value, returns this value; if all blocks along
+/// the first index are equal, returns the first block.
 fn start<M: Model>(variable: &Variable<M>) -> String {
     let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
     let starts: Vec<_> = (0..variable.len())
@@ -153,7 +153,7 @@ fn range<M: Model>(variable: &Variable<M>) -> (String, String) {
     }
 }
 
-/// Formats a number in the usual notation, with powers of ten only instead of many zeros.
+/// Formats a number: without an exponent if it is 0 or its magnitude is 1e-4 to 1e5, otherwise with a power of ten.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }

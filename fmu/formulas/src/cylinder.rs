@@ -1,5 +1,4 @@
-//! Liquid in an upright cylinder of diameter d, filled to the depth h, as pendulums and rigid
-//! liquid.
+//! Equivalent pendulums and rigid liquid of a liquid in an upright cylinder of diameter d, filled to the depth h:
 //!
 //! ```text
 //! m_n = m_liq d tanh(2 xi_n h/d) / (xi_n (xi_n^2 - 1) h)        l_n = d/(2 xi_n tanh(2 xi_n h/d))
@@ -7,15 +6,14 @@
 //! I/m_liq = h^2/12 - 3 R^2/4 + (16 R^3/h) sum of tanh(xi_n h/(2 R))/(xi_n^3 (xi_n^2 - 1))
 //! ```
 //!
-//! xi_n: zeros of J1'. I: transverse inertia of the liquid under a lid, about its centre. With all
-//! modes, force and moment are those of linear potential flow in a cylinder that moves and pitches.
+//! xi_n are the zeros of J1', and I is the transverse inertia of the liquid under a lid, about its centre. With all modes,
+//! force and moment are those of linear potential flow in a cylinder that moves and pitches.
 //!
 //! Source: Abramson, NASA SP-106 (1966), chapters 2 and 6; Dodge (2000).
 
 pub const MODES: usize = 10;
 
-/// Zeros xi_n of J1', the derivative of the Bessel function J1, with 17 digits; `MODES` of them are
-/// tabulated.
+/// Zeros xi_n of J1', the derivative of the Bessel function J1, with 17 digits. The table has `MODES` zeros.
 pub const XI: [f64; MODES] = [
     1.841_183_781_340_659_5,
     5.331_442_773_525_032_5,
@@ -29,9 +27,8 @@ pub const XI: [f64; MODES] = [
     30.601_922_972_669_094,
 ];
 
-/// One slosh mode as a pendulum with its hinge on the tank's axis: `mass` in kg, `length` in m, `hinge` is
-/// its height above the bottom, m, and `wave` the elevation of the wave at the wall per slosh angle, 2
-/// R/(xi_n^2 - 1), m/rad.
+/// One slosh mode as a pendulum with its hinge on the tank's axis: `mass`, kg, `length`, m, height `hinge` of the hinge
+/// above the bottom, m, and `wave`, the elevation of the wave at the wall per slosh angle, 2 R/(xi_n^2 - 1), m/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
     pub mass: f64,
@@ -40,8 +37,8 @@ pub struct Pendulum {
     pub wave: f64,
 }
 
-/// Returns the pendulum of mode `n`, which counts from 0 and is below [`MODES`], in a cylinder of diameter
-/// `d` filled to the height `h`, both m, with the mass `m_liq` of liquid, kg.
+/// Returns the pendulum of mode `n`, which counts from 0 and is below [`MODES`], in a cylinder of diameter `d`, m, filled to
+/// the height `h`, m, with `m_liq` kg of liquid.
 pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     let (xi, radius) = (XI[n], d / 2.0);
     let tanh = libm::tanh(2.0 * xi * h / d);
@@ -55,10 +52,10 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
-/// Returns diameter and fill height, m, of the upright cylinder whose first mode has the pendulum `length`,
-/// m, and `mass`, kg, with a liquid of `density`, kg/m3. The equations of the module's head give d^4 = 8 xi^2
-/// (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
-/// fill, so tanh is limited to 0.995.
+/// Returns diameter and fill height, m, of the upright cylinder whose first mode has a pendulum with this `length`,
+/// m, and `mass`, kg, with a liquid of `density`, kg/m3. The equations of the module's head give d^4 = 8 xi^2 (xi^2 -
+/// 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the fill, so that
+/// tanh is limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     let xi = XI[0];
     let d4 = 8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (density * core::f64::consts::PI);
@@ -74,14 +71,14 @@ pub fn capped_inertia(d: f64, h: f64) -> f64 {
     let radius = d / 2.0;
     let term = |xi: f64| libm::tanh(xi * h / d) / (xi * xi * xi * (xi * xi - 1.0));
     let sum: f64 = (1..=ZEROS).rev().map(|n| term(zero(n))).sum();
-    // Zeros are pi apart, which gives the sum of xi^-5 from here on.
+    // The zeros are pi apart, from which the sum of xi^-5 over the further zeros follows.
     let end = zero(ZEROS) + core::f64::consts::FRAC_PI_2;
     let rest = 1.0 / (4.0 * core::f64::consts::PI * end * end * end * end);
     let rest = rest * libm::tanh(end * h / d);
     h * h / 12.0 - 0.75 * radius * radius + 16.0 * radius * radius * radius / h * (sum + rest)
 }
 
-/// Returns zero `n` of J1', which counts from 1. Zeros beyond the table come from McMahon's expansion (DLMF
+/// Returns zero `n` of J1', which counts from 1. Zeros that are not in the table are computed by McMahon's expansion (DLMF
 /// 10.21.20).
 fn zero(n: usize) -> f64 {
     if n <= MODES { XI[n - 1] } else { mcmahon(n) }
@@ -90,14 +87,13 @@ fn zero(n: usize) -> f64 {
 fn mcmahon(n: usize) -> f64 {
     let b = (n as f64 - 0.25) * core::f64::consts::PI;
     let x = 8.0 * b;
-    // mu = 4
+    // McMahon's expansion for mu = 4.
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// Returns the mass, kg, the height of the centre of mass above the bottom, m, and the transverse
-/// inertia about that centre, kg m2, of the rigid liquid that remains when the modes `kept` are
-/// pendulums. The rigid liquid is chosen so that mass, centre of mass and inertia of the whole
-/// liquid are exact while every pendulum hangs along the tank's axis.
+/// Returns the mass, kg, the height of the centre of mass above the bottom, m, and the transverse inertia about the centre
+/// of mass, kg m2, of the rigid liquid. The modes `kept` are pendulums, and the rigid liquid is chosen so that mass, centre
+/// of mass and inertia of the whole liquid are exact while every pendulum hangs along the tank's axis.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();
@@ -114,9 +110,9 @@ pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// The reference values are those of `fmu/craft/tests/six.json` to six digits, for R = 0.45 m, 0.6 m of
-    /// liquid and 1000 kg/m3. The sum for I_0 is shorter there, and I_0 is a small difference of large
-    /// numbers.
+    /// The reference values are those of `fmu/craft/tests/six.json` to six digits, for R = 0.45 m, 0.6 m of liquid and
+    /// 1000 kg/m3. I_0 has a larger tolerance, because its sum has fewer terms in the records and it is a small
+    /// difference of large numbers.
     #[test]
     fn the_cylinder_equals_the_reference_records() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
@@ -134,8 +130,8 @@ mod tests {
         }
     }
 
-    /// The fourth root in the formula for the diameter has an error of some units in the last
-    /// place, and atanh near 1 multiplies this error by 1/(1 - tanh^2) = 20.
+    /// The fourth root in the formula for the diameter has an error of some units in the last place. atanh near 1 amplifies
+    /// this error by 1/(1 - tanh^2) = 20.
     #[test]
     fn tank_dimensions_are_recovered_from_the_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
@@ -182,8 +178,8 @@ mod tests {
         assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
     }
 
-    /// Cylinders of 2 m diameter, 20 m and 1e6 m deep: modal mass, length, and the hinge's depth below the surface are
-    /// equal.
+    /// In cylinders of 2 m diameter that are 20 m and 1e6 m deep, modal mass, length and the depth of the hinge below
+    /// the surface are equal.
     #[test]
     fn the_pendulum_of_a_deep_cylinder_does_not_depend_on_the_depth() {
         let [deep, deeper] = [20.0, 1e6].map(|h| (h, pendulum(0, 2.0, h, h)));
@@ -193,8 +189,8 @@ mod tests {
         assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
     }
 
-    /// From length and mass of the first mode the function returns diameter and depth of a cylinder. In deep liquid they do
-    /// not depend on the depth.
+    /// The function returns diameter and depth of a cylinder from length and mass of the first mode, which do not depend on
+    /// the depth in deep liquid.
     #[test]
     fn a_pendulum_of_a_very_deep_cylinder_is_assigned_a_depth_at_which_tanh_is_0_995() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
@@ -203,9 +199,9 @@ mod tests {
         assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
     }
 
-    /// A thin film has no height and the inertia per mass of a disk, R^2/4; the integral
-    /// that replaces the last zeros of the sum is then too small by 8/(12 pi end^3), end = 400 pi +
-    /// 1.6. In a long column the inertia per mass tends to h^2/12 - 3 R^2/4.
+    /// A thin film has no height, so that its inertia per mass is that of a disk, R^2/4. The integral that replaces the last
+    /// zeros of the sum is then too small by 8/(12 pi end^3) with end = 400 pi + 1.6. In a long column the inertia per mass
+    /// tends to h^2/12 - 3 R^2/4.
     #[test]
     fn the_capped_inertia_has_its_limits() {
         let film = capped_inertia(2.0, 1e-12);
@@ -220,14 +216,14 @@ mod tests {
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
 
-    /// McMahon's expansion approximates the zeros of J1'. Its first omitted term is of the order of
-    /// 1e4/(8 b)^5, b being the leading term of the expansion, which is 1e-8 at the tenth zero.
+    /// McMahon's expansion approximates the zeros of J1'. Its first omitted term is about 1e4/(8 b)^5, where b is the
+    /// leading term of the expansion. At the tenth zero this is 1e-8.
     #[test]
     fn mcmahon_s_zeros_continue_the_table() {
         let tenth = mcmahon(10);
         assert!((tenth - XI[9]).abs() < 1e-7, "{tenth} {}", XI[9]);
         assert_eq!((zero(1), zero(10)), (XI[0], XI[9]));
-        // from libm's J1'; the next term of the expansion is 1e-8 at the 11th zero
+        // The expected zero was computed with libm's J1'. The next term of the expansion is 1e-8 at the 11th zero.
         let eleventh = zero(11);
         assert!((libm::j0(eleventh) - libm::j1(eleventh) / eleventh).abs() < 1e-8, "{eleventh}");
     }

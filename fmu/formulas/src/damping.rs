@@ -1,18 +1,17 @@
-//! Damping ratios: one law for every tank ([`estimate`]), from the laminar layer at the wall and published
-//! correlations; ring baffles.
+//! Damping ratios of slosh modes in any tank ([`estimate`]), from the laminar layer at the wall and published correlations,
+//! and damping by ring baffles.
 //!
 //! ```text
 //! zeta_n = f beta_n sqrt(nu/(8 omega_n)),   omega_n^2 = g lambda_n + k_n/m_n
 //! ```
 //!
-//! The ratio of wall shear to volume is beta_n = int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV, 1/m. The true natural
-//! frequency omega_n includes capillarity, so that zeta stays finite if g vanishes. The factor f accounts for surface
-//! film and contact line. It is measured for some shapes of tanks; any other shape has [`UNMEASURED`]. If only a part
+//! beta_n = int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV, 1/m, is the ratio of wall shear to volume. The true natural
+//! frequency omega_n includes capillarity, so that zeta stays finite if g vanishes. The factor f accounts for surface film
+//! and contact line. It was measured for some shapes of tanks; any other shape has the value [`UNMEASURED`]. If only a part
 //! of the wall has a measured shape, f is a mean of both values.
 //!
-//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
-//! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any
-//! correlation.
+//! Everywhere Re = nu/sqrt(g R^3) (an inverse Reynolds number), x = h/R is the fill, and zeta is the logarithmic decrement
+//! divided by 2 pi. Measured damping ratios scatter by about 30 % around any correlation.
 
 use core::f64::consts::TAU;
 
@@ -20,16 +19,16 @@ use libm::{cosh, exp, log, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
-/// Damping of a slosh mode over the damping of the laminar layer at its wall, for a tank whose
-/// shape nobody has measured. It lies between the measured cylinders' 1.49 (Stephens) and 1.39 to
-/// 1.54 (Mikishev and Dorozhkin).
+/// Damping of a slosh mode divided by the damping of the laminar layer at the wall, for a tank of a shape without
+/// measurements. It lies between the values of measured cylinders, 1.49 (Stephens) and 1.39 to 1.54 (Mikishev and
+/// Dorozhkin).
 pub const UNMEASURED: f64 = 1.45;
 
 pub const SCATTER: f64 = 0.3;
 
-/// Parameters of a slosh mode on which its damping depends: the ratio `beta` of wall shear to volume, 1/m;
-/// `lambda`, 1/m, with which gravity alone gives the frequency sqrt(g lambda) (1/l of the pendulum); and the
-/// natural frequency `omega` with capillarity, rad/s.
+/// Quantities of a slosh mode on which its damping depends: the ratio `beta` of wall shear to volume, 1/m; `lambda`,
+/// 1/m, which gives the frequency sqrt(g lambda) without capillarity (1/l of the pendulum); and the natural frequency
+/// `omega` with capillarity, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     pub beta: f64,
@@ -50,9 +49,9 @@ impl Mode {
     }
 }
 
-/// Shapes of tanks for which the damping of the first mode was measured. Lengths are in m; `radius` of a cone is the radius
-/// of its free surface, and its half angle is in degrees. Cylinder and torus are upright, and the cone's apex is at the
-/// bottom.
+/// Shapes of tanks for which the damping of the first mode was measured. Lengths are in m. Cylinder and torus are
+/// upright, and the apex of the cone is at its bottom. `radius` of a cone is the radius of its free surface, and its half
+/// angle is in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     Cylinder { radius: f64, depth: f64 },
@@ -62,9 +61,9 @@ pub enum Shape {
     Other,
 }
 
-/// Damping ratio `zeta` of a first mode by a correlation. Its `weight` against the general value of
-/// [`UNMEASURED`] laminar layers is 1 within the range of the measurements, and falls smoothly to 0 where a
-/// number is outside that range by the factor [`BEYOND`].
+/// Damping ratio `zeta` of a first mode by a correlation. `weight` is the weight of the correlation relative to
+/// [`UNMEASURED`] laminar layers: 1 within the range of the measurements, falling smoothly to 0 where a similarity number is
+/// outside this range by the factor [`BEYOND`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correlation {
     pub zeta: f64,
@@ -73,13 +72,13 @@ pub struct Correlation {
 
 pub const BEYOND: f64 = 2.0;
 
-/// Half angle of a cone, degrees, from which on the measured correlation for cones is not used,
-/// because cones were measured only up to 45 degrees.
+/// Half angle of a cone, degrees, from which on the correlation is not used, because cones were measured only
+/// up to 45 degrees.
 const WIDEST: f64 = 50.0;
 
 const SHALLOW: f64 = 0.4;
 
-/// Returns 0 for t <= 0, 1 for t >= 1, and in between the cubic that joins them with a continuous slope.
+/// Returns 0 for t <= 0, 1 for t >= 1, and in between a cubic with continuous slope.
 pub fn smooth_step(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -91,13 +90,12 @@ fn weight(number: f64, [low, high]: [f64; 2]) -> f64 {
 }
 
 impl Shape {
-    /// Returns the published correlation of the first mode's damping ratio at the viscosity `nu`, m2/s, and
-    /// the specific force `g`, m/s2, which must include the equivalent of a centring stiffness. `None` for a
-    /// shape without measurements.
+    /// Returns the published correlation of the first mode's damping ratio, at the viscosity `nu`, m2/s, and the specific
+    /// force `g`, m/s2, which must include the equivalent of a centring stiffness. `None` if the shape was not measured.
     ///
-    /// The cylinder has Mikishev and Dorozhkin's formula from h/R = 0.5 on. For smaller fills that formula
-    /// gives less damping than the laminar layer, so Stephens, Leonard and Perry's is used there. Both differ
-    /// by 7 % at 0.5, and the result passes from one to the other between 0.4 ([`SHALLOW`]) and 0.5.
+    /// For a cylinder Mikishev and Dorozhkin's formula is used from h/R = 0.5 on. For smaller fills this formula gives less
+    /// damping than the laminar layer, so that the formula of Stephens, Leonard and Perry is used. At 0.5 the two formulas
+    /// differ by 7 %; between 0.4 ([`SHALLOW`]) and 0.5 the result changes from one to the other.
     pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
         let (zeta, weight) = match *self {
             Shape::Cylinder { radius, depth } => {
@@ -126,8 +124,8 @@ impl Shape {
         Some(Correlation { zeta, weight })
     }
 
-    /// Returns the shape with its depth moved to the nearest depth that was measured: 0.1 to 1.9 radii of a
-    /// sphere, and 0.1 to 0.9 of the height of a torus.
+    /// Returns the shape with its depth replaced by the nearest measured depth: 0.1 to 1.9 radii of a sphere, and 0.1 to 0.9
+    /// of the height of a torus.
     #[must_use]
     pub fn at_measured_depth(self) -> Shape {
         match self {
@@ -143,9 +141,9 @@ impl Shape {
     }
 }
 
-/// A measured shape that the wetted wall of a tank has, wholly or in part. `share` is its share of the wetted
-/// area, 0 to 1; `factor` is the damping ratio of the shape's first mode by its correlation over the ratio of
-/// the laminar layer at its wall; `weight` is [`Correlation::weight`].
+/// A measured shape that the whole wetted wall of a tank or a part of it has. `share` is the fraction of the wetted area, 0
+/// to 1. `factor` is the damping ratio of the shape's first mode by its correlation, divided by the damping ratio of the
+/// laminar layer at its wall. `weight` is [`Correlation::weight`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     pub share: f64,
@@ -153,27 +151,26 @@ pub struct Part {
     pub weight: f64,
 }
 
-/// Share of the wetted wall from which on a measured shape counts in the interval of an estimate.
-/// The interval then contains the shape's correlation entirely. If other shapes have at least this
-/// share, the estimate has the interval of a wall of several shapes.
+/// Fraction of the wetted wall from which on a measured shape affects the interval of an estimate. The interval then
+/// includes the shape's correlation. If other shapes have at least this fraction, the estimate has the interval of a
+/// wall of several shapes.
 const COUNTS: f64 = 0.05;
 
-/// Damping by a correlation over the damping of the laminar layer below which the correlation is
-/// not used, because no wall can have less damping than its laminar layer.
+/// Damping by a correlation divided by the damping of the laminar layer, below which the correlation is not used, because no
+/// wall can have less damping than its laminar layer.
 const BELOW: f64 = 0.8;
 
 impl Part {
-    /// Returns the factor over the laminar layer that the shape contributes: its correlation's factor, but at
-    /// least 1. Where the correlation's factor falls from 1 to [`BELOW`], the result passes into
-    /// [`UNMEASURED`], because no wall has less than its layer.
+    /// Returns the factor f that the shape contributes: the factor of its correlation, but at least 1. If the correlation's
+    /// factor is between 1 and [`BELOW`], the result changes smoothly to [`UNMEASURED`], because no wall has less damping
+    /// than its laminar layer.
     fn shape_factor(&self) -> f64 {
         let trusted = self.weight * smooth_step((self.factor - BELOW) / (1.0 - BELOW));
         UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
     }
 
-    /// Returns true if the damping by the shape's correlation differs from the damping of
-    /// [`UNMEASURED`] laminar layers by more than the damping ratios of measured tanks scatter
-    /// about a correlation.
+    /// Returns true if the damping by the shape's correlation differs from that of [`UNMEASURED`] laminar layers by more
+    /// than the scatter of measured damping ratios.
     pub fn disagrees(&self) -> bool {
         let (low, high) = (self.factor.min(UNMEASURED), self.factor.max(UNMEASURED));
         high > (1.0 + SCATTER) * low
@@ -188,8 +185,8 @@ impl Part {
     }
 }
 
-/// Damping ratios as multiples f of the damping ratio of a laminar wall layer: the expected value `factor`, which holds for all modes, and
-/// the expected intervals of the first mode and of the higher modes.
+/// Damping ratios as multiples f of the damping ratio of a laminar wall layer: the expected value `factor` for all modes,
+/// and the expected intervals for the first mode and for the higher modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub factor: f64,
@@ -197,16 +194,17 @@ pub struct Estimate {
     pub interval_of_others: [f64; 2],
 }
 
-/// Estimates the factor f of a tank whose wetted wall consists of the shapes `parts`; the rest of the wall
-/// has [`UNMEASURED`]. `near` lists these shapes and the shapes that the wall resembles.
+/// Estimates the factor f of a tank whose wetted wall consists of the shapes `parts`. The rest of the wall has
+/// [`UNMEASURED`]. `near` contains these shapes and those that the wall resembles.
 ///
-/// f is the mean over the wall. Each shape contributes its factor on its share, moved towards [`UNMEASURED`]
-/// as far as its correlation lacks weight or is below the laminar layer. All modes have the same f.
+/// f is the mean over the wall. Each shape contributes its factor in proportion to its share. The factor is moved towards
+/// [`UNMEASURED`] if the correlation has less than full weight or gives less damping than the laminar layer. All modes
+/// have the same f.
 ///
-/// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the first mode's
-/// interval is the scatter of measured tanks. Otherwise it runs from the laminar layer to 1.3 times the
-/// largest factor of all parts and near shapes. It widens from one to the other while the shape's share falls
-/// to 95 %.
+/// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the interval of the first
+/// mode is the scatter of measured tanks. Otherwise it extends from the laminar layer to 1.3 times the largest factor
+/// of all parts and near shapes. If the share of the shape falls to 95 %, the interval changes continuously from the
+/// former to the latter.
 pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
     let mean = |sum: f64, part: &Part| sum + part.share * (part.shape_factor() - UNMEASURED);
     let factor = match parts {
@@ -235,9 +233,8 @@ pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
     nu / sqrt(g * radius * radius * radius)
 }
 
-/// Returns the damping ratio of the laminar layer at the wetted wall of any tank, beta sqrt(nu/(8 omega)).
-/// `beta`, 1/m, depends on the mode's shape (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the
-/// box).
+/// Returns the damping ratio of the laminar layer at the wetted wall of any tank, beta sqrt(nu/(8 omega)). The wall factor
+/// `beta`, 1/m, depends on the mode's shape (cylinder: Case and Parkinson 1957, box: Keulegan 1959).
 pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
     beta * sqrt(nu / (8.0 * omega))
 }
@@ -262,10 +259,10 @@ pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     }
 }
 
-/// Returns an upper bound of the damping ratio of the first mode of an upright cylinder at Bond numbers of 10
-/// to 100, where the contact line dissipates more than at large ones. The formula `0.83 (nu^2/(g R^3))^(1/4)
-/// (1 + 8.2 Bo^(-3/5))` is quoted for drop-tower tests (Salzman, Labus and Masica, NASA TN D-4132). The
-/// report could not be obtained, so the value is not used as an estimate.
+/// Returns an upper bound of the damping ratio of the first mode of an upright cylinder at Bond numbers of 10 to 100, where
+/// the contact line dissipates more than at large Bond numbers. The formula `0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5))`
+/// is quoted for drop-tower tests (Salzman, Labus and Masica, NASA TN D-4132). Since the report could not be obtained, the
+/// value is not used as an estimate.
 pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
     0.83 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + 8.2 * pow(bond, -0.6))
 }
@@ -273,10 +270,10 @@ pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
 /// Returns the damping ratio of the first mode of an upright cylinder by Mikishev and Dorozhkin (Dodge 2000):
 /// 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x) (1 + (1 - x)/cosh 1.84 x)]. Here x is h/R. For x below 0.5 the formula gives
 /// less than the damping of the laminar layer.
-#[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
+#[allow(clippy::approx_constant)] // 0.318 is a number of the correlation, not 1/pi
 pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
-    // sinh would overflow, and the bottom has no effect there.
+    // The limit avoids an overflow of sinh; the bottom has no effect at this depth.
     let u = f64::min(1.84 * x, 300.0);
     let bottom = 0.318 / sinh(u) * (1.0 + (1.0 - x) / cosh(u));
     0.79 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + bottom)
@@ -296,10 +293,10 @@ pub fn sphere_number(radius: f64, nu: f64, g: f64) -> f64 {
     1e4 * inverse_reynolds(2.0 * radius, nu, g)
 }
 
-/// Returns the damping ratio of the first mode of a sphere by Mikishev and Dorozhkin, with the exponent of
-/// Sumner and Stofan (NASA TN D-1991): (0.131/2 pi) B^0.359/x up to half full, and above this value times x
-/// (1 + 0.46 (2 - x))/(1.46 (2 - x)), with B = 1e4 nu/sqrt(g D^3). The formula is unbounded at both ends, so
-/// x = h/R is limited to 0.1 to 1.9.
+/// Returns the damping ratio of the first mode of a sphere by Mikishev and Dorozhkin, with the exponent of Sumner and
+/// Stofan (NASA TN D-1991). Up to half full it is (0.131/2 pi) B^0.359/x with B = 1e4 nu/sqrt(g D^3); above, this value
+/// is multiplied by x (1 + 0.46 (2 - x))/(1.46 (2 - x)). The formula is unbounded at both ends, so that x = h/R is
+/// limited to 0.1 to 1.9.
 pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = (depth / radius).clamp(0.1, 1.9);
     let by_fill = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
@@ -316,16 +313,15 @@ pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Returns the viscosity number Re = nu/sqrt(g R^3) of a torus divided by the viscosity number of
-/// the only torus whose damping was measured. `tube_radius` is the radius of the torus's section,
-/// m.
+/// Returns the viscosity number Re = nu/sqrt(g R^3) of a torus, divided by that of the only torus whose damping was
+/// measured. `tube_radius` is the radius of the torus's cross-section, m.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
 
-/// Returns the damping ratio of the first mode of a torus by SLOSH-ML, who measured one size of tank:
-/// sqrt(Re/Re_0) (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi with y = h/2a, the radius a
-/// = `tube_radius` of the section, m, and Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
+/// Returns the damping ratio of the first mode of a torus by SLOSH-ML, whose authors measured one size of tank:
+/// sqrt(Re/Re_0) (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi with y = h/2a, the radius a = `tube_radius`
+/// of the cross-section, m, and Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
 pub fn torus(tube_radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let y = 0.5 * depth / tube_radius;
     let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;
@@ -341,15 +337,15 @@ pub fn covered(radius: f64, width: f64) -> f64 {
 /// first mode of an upright cylinder. The ring is `depth` (m) below the surface, and `radius` (m) is the radius of the
 /// cylinder.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
-    // The limit keeps divisions by this share finite.
+    // The limit keeps a division by this ratio finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))
 }
 
-/// Returns the damping ratio that a flat ring baffle adds in an upright cylinder (Miles 1958): `2.83
-/// exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)`, with the ring's share alpha of the section and the `amplitude`
-/// eta of the wave at the wall, m.
+/// Returns the damping ratio that a flat ring baffle adds in an upright cylinder (Miles 1958): `2.83 exp(-4.60 d/R)
+/// alpha^(3/2) (eta/R)^(1/2)`, where alpha is the fraction of the cross-section that the ring covers, and `amplitude`, m, is
+/// the amplitude eta of the wave at the wall.
 ///
-/// The ratio grows with the root of the amplitude, so a constant damping ratio holds only at one amplitude.
+/// The ratio grows with the root of the amplitude, so that it is constant only at a constant amplitude.
 pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
     let alpha = covered(radius, width);
     2.83 * exp(-4.60 * depth / radius) * alpha * sqrt(alpha) * sqrt(amplitude / radius)
@@ -359,21 +355,21 @@ pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Water in the bench's tank, R = 0.0815 m, has Re = 9.1312e-7/sqrt(9.81 R^3). The values were computed
-    /// by hand to four digits.
+    /// Water in the bench's tank, R = 0.0815 m, has Re = 9.1312e-7/sqrt(9.81 R^3). The expected values were computed by
+    /// hand to four digits.
     #[test]
     fn correlations_have_their_published_coefficients() {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
         near(inverse_reynolds(r, nu, g), 1.2530e-5);
-        // Deep liquid: the bottom has no effect.
+        // In deep liquid the bottom has no effect.
         near(mikishev_dorozhkin(r, 5.0 * r, nu, g), 0.79 * 3.5398e-3);
-        // x = 1/2: 0.318/sinh 0.92 (1 + 0.5/cosh 0.92) = 0.3018 (1 + 0.3444)
+        // For x = 1/2 the term is 0.318/sinh 0.92 (1 + 0.5/cosh 0.92) = 0.3018 (1 + 0.3444).
         near(mikishev_dorozhkin(r, 0.5 * r, nu, g), 0.79 * 3.5398e-3 * 1.4057);
         near(stephens(r, 5.0 * r, nu, g), 5.23 / TAU * 3.5398e-3);
-        // x = 1: the bracket is 1, tanh(1.84) = 0.95080
+        // For x = 1 the bracket is 1, and tanh(1.84) = 0.95080.
         near(stephens(r, r, nu, g), 5.23 / TAU * 3.5398e-3 * 1.01269);
-        // Half full, B = 1e4 Re/8^(1/2)
+        // A half full sphere has B = 1e4 Re/8^(1/2).
         near(sphere_number(r, nu, g), 4.4300e-2);
         near(sphere(r, r, nu, g), 0.131 / TAU * 0.32660);
         near(sphere(r, 1.5 * r, nu, g), 0.131 / TAU * 0.32660 * 1.23 / 0.73);
@@ -384,8 +380,8 @@ mod tests {
         );
     }
 
-    /// In shallow liquid sign and magnitude of every term matter. The values at x = 0.2, 1 and 2 are twelve
-    /// digits of the published formula, evaluated by another program.
+    /// In shallow liquid the sign and magnitude of every term matter. The expected values at x = 0.2, 1 and 2 have twelve
+    /// digits and were computed from the published formula by another program.
     #[test]
     fn the_bottom_term_of_mikishev_and_dorozhkin_matters_in_shallow_liquid_and_changes_sign_above_the_radius()
      {
@@ -398,7 +394,7 @@ mod tests {
         ] {
             assert!((mikishev_dorozhkin(r, x * r, nu, g) / zeta - 1.0).abs() < 1e-12, "{x}");
         }
-        // At depths where sinh would overflow, the term vanishes.
+        // At depths at which sinh would overflow, the bottom term is 0.
         assert_eq!(mikishev_dorozhkin(r, 1e4 * r, nu, g), 0.79 * sqrt(inverse_reynolds(r, nu, g)));
     }
 
@@ -406,9 +402,9 @@ mod tests {
     fn the_bottom_term_of_stephens_matters_in_shallow_liquid() {
         let deep = stephens(1.0, 5.0, 1e-6, 9.81);
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
-        // x = 1/2: sinh 1.84 = 3.06896, tanh 0.92 = 0.72590
+        // For x = 1/2: sinh 1.84 = 3.06896, tanh 0.92 = 0.72590.
         near(stephens(1.0, 0.5, 1e-6, 9.81) / deep, (1.0 + 1.0 / 3.06896) / pow(0.72590, 0.25));
-        // x = 2: sinh 7.36 = 785.92, tanh 3.68 = 0.998729
+        // For x = 2: sinh 7.36 = 785.92, tanh 3.68 = 0.998729.
         near(stephens(1.0, 2.0, 1e-6, 9.81) / deep, (1.0 - 2.0 / 785.92) / pow(0.998729, 0.25));
         near(stephens(1.0, 1e4, 1e-6, 9.81) / deep, 1.0);
     }
@@ -418,17 +414,17 @@ mod tests {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
         assert_eq!((sphere(0.01), sphere(1.99)), (sphere(0.1), sphere(1.9)));
         assert!(sphere(0.11) < sphere(0.1) && sphere(1.89) != sphere(1.9));
-        // full to 1.9 radii: (1 + 0.046)/0.146 of half full
+        // At 1.9 radii the ratio is (1 + 0.046)/0.146 times that of the half full sphere.
         assert!((sphere(1.9) / sphere(1.0) / (1.046 / 0.146) - 1.0).abs() < 1e-12);
         let cone = |b: f64| cone(1.0, b, 1e-6, 9.81);
         assert_eq!((cone(-5.0), cone(60.0)), (cone(0.0), cone(45.0)));
-        // b = 20 and 40 degrees: C5 1.2557 and 1.5077, C4 0.819 and 0.397
+        // For b = 20 and 40 degrees C5 is 1.2557 and 1.5077, and C4 is 0.819 and 0.397.
         let both = cone(40.0) / cone(20.0);
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
-    /// The damping ratio of a torus is a polynomial of fourth order in the depth, multiplied by the
-    /// root of the viscosity number over the viscosity number of the measured torus.
+    /// The damping ratio of a torus is a polynomial of fourth order in the depth, multiplied by the root of its viscosity
+    /// number divided by that of the measured torus.
     #[test]
     fn the_damping_of_a_torus_equals_the_fit_and_grows_with_the_root_of_the_viscosity_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
@@ -445,7 +441,7 @@ mod tests {
         let zeta = miles_ring(1.0, 0.1, 0.1, 0.04);
         assert!((zeta / (2.83 * 0.63128 * 0.082819 * 0.2) - 1.0).abs() < 1e-4, "{zeta}");
         assert!((motion_at_ring(2.0, 0.2) / 0.83194 - 1.0).abs() < 1e-4);
-        // Four times the wave has twice the damping. Doubling all lengths changes nothing.
+        // A wave that is four times as high has twice the damping. If all lengths are doubled, the damping does not change.
         assert!((miles_ring(1.0, 0.1, 0.1, 0.16) / zeta - 2.0).abs() < 1e-14);
         assert!((miles_ring(2.0, 0.2, 0.2, 0.08) / zeta - 1.0).abs() < 1e-14);
         assert!((covered(2.0, 0.2) - 0.19).abs() < 1e-15);
@@ -472,7 +468,7 @@ mod tests {
                 assert!((mode.omega * mode.omega / (3.0 * lambda) - 1.0).abs() < 1e-15, "{n}");
             }
         }
-        // x = 2: 1 - x is -1
+        // For x = 2 the factor 1 - x is -1.
         let deep = cylinder_beta(0, 1.0, 2.0) - cylinder_beta(0, 1.0, 1.0);
         assert!((deep / (-2.0 * XI[0] / sinh(4.0 * XI[0])) - 1.0).abs() < 1e-12, "{deep}");
     }
@@ -494,8 +490,8 @@ mod tests {
         );
     }
 
-    /// The weight falls from 1 at the ends of the measured range of viscosity numbers to 0, as the correlation then gives
-    /// way to wall friction.
+    /// At the ends of the measured range of viscosity numbers the weight of the correlation falls from 1 to 0, so that
+    /// wall friction replaces it.
     #[test]
     fn a_damping_correlation_gets_weight_0_outside_the_range_of_its_measurements() {
         let (r, g) = (2.0, 9.81);
@@ -524,9 +520,9 @@ mod tests {
             1.0
         );
         assert_eq!(Shape::Other.correlation(1e-6, g), None);
-        // without viscosity nothing was measured
+        // No measurement was made without viscosity.
         assert_eq!(sphere(1.0).correlation(0.0, g), Some(Correlation { zeta: 0.0, weight: 0.0 }));
-        // the value is the shape's formula
+        // The value is that of the shape's formula.
         let nu = unit;
         let zeta = |shape: Shape| shape.correlation(nu, g).unwrap().zeta;
         assert_eq!(zeta(sphere(0.7)), super::sphere(r, 0.7 * r, nu, g));
@@ -571,15 +567,14 @@ mod tests {
 
     fn numbers(parts: &[Part]) -> [f64; 3] {
         let Estimate { factor, interval: [low, high], interval_of_others } = estimate(parts, &[]);
-        // those of the other modes reach from the layer on
+        // The interval of the other modes begins at the laminar layer.
         assert_eq!(interval_of_others[0], 1.0);
         assert!(interval_of_others[1] >= high);
         [factor, low, high]
     }
 
-    /// The damping of a tank's first mode over the damping of its laminar wall layer, with lower
-    /// and upper limits. Limits are ±30 % of the correlation where it agrees with 1.45 layers;
-    /// otherwise they include both estimates.
+    /// Damping of a tank's first mode divided by that of its laminar wall layer, with lower and upper limits. If the
+    /// correlation agrees with 1.45 layers, the limits are ±30 % of the correlation; otherwise they include both estimates.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [
@@ -597,27 +592,28 @@ mod tests {
         is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 
-    /// The damping over the damping of the laminar layer is 1.45 for a tank without a correlation,
-    /// and for a tank whose correlation has low weight or gives less than the layer.
+    /// The damping divided by that of the laminar layer is 1.45 for a tank without a correlation, and for a tank whose
+    /// correlation has a low weight or gives less damping than the layer.
     #[test]
     fn unmeasured_shapes_have_1_45_times_the_laminar_damping() {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);
         is_near(numbers(&[part(1.0, 3.0, 0.0)]), [1.45, 1.0, 3.9]);
         is_near(numbers(&[part(1.0, 0.8, 1.0)]), [1.45, 1.0, 1.3 * 1.45]);
-        // half-way from 1 to 0.8
+        // The factor 0.9 is half-way between 1 and 0.8.
         is_near(numbers(&[part(1.0, 0.9, 1.0)]), [1.225, 1.0, 1.3 * 1.45]);
         is_near(numbers(&[part(1.0, 3.45, 0.25)]), [1.95, 1.0, 1.3 * 3.45]);
     }
 
-    /// A third of the wall has 4 times the damping of the laminar layer, a half 1.15 times and the rest 1.45 times. The
-    /// result is the mean of these factors, and its interval contains the largest one.
+    /// A third of the wall has 4 times the damping of the laminar layer, half of it 1.15 times and the rest 1.45 times. The
+    /// result is the mean of these factors, and its interval includes the largest factor.
     #[test]
     fn a_wall_of_several_shapes_has_the_mean_of_their_damping() {
         let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];
         is_near(numbers(&parts), [4.0 / 3.0 + 0.5 * 1.15 + 1.45 / 6.0, 1.0, 5.2]);
-        // a share below 5 % moves the end of the interval in proportion
+        // A share below 5 % changes the end of the interval in proportion.
         is_near(numbers(&[part(0.01, 4.0, 1.0)]), [1.4755, 1.0, 1.3 * (1.45 + 0.2 * 2.55)]);
-        // and nothing jumps where a shape becomes the whole wall, whether it agrees with 1.45 layers or not
+        // The result is continuous where a shape becomes the whole wall, whether its correlation agrees with
+        // 1.45 layers or not.
         for factor in [1.0, 1.3, 1.7, 4.0] {
             let [nearly, wholly] =
                 [1.0 - 1e-9, 1.0].map(|share| numbers(&[part(share, factor, 1.0)]));
@@ -625,7 +621,8 @@ mod tests {
                 assert!((a / b - 1.0).abs() < 1e-7, "{nearly:?} {wholly:?}");
             }
         }
-        // half-way to the mixture: between 0.7 and 1, 1.3 of 1.3 and of 1.45
+        // Half-way to a wall of several shapes, the limits are half-way between 0.7 and 1, and between 1.3 times the factor
+        // and 1.3 x 1.45.
         let factor = 1.45 - 0.975 * 0.15;
         let found = numbers(&[part(0.975, 1.3, 1.0)]);
         is_near(found, [factor, 0.5 * (0.7 * factor + 1.0), 0.5 * 1.3 * (factor + 1.45)]);

@@ -1,31 +1,29 @@
-//! Coefficients of the first mode in an upright cylinder that give the slosh mass the wave's energy as well as its
-//! frequency.
+//! Coefficients of the first mode in an upright cylinder for which the slosh mass has the energy of the wave as
+//! well as its frequency:
 //!
 //! ```text
 //! L = m |q'|^2/2 + m (s + s_2 |q|^2/l^2) (q.q')^2/(2 l^2) + m (t + t_2 |q|^2/l^2) (q x q')^2/(2 l^2) - m g z
 //! z = l [A^2/2 + kappa A^4/8 + (kappa_2 + 1) A^6/16 + ...],   A = |q|/l
 //! ```
 //!
-//! as in `fmu/craft/src/surface.rs`: a pendulum with s, kappa and the four further coefficients, which are 0 for it. The
-//! third order has the right frequency, but not the right energy: at h/R 0.5 and 16 degrees its slosh mass holds 4.7 % less
-//! than the liquid, and forced near resonance its amplitude errs by 3 to 8 %. Here kappa and kappa_2 follow from the rise
-//! of the liquid's centre of mass, s and s_2 from the frequency of planar motion and t and t_2 from that of circular
-//! motion.
+//! The equations are those of `fmu/craft/src/surface.rs`: a pendulum with s, kappa and four further coefficients, which are
+//! 0 for a plain pendulum. The third order has the right frequency, but not the right energy: at h/R = 0.5 and 16 degrees
+//! its slosh mass has 4.7 % less energy than the liquid, and near resonance its forced amplitude has errors of 3 to 8 %.
+//! Here kappa and kappa_2 follow from the rise of the liquid's centre of mass, s and s_2 from the frequency of planar
+//! motion, and t and t_2 from the frequency of circular motion.
 //!
-//! Source: fully nonlinear potential flow, computed for this project by a variational method (Luke's principle) at
-//! the depths of [`ROWS`]. Up to the slosh angles in that table, the frequencies of the slosh mass differ from the
-//! frequencies of the flow by at most 0.06 % (planar) and 0.11 % (circular), and its energy differs from the energy
-//! of planar waves by at most 0.1 % from h/R 0.35 on (0.7 % at 0.25, 1.1 % at 0.3).
-//! `harness/tank/tests/tank/backbones.rs` compares the frequencies.
+//! Source: fully nonlinear potential flow, computed for this project by a variational method (Luke's principle) at the
+//! depths of [`ROWS`]. Up to the slosh angles in this table, the frequencies of slosh mass and potential flow differ by at
+//! most 0.06 % in planar and 0.11 % in circular motion. The energy differs from that of planar waves by at most 0.1 % from
+//! h/R = 0.35 on (0.7 % at 0.25, 1.1 % at 0.3). `harness/tank/tests/tank/backbones.rs` compares the frequencies.
 
 use crate::third_order;
 
 pub const DEPTHS: [f64; 2] = [0.25, third_order::BRIDGED[0]];
 
-/// Rows of h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle, degrees, at which the
-/// slosh mass was compared with potential flow. The frequency of a circular motion is defined here
-/// as omega^2 (1 + t A^2 + t_2 A^4) = (dz/dA)/A, so that t and t_2 are two and three times as large
-/// as t and t_2 in the equations above.
+/// Each row contains h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle, degrees, at which the slosh mass was
+/// compared with potential flow. In this table the frequency of circular motion is defined by omega^2 (1 + t A^2 + t_2 A^4)
+/// = (dz/dA)/A, so that t and t_2 are two and three times the t and t_2 of the equations above.
 const ROWS: [[f64; 8]; 7] = [
     [0.25, 111.6366, 67.2399, 48.6774, -3776.617, -2326.024, -1494.947, 8.0],
     [0.3, 38.3052, 21.5892, 15.4987, -429.434, -236.528, -188.836, 12.5],
@@ -36,8 +34,8 @@ const ROWS: [[f64; 8]; 7] = [
     [0.65, 2.1267, 2.1867, 0.6731, -4.250, -0.965, -2.221, 18.0],
 ];
 
-/// Coefficients of the first mode at one depth: `pair` is (s, kappa), `next` (s_2, kappa_2), `rotary` (t,
-/// t_2), and `compared` the largest slosh angle of the comparison with potential flow, rad.
+/// Coefficients of the first mode at one depth: `pair` is (s, kappa), `next` is (s_2, kappa_2), and `rotary` is (t, t_2).
+/// `compared` is the largest slosh angle, rad, of the comparison with potential flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyTerms {
     pub pair: [f64; 2],
@@ -46,13 +44,13 @@ pub struct EnergyTerms {
     pub compared: f64,
 }
 
-/// Returns the coefficients that give the slosh mass the energy of a large wave in an upright cylinder filled to h/R =
+/// Returns the coefficients for which the slosh mass has the energy of a large wave in an upright cylinder filled to h/R =
 /// `fill`; `None` if the fill is outside [`DEPTHS`].
 ///
-/// Between the rows kappa, kappa_2 and the shifts of the frequency are interpolated, and the other
-/// coefficients follow from them. An error of the interpolation therefore changes the energy and not the frequency. The
-/// shifts to third order are interpolated as differences from the third order of potential flow, which is known at
-/// every depth. Beyond the last row the last two coefficients are extrapolated.
+/// Between the rows kappa, kappa_2 and the shifts of the frequency are interpolated, and the other coefficients follow from
+/// them. An error of the interpolation therefore changes the energy and not the frequency. The shifts to third order are
+/// interpolated as differences from the third order of potential flow, which is known at every depth. Beyond the last row
+/// s_2 and t_2 are extrapolated.
 pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     if !(DEPTHS[0]..=DEPTHS[1]).contains(&fill) {
         return None;
@@ -107,9 +105,9 @@ fn shifts_of_third_order(fill: f64) -> [f64; 2] {
     third_order::shifts(s, kappa)
 }
 
-/// Returns the six quantities of a row that are interpolated over the depth: the logarithms of kappa - 1 and
-/// -kappa_2, the differences of both shifts from the third order, and the logarithms of the shifts by the
-/// fourth power of the angle. Logarithms are possible because these do not change their sign.
+/// Returns the six quantities of a row that are interpolated over the depth: the logarithms of kappa - 1 and -kappa_2, the
+/// differences of both shifts from the third order, and the logarithms of the shifts by the fourth power of the angle. The
+/// logarithms exist because these quantities do not change their sign.
 fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     let [planar, circular] = shifts_of_third_order(fill);
     [
@@ -122,8 +120,8 @@ fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     ]
 }
 
-/// Interpolates y at `x` between the points i - 1 and i. With `is_cubic` it is a cubic whose slopes at both points are
-/// those of the parabola through the nearest three points; otherwise it is the straight line.
+/// Interpolates y at `x` between the points i - 1 and i. If `is_cubic` is true, by a cubic whose slopes at both points are
+/// those of the parabola through the nearest three points; otherwise by a straight line.
 fn interpolate_segment(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_cubic: bool) -> f64 {
     let [[x_0, y_0], [x_1, y_1]] = [point(i - 1), point(i)];
     let (h, secant) = (x_1 - x_0, (y_1 - y_0) / (x_1 - x_0));

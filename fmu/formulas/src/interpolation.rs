@@ -1,16 +1,15 @@
 //! Interpolation with two continuous derivatives that is monotone wherever the data are.
 //!
-//! A quintic between two points has given values, slopes and second derivatives at both. Slopes and second derivatives
-//! come from the polynomial through the five nearest points, which is exact to fifth order for smooth data. Between two
-//! points they are limited so that the quintic's Bernstein coefficients are monotone. This is sufficient for a monotone
-//! curve.
+//! In each interval the curve is a quintic, which has given values, slopes and second derivatives at both points. Slopes and
+//! second derivatives come from the polynomial through the five nearest points, which is exact to fifth order for smooth
+//! data. In each interval they are then limited so that the Bernstein coefficients of the quintic are monotone, which is
+//! sufficient for a monotone curve.
 
-/// Writes the slopes and second derivatives of a curve through points with ascending `x` into `slope` and
-/// `curvature`.
+/// Writes the slopes and second derivatives of a curve through points with ascending `x` to `slope` and `curvature`.
 ///
-/// With `within`, the curve stays between its two points in every interval, so that it turns where the data
-/// turn. Otherwise the intervals next to a turning point are not limited, because the true maximum lies
-/// between points.
+/// If `within` is true, the curve stays between its two points in every interval, so that it has its maxima and
+/// minima at points. Otherwise the intervals next to a turning point of the data are not limited, because the true
+/// maximum lies between points.
 ///
 /// # Panics
 /// If the lengths of the slices differ.
@@ -27,7 +26,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     let turning = |j: usize| j > 0 && j + 1 < count && secant(j - 1) * secant(j) < 0.0;
     let limited = |j: usize| j + 1 < count && (within || !turning(j) && !turning(j + 1));
     let sign = |j: usize| if secant(j) < 0.0 { -1.0 } else { 1.0 };
-    // In the direction of the rise: 0 <= d, and 2 (d_0 + d_1)/5 < secant on every interval.
+    // The limits, in the direction of the rise, are 0 <= d and 2 (d_0 + d_1)/5 < secant in every interval.
     for j in (0..count).filter(|j| limited(*j)) {
         for slope in &mut slope[j..j + 2] {
             *slope = sign(j) * (sign(j) * *slope).clamp(0.0, 2.4 * secant(j).abs());
@@ -40,8 +39,8 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
             slope[j + 1] *= most / sum;
         }
     }
-    // b_2 - b_1 = h d/5 + h^2 s/20, b_4 - b_3 = h d/5 - h^2 s/20,
-    // b_3 - b_2 = h [secant - 2 (d_0 + d_1)/5] + h^2 (s_1 - s_0)/20
+    // The differences of Bernstein coefficients are b_2 - b_1 = h d/5 + h^2 s/20, b_4 - b_3 = h d/5 - h^2 s/20, and b_3 -
+    // b_2 = h [secant - 2 (d_0 + d_1)/5] + h^2 (s_1 - s_0)/20.
     for i in 0..count {
         let mut limit = [f64::NEG_INFINITY, f64::INFINITY];
         for (j, at_left) in [(i, true), (i.wrapping_sub(1), false)] {
@@ -51,7 +50,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
             let h = x[j + 1] - x[j];
             let room = (20.0 / h) * (secant(j) - 0.4 * (slope[j] + slope[j + 1])).abs();
             let own = 4.0 * slope[i].abs() / h;
-            // s at the left end: s >= -own, s <= room/2; at the right end with opposite signs
+            // At the left end s >= -own and s <= room/2; at the right end the signs are opposite.
             let (low, high) = if at_left { (-own, 0.5 * room) } else { (-0.5 * room, own) };
             let (low, high) = if sign(j) > 0.0 { (low, high) } else { (-high, -low) };
             limit = [limit[0].max(low), limit[1].min(high)];
@@ -60,7 +59,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     }
 }
 
-/// Returns the first and second derivative at `x0` of the polynomial through up to five points, by Fornberg's
+/// Returns the first and the second derivative, at `x0`, of the polynomial through up to five points, by Fornberg's
 /// recurrence (1988).
 fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     let mut weights = [[0.0; 5]; 3];
@@ -89,8 +88,8 @@ fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     (sum(1), sum(2))
 }
 
-/// Returns the coefficients, in powers of t from 0 to 1, of the quintic between two points a distance `h`
-/// apart, each given as `[value, slope, second derivative]`.
+/// Returns the coefficients, in powers of t from 0 to 1, of the quintic between two points at the distance `h`, each given
+/// as `[value, slope, second derivative]`.
 pub fn quintic(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 6] {
     let (rise, d_0, d_1) = (y_1 - y_0, d_0 * h, d_1 * h);
     let (s_0, s_1) = (0.5 * s_0 * h * h, 0.5 * s_1 * h * h);
@@ -152,7 +151,7 @@ mod tests {
                 }
             }
         }
-        // with fewer points all of them are used
+        // If there are fewer than five points, all of them are used.
         let parabola = [0.0, 1.0, 3.0].map(|x| x + x * x);
         let (slope, curvature) = found([0.0, 1.0, 3.0], parabola, true);
         for i in 0..3 {
@@ -175,11 +174,10 @@ mod tests {
         }
     }
 
-    /// Returns the differences between neighbouring Bernstein coefficients of the quintic between
-    /// two points, divided by their distance h. With d the slope and s the second derivative at a
-    /// point, the first two differences are d/5 and d/5 + h s/20 at the left point, the last two
-    /// follow likewise from the right point, and the middle one is what remains of the rise. If all
-    /// have the sign of the rise, the curve is monotonic.
+    /// Returns the differences between neighbouring Bernstein coefficients of the quintic between two points, divided by
+    /// their distance h. With the slope d and the second derivative s, the first two differences are d/5 and d/5 + h s/20 at
+    /// the left point, the last two follow in the same way from the right point, and the middle one is the rest of the rise.
+    /// If all differences have the sign of the rise, the curve is monotone.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };
@@ -193,9 +191,8 @@ mod tests {
         .map(|step| sign * step)
     }
 
-    /// The curve is monotone between points that jump by factors up to 1e4, that rise and fall
-    /// smoothly, or that turn. The tolerance is 1e-11: the last digit of the largest value over the
-    /// smallest distance between points.
+    /// The curve is monotone between points that jump by factors of up to 1e4, that rise and fall smoothly, or that turn.
+    /// The tolerance is 1e-11: the last digit of the largest value, divided by the smallest distance between points.
     #[test]
     fn the_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;
@@ -223,7 +220,7 @@ mod tests {
                     assert!(step > -1e-11, "{round} {j}: {step}");
                 }
             }
-            // Slopes that already satisfy the limits, with each end taking half of the remaining range, do not change.
+            // Slopes that already satisfy the limits do not change if each end takes half of the remaining range.
             let (mut own, mut bent) = ([0.0; 8], [0.0; 8]);
             for i in 0..8 {
                 let first = [0, 0, 0, 1, 2, 3, 3, 3][i];
@@ -255,19 +252,19 @@ mod tests {
 
     #[test]
     fn steep_slopes_are_limited() {
-        // secants 1 and 10 alternate; each slope at most 2.4 of the smaller one
+        // The secants are 1 and 10 alternately. Each slope is at most 2.4 times the smaller secant,
         let (x, y) = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 10.0, 11.0, 21.0, 22.0]);
         let (slope, _) = found(x, y, true);
         assert_eq!(found(x, y, true), found(x, y, false), "nothing turns");
         for i in 1..4 {
             assert!(slope[i] <= 2.4 + 1e-15, "{slope:?}");
         }
-        // and the sum at most 2.375 times it
+        // and the sum of two slopes is at most 2.375 times the smaller secant.
         for j in [1, 3] {
             assert!((slope[j] + slope[j + 1]) <= 2.375 + 1e-14, "{slope:?}");
         }
         assert!((slope[1] + slope[2] - 2.375).abs() < 1e-14, "{slope:?}");
-        // constant stretches stay constant
+        // Where the data are constant, the curve is constant.
         let (slope, curvature) = found([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0, 3.0], true);
         assert_eq!((slope[0], slope[1], slope[2]), (0.0, 0.0, 0.0));
         assert_eq!((curvature[0], curvature[1]), (0.0, 0.0));

@@ -1,7 +1,7 @@
-//! Closed formulas of slosh for models and harness. Liquid in an upright cylinder (`cylinder.rs`), to third order in
-//! the amplitude (`third_order.rs`) and beyond (`energy_terms.rs`), and with a tilted surface (`tilt.rs`). Damping by published correlations
-//! (`damping.rs`), the ends of the slosh models (`limits.rs`), the range of linear theory (`regime.rs`), similarity numbers (`similarity.rs`), and interpolation of
-//! fill tables (`interpolation.rs`). SI units.
+//! Closed formulas of slosh for models and harness, in SI units: liquid in an upright cylinder (`cylinder.rs`), to third
+//! order in the amplitude (`third_order.rs`) and beyond (`energy_terms.rs`), and with a tilted surface (`tilt.rs`); damping
+//! by published correlations (`damping.rs`); limits of the slosh models (`limits.rs`); range of linear theory (`regime.rs`);
+//! similarity numbers (`similarity.rs`); and interpolation of fill tables (`interpolation.rs`).
 
 #![no_std]
 

@@ -1,22 +1,24 @@
-//! Ends of the range in which a pendulum, or a slosh mass of the third order, represents the liquid in its tank.
+//! Limits of the range in which a pendulum, or a slosh mass with coefficients of the third order, represents the
+//! liquid in its tank.
 //!
-//! Slosh angles: the model's frequency over the amplitude is compared with fully nonlinear potential flow in upright
-//! cylinders. That flow was computed for this project by two independent methods, a variational one and one that marches in
-//! time; they agree within 0.04 % at h/R 0.5 and more, and within 0.12 % at 0.3. The frequency of the slosh mass is that of
-//! `fmu/craft/src/surface.rs` by quadrature. Two ends are given: at [`FREQUENCY`] the frequency itself is wrong, and at the
-//! smaller, second one a forced response near resonance is: its amplitude, force or phase leaves 3 %, 3 % or 3
-//! degrees. That response was computed for this project by a third method, spectral in space and marching in time, with a
-//! damping ratio of 0.01 on every mode of the liquid, at the peak of the response and 1 % from it. The angle is
-//! interpolated between the largest errors at two or more amplitudes. Part of the error is the damping of the waves that
-//! the first mode drives, which one slosh mass of the third order does not have. Tanks that move on a circle were compared in
-//! the same way with steady rotary waves (`harness/tank/examples/forced_waves.rs`), at the frequency of free rotary waves of 9
-//! degrees and 1 % from it. At the higher frequency, close to the jump of the response, the error is largest. Planar motion
-//! ends at the angles of [`cylinder`] and [`cylinder_with_energy`], rotary motion at the angle [`swirl`].
+//! **Slosh angle.** The model's frequency as a function of the amplitude is compared with fully nonlinear potential flow in
+//! upright cylinders. This flow was computed for this project by two independent methods, a variational method and one that
+//! marches in time; they agree within 0.04 % at h/R of 0.5 and more, and within 0.12 % at 0.3. The frequency of the slosh
+//! mass is that of `fmu/craft/src/surface.rs`, computed by quadrature. There are two limits: at [`FREQUENCY`] the error of
+//! the frequency itself is too large, and at a smaller angle the error of a forced response near resonance is: 3 % in
+//! amplitude or force, or 3 degrees in phase. This response was computed for this project by a third method, spectral in
+//! space and marching in time, with a damping ratio of 0.01 on every mode of the liquid, at the peak of the response and 1
+//! % from it. The angle is interpolated between the largest errors at two or more amplitudes. A part of the error is the
+//! damping of the waves that the first mode drives, which a single slosh mass of the third order does not have. Tanks that
+//! move on a circle were compared in the same way with steady rotary waves (`harness/tank/examples/forced_waves.rs`), at
+//! the frequency of free rotary waves of 9 degrees and 1 % from it. The error is largest at the higher frequency, which is
+//! close to the jump of the response. The limits are [`cylinder`] and [`cylinder_with_energy`] for planar motion, and
+//! [`swirl`] for rotary motion.
 //!
-//! Swirl: above h/R 0.83 mode (2,2) resonates with twice the frequency of mode 1, so that the branch of rotary motion
-//! folds at the angle [`swirl_fold`], and another one takes over. No single mode has two branches.
+//! **Rotary motion.** Above h/R = 0.83 mode (2,2) resonates with twice the frequency of mode 1, so that the branch of rotary
+//! motion folds at the angle [`swirl_fold`] and another branch replaces it. No model with a single mode has two branches.
 //!
-//! Spin: in a liquid that turns with its tank a wave has two frequencies, and a pendulum is wrong about both.
+//! **Spin.** In liquid that rotates with its tank a wave has two frequencies, and a pendulum has neither of them.
 
 use core::f64::consts::PI;
 
@@ -24,8 +26,8 @@ use crate::cylinder::XI;
 use crate::energy_terms::energy_terms;
 use crate::third_order;
 
-/// Reason why a pendulum does not represent the liquid in the present state of a tank.
-/// [`LimitedBy::ITEMS`] describes each reason.
+/// Reason why a pendulum does not represent the liquid of a tank in its present state. [`LimitedBy::ITEMS`] describes each
+/// reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LimitedBy {
@@ -80,32 +82,33 @@ impl LimitedBy {
     }
 }
 
-/// Relative error that a slosh model's natural frequency may have at the largest slosh angle of its
-/// range, compared with the frequency of fully nonlinear potential flow.
+/// Largest relative error of a slosh model's natural frequency within its range, compared with fully nonlinear potential
+/// flow.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of the model's natural frequency at which a forced response is wrong by 3 %, if
-/// the response is wrong only because the model's frequency changes with the slosh angle in another
-/// way than the liquid's.
+/// Relative error of the model's natural frequency at which the error of a forced response is 3 %, if the response is wrong
+/// only because the model's frequency changes with the slosh angle in another way than the liquid's frequency.
 pub const FORCED: f64 = 8.5e-4;
 
-/// Relative error of the third order's frequency at the angle at which a forced response is wrong by 3 %, for a tank in
-/// which only free motion was compared with potential flow. It is the smallest such error in upright cylinders with h/R
+/// Relative error of the third order's frequency at the angle at which the error of a forced response is 3 %, for a tank
+/// in which only free motion was compared with potential flow. It is the smallest such error in upright cylinders with h/R
 /// of 0.4 and more.
 pub const FORCED_UNCOMPARED: f64 = 1.7e-4;
-/// Slosh angle at which a forced response with [`energy_terms`] is wrong by 3 % over the angle at which a forced response
-/// of the third order is, for a tank in which only free motion was compared with potential flow. It is the smallest such
+/// Ratio of two slosh angles at which the error of a forced response is 3 %: with [`energy_terms`], divided by that of the
+/// third order. It is for a tank in which only free motion was compared with potential flow, and is the smallest such
 /// ratio in upright cylinders.
 pub const ENERGY_UNCOMPARED: f64 = 1.06;
-/// Slosh angle, rad, above which no forced response of the third order was found right within 3 % in any upright
+/// Largest slosh angle, rad, at which the error of a forced response of the third order was below 3 % in any upright
 /// cylinder.
 pub const LARGEST_FORCED: f64 = 9.3 * PI / 180.0;
-/// Slosh angle, rad, above which no forced response with [`energy_terms`] was found right within 3 % in any upright cylinder.
+/// Largest slosh angle, rad, at which the error of a forced response with [`energy_terms`] was below 3 % in any upright
+/// cylinder.
 pub const LARGEST_FORCED_ENERGY: f64 = 10.2 * (PI / 180.0);
 
-/// Rows of h/R and two slosh angles of planar motion in an upright cylinder, degrees: the first where the frequency of the
-/// third order errs by [`FREQUENCY`] (that of rotary motion errs at larger angles, except by the fold), the second where a
-/// forced response errs by 3 %. In [`third_order::BRIDGED`] the coefficients are bridged. `harness/tank/tests/tank/backbones.rs` computes the first column from
-/// `harness/tank/tests/backbones.csv`.
+/// Each row contains h/R and two slosh angles of planar motion in an upright cylinder, degrees. At the first angle the
+/// frequency of the third order has the error [`FREQUENCY`] (the frequency of rotary motion has it at larger angles,
+/// except where the branch folds), and at the second angle the error of a forced response is 3 %. In
+/// [`third_order::BRIDGED`] the coefficients are interpolated. `harness/tank/tests/tank/backbones.rs` computes the
+/// first angle from `harness/tank/tests/backbones.csv`.
 const THIRD_ORDER: [[f64; 3]; 12] = [
     [0.25, 4.41, 1.3],
     [0.3, 7.11, 2.4],
@@ -121,25 +124,24 @@ const THIRD_ORDER: [[f64; 3]; 12] = [
     [2.5, 22.06, 11.1],
 ];
 
-/// Rows of h/R and the slosh angle of rotary motion, degrees, at which its branch folds. The first row is at the depth of
-/// the secondary resonance. At h/R = 1 and 2.5 the angle is only the end of the computation, so that the fold may be at a
-/// larger angle.
+/// Each row contains h/R and the slosh angle, degrees, at which the branch of rotary motion folds. The first row is
+/// the depth of the secondary resonance. At h/R = 1 and 2.5 the computation ended at this angle, so that the fold may
+/// be at a larger angle.
 const FOLD: [[f64; 2]; 6] =
     [[0.8314, 0.5], [0.9, 4.6], [1.0, 7.0], [1.227, 9.4], [2.0, 10.8], [2.5, 10.4]];
 
-/// Largest slosh angles, rad, of a model of the first mode: up to `frequency` its natural frequency
-/// errs by at most [`FREQUENCY`], and up to `forced` a forced response near resonance errs by at
-/// most 3 %.
+/// Largest slosh angles, rad, of a model of the first mode. Up to `frequency` the error of its natural frequency is at most
+/// [`FREQUENCY`], and up to `forced` the error of a forced response near resonance is at most 3 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleLimit {
     pub frequency: f64,
     pub forced: f64,
 }
 
-/// Returns the limit of a model of the first mode in an upright cylinder filled to h/R = `fill`. `shifts` are
-/// the model's relative shifts of omega^2 per squared slosh angle in planar and in circular motion: 0 for a
-/// linear mode, -1/8 and 1/2 for a pendulum, and `None` for a motion that the model does not have. Their
-/// difference from the shifts of the third order adds to that order's own error.
+/// Returns the limit of a model of the first mode in an upright cylinder filled to h/R = `fill`. `shifts` are the model's
+/// relative changes of omega^2 per squared slosh angle in planar and in circular motion: 0 for a linear mode, -1/8 and 1/2
+/// for a pendulum, and `None` for a motion that the model does not have. If they differ from the shifts of the third order,
+/// the difference adds to the error of the third order.
 pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     let (s, kappa) = third_order::coefficients(fill);
     let own = |error: f64, column: usize| {
@@ -148,23 +150,24 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     AngleLimit { frequency: own(FREQUENCY, 1), forced: own(FORCED, 2) }
 }
 
-/// Rows of h/R and the slosh angle, degrees, at which a forced planar response of the model with [`energy_terms`] is wrong by
-/// 3 %. The error is smaller than 3 % from h/R = 0.6 on, up to 15 degrees, the largest angle that was compared.
+/// Each row contains h/R and the slosh angle, degrees, at which the error of a forced planar response of the model
+/// with [`energy_terms`] is 3 %. From h/R = 0.6 on the error is smaller than 3 % up to 15 degrees, the largest
+/// angle that was compared.
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 
-/// Rows of h/R and the slosh angle, degrees, at which a forced rotary response of the third order is wrong by 3 %. In
-/// shallower liquid planar motion ends first.
+/// Each row contains h/R and the slosh angle, degrees, at which the error of a forced rotary response of the third order is
+/// 3 %. In shallower liquid planar motion has the smaller limit.
 const ROTARY: [[f64; 2]; 6] =
     [[0.65, 9.3], [0.8, 7.7], [1.0, 4.8], [1.227, 5.9], [2.0, 7.2], [2.5, 7.2]];
 
-/// The same for the model with [`energy_terms`].
+/// As [`ROTARY`], for the model with [`energy_terms`].
 const ROTARY_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.8], [0.35, 4.0], [0.4, 5.0], [0.5, 7.5], [0.6, 9.6], [0.7, 10.2]];
 
-/// Returns the slosh angle, rad, at which rotary motion in an upright cylinder filled to h/R = `fill` is out of range: a forced
-/// response of the third order or, if `has_energy`, of the model with [`energy_terms`] is wrong by 3 %, or the branch folds.
-/// `None` in shallow liquid, where planar motion ends first.
+/// Returns the slosh angle, rad, above which rotary motion in an upright cylinder filled to h/R = `fill` is out of range,
+/// because the error of a forced response is 3 % or the branch folds. The model is that with [`energy_terms`] if
+/// `has_energy` is true, otherwise the third order. `None` in shallow liquid, where planar motion has the smaller limit.
 pub fn swirl(fill: f64, has_energy: bool) -> Option<f64> {
     let forced = match has_energy && energy_terms(fill).is_some() {
         true => Some(interpolate(fill, ROTARY_ENERGY)),
@@ -173,25 +176,26 @@ pub fn swirl(fill: f64, has_energy: bool) -> Option<f64> {
     [forced.map(f64::to_radians), swirl_fold(fill)].into_iter().flatten().reduce(f64::min)
 }
 
-/// Returns the limit of a slosh mass with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`, or `None` at
-/// depths without such coefficients.
+/// Returns the limit of a slosh mass with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`; `None` at
+/// depths without these coefficients.
 pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
     let compared = energy_terms(fill)?.compared;
     Some(AngleLimit { frequency: compared, forced: interpolate(fill, FORCED_ENERGY).to_radians() })
 }
 
-/// Returns the slosh angle, rad, up to which the frequency of a model errs by at most the fraction `error`.
-/// If the model's `shifts` are the `exact` ones to third order, this is `limit`. Otherwise it is at most the
-/// angle at which the difference of the shifts makes that error.
+/// Returns the slosh angle, rad, up to which the relative error of a model's frequency is at most `error`. If the model's
+/// `shifts` equal the `exact` shifts to third order, this is `limit`. Otherwise it is at most the angle at which the
+/// difference of the shifts causes this error.
 pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]) -> f64 {
     let off = shifts.iter().zip(exact);
     let off = off.filter_map(|(shift, exact)| Some((shift.as_ref()? - exact).abs()));
-    // omega errs by half as much as its square
+    // The relative error of omega is half that of its square.
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 
-/// Returns a column of the table [`THIRD_ORDER`] at h/R = `fill`, interpolated and converted from degrees to rad.
-/// Shallower liquid continues the power law of the first two rows, and deeper liquid has the last row's value.
+/// Returns a column of the table [`THIRD_ORDER`] at h/R = `fill`, interpolated and converted from degrees to rad. In
+/// shallower liquid than that of the table the power law of the first two rows is continued, and in deeper liquid the value
+/// is that of the last row.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {
@@ -203,8 +207,8 @@ fn degrees_at(fill: f64, column: usize) -> f64 {
     degrees.to_radians()
 }
 
-/// Returns the slosh angle, rad, at which rotary motion in an upright cylinder folds because of a secondary
-/// resonance; `None` in liquid so shallow that it has none.
+/// Returns the slosh angle, rad, at which the branch of rotary motion in an upright cylinder folds because of a secondary
+/// resonance; `None` in liquid so shallow that there is no secondary resonance.
 pub fn swirl_fold(fill: f64) -> Option<f64> {
     (fill >= FOLD[0][0]).then(|| interpolate(fill, FOLD).to_radians())
 }
@@ -215,12 +219,12 @@ fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
     y_0 + (y_1 - y_0) * (x - x_0) / (x_1 - x_0)
 }
 
-/// Largest spin number Omega^2 R/g at which the liquid of a tank that spins about its axis is
-/// modelled by pendulums. Omega is the spin rate, R the radius of the free surface.
+/// Largest spin number Omega^2 R/g at which pendulums represent the liquid of a tank that spins about its axis. Omega is the
+/// spin rate, and R the radius of the free surface.
 pub const SPIN_NUMBER: f64 = 0.3;
 
-/// Quantities of a tank's first mode that limit its spin: `factor` is 4 (1 + C_0), because the slower wave is
-/// among the inertial waves if this exceeds omega_0^2/Omega^2; `ratio` is R/l.
+/// Quantities of a tank's first mode that limit its spin. `factor` is 4 (1 + C_0): if it exceeds omega_0^2/Omega^2, the
+/// slower wave is among the inertial waves. `ratio` is R/l.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinLimit {
     factor: f64,
@@ -228,16 +232,15 @@ pub struct SpinLimit {
 }
 
 impl SpinLimit {
-    /// Creates the limits of a pendulum of this length in a tank with this radius of the free surface, m. If
-    /// the radius is unknown it is 0, and the liquid is taken as deep.
+    /// Creates the limits for a pendulum of this length, m, in a tank with this radius of the free surface, m. The radius is
+    /// 0 if it is unknown; the liquid then counts as deep.
     ///
-    /// The gyroscopic coefficient of the liquid is C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1), with the wave number k and
-    /// tanh kh = 1/(k l):
-    /// 0.418 in deep liquid and 0.837 in shallow liquid.
+    /// The gyroscopic coefficient of the liquid is C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1), with the wave number k and tanh kh
+    /// = 1/(k l). It is 0.418 in deep liquid and 0.837 in shallow liquid.
     pub fn new(length: f64, radius: f64) -> SpinLimit {
         let deep = 1.0 / XI[0];
         let ratio = if radius > 0.0 { radius / length } else { XI[0] };
-        // 1/(k l), below 1 except by rounding and in tanks that are no cylinders
+        // This is 1/(k l), which is below 1 except for rounding errors and in tanks that are not cylinders.
         let t = ratio * deep;
         let share = match t {
             t if t < 1e-3 => 1.0,
@@ -248,23 +251,21 @@ impl SpinLimit {
         SpinLimit { factor: 4.0 * (1.0 + gyroscopic), ratio }
     }
 
-    /// Returns the gyroscopic coefficient C_0 of the first mode. Seen from a tank that spins at the
-    /// rate Omega, a wave of the first mode has the frequencies C_0 Omega +- sqrt(C_0^2 Omega^2 +
-    /// omega_0^2), to the first order in Omega. A pendulum, which does not take part in the spin,
-    /// has the frequencies of this formula with C_0 = 1.
+    /// Returns the gyroscopic coefficient C_0 of the first mode. Seen from a tank that spins at the rate Omega, a wave of
+    /// the first mode has the frequencies C_0 Omega +- sqrt(C_0^2 Omega^2 + omega_0^2), to the first order in Omega. For a
+    /// pendulum, which does not take part in the spin, C_0 would be 1.
     pub fn gyroscopic_coefficient(&self) -> f64 {
         self.factor / 4.0 - 1.0
     }
 
-    /// Returns R/l, the radius of the free surface over the pendulum length. Multiplied by Omega^2/omega_0^2 it gives
-    /// the spin number Omega^2 R/g.
+    /// Returns R/l, the radius of the free surface divided by the pendulum length. R/l times Omega^2/omega_0^2 is the
+    /// spin number Omega^2 R/g.
     pub fn radius_over_length(&self) -> f64 {
         self.ratio
     }
 
-    /// Returns true if a pendulum does not represent liquid that spins with its tank at `rate`,
-    /// rad/s, about the tank's axis. `omega2`, 1/s^2, is the squared natural frequency without
-    /// spin.
+    /// Returns true if a pendulum does not represent liquid that spins with its tank at `rate`, rad/s, about the tank's
+    /// axis. `omega2`, 1/s^2, is the squared natural frequency without spin.
     ///
     /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the
     /// inertial waves of the liquid. Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by
@@ -311,7 +312,7 @@ mod tests {
     #[test]
     fn a_tank_without_a_forced_comparison_has_the_limits_of_the_most_unfavourable_cylinder() {
         let rows = || THIRD_ORDER.into_iter();
-        // the frequency's error grows with the square of the angle
+        // The error of the frequency grows with the square of the angle.
         let least_of = |fill: f64, planar: f64, has_energy: bool| {
             planar.min(swirl(fill, has_energy).map_or(planar, f64::to_degrees))
         };
@@ -331,9 +332,9 @@ mod tests {
         assert!((compared.to_radians() / LARGEST_FORCED_ENERGY - 1.0).abs() < 1e-12);
     }
 
-    /// In fully nonlinear potential flow the frequency of planar motion differs from a pendulum's
-    /// by 0.3 % at the slosh angles 1.6, 3.5, 8.3 and 7.8 degrees for h/R = 0.25, 0.35, 1.227 and
-    /// 2. The term of the next order in the angle changes these angles by at most 0.3 degrees.
+    /// In fully nonlinear potential flow the frequency of planar motion differs from a pendulum's by 0.3 % at the slosh
+    /// angles 1.6, 3.5, 8.3 and 7.8 degrees for h/R = 0.25, 0.35, 1.227 and 2. The term of the next order changes these
+    /// angles by at most 0.3 degrees.
     #[test]
     fn the_range_of_a_pendulum_ends_where_the_third_order_differs_from_it() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {
@@ -341,7 +342,7 @@ mod tests {
             assert!((limit - exact).abs() < 0.3, "{fill}: {limit} {exact}");
         }
         let linear = cylinder(1.227, [Some(0.0), None]);
-        // -0.429 A^2/2 = -0.003
+        // The limit follows from -0.429 A^2/2 = -0.003.
         assert!((linear.frequency.to_degrees() - 6.78).abs() < 0.01, "{linear:?}");
         assert!(linear.forced < linear.frequency);
     }
@@ -357,8 +358,8 @@ mod tests {
     }
 
     /// An upright tank with R = 0.3 m and h = 0.4 m at 5 m/s2 that spins at 9 rad/s is out of range: 2 Omega/omega_0 is 3.3
-    /// (limit 1/sqrt(1 + C_0), between 0.7 and 0.9), and Omega^2 R/g is 4.86 (limit 0.3). At 0 and 0.1 rad/s the tank is in
-    /// range.
+    /// (the limit 1/sqrt(1 + C_0) is between 0.7 and 0.9), and Omega^2 R/g is 4.86 (the limit is 0.3). At 0 and 0.1 rad/s
+    /// the tank is in range.
     #[test]
     fn a_spinning_tank_is_out_of_range_where_inertial_waves_occur_or_the_paraboloid_is_deep() {
         let limit = |fill: f64| {
@@ -372,7 +373,8 @@ mod tests {
             let (found, _) = limit(fill);
             assert!((found.factor / 4.0 - 1.0 - c_0).abs() < 2e-4, "{fill} {found:?}");
         }
-        // The paraboloid's limit comes first in shallow liquid: omega_0 is small, and beta is not.
+        // In shallow liquid the limit of the paraboloid is reached first, because omega_0 is small although the
+        // spin number is not.
         let (found, omega2) = limit(2.0);
         let beta = libm::sqrt(SPIN_NUMBER * 5.0 / 0.3);
         assert!(

@@ -1,8 +1,8 @@
-//! Range of linear slosh theory, by the wave height at the wall over the radius R of the free
-//! surface (Rubaga's thesis, 2.3.5, after Dodge).
+//! Range of linear slosh theory, by the wave height at the wall divided by the radius R of the free surface (Rubaga's
+//! thesis, section 2.3.5, after Dodge).
 
-/// Class of a wave by the ratio of its height at the wall to the radius R of the free surface.
-/// Linear theory holds below 0.15; above 0.25 computed heights and forces are only indications.
+/// Class of a wave by its height at the wall divided by the radius R of the free surface. Below 0.15 linear theory is valid;
+/// above 0.25 computed heights and forces are only indications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Regime {

@@ -1,5 +1,5 @@
-//! Similarity of a bench and a flight tank: Bond numbers and Froude's factors (Rubaga's thesis 2.5, 2.6, 7.2). All
-//! quantities are in SI units.
+//! Similarity of a bench and a flight tank: Bond numbers and Froude's scale factors (Rubaga's thesis, sections 2.5, 2.6 and
+//! 7.2; the numbers in brackets are its equations). All quantities are in SI units.
 //!
 //! ```text
 //! Bo   = rho a R^2 / sigma          gravity or thrust against surface tension   (2.22, 2.27, 7.1)
@@ -24,9 +24,8 @@ impl Liquid {
         self.density * a * radius * radius / self.tension
     }
 
-    /// Returns Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from the axis.
-    /// With the square of an angular rate instead of the acceleration it is Bo_c; with the radius as the arm
-    /// it is Bo_r.
+    /// Returns the Bond number Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from the axis.
+    /// If `alpha` is the square of an angular rate instead, the result is Bo_c; if `arm` is the radius, it is Bo_r.
     pub fn rotational_bond(&self, alpha: f64, radius: f64, arm: f64) -> f64 {
         self.bond(alpha * arm, radius)
     }
@@ -35,8 +34,8 @@ impl Liquid {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// Returns the time scale sqrt(rho L^3/sigma) on which surface tension moves liquid over the
-    /// length L, m (equation 2.29). It is not the period of an oscillation.
+    /// Returns the time sqrt(rho L^3/sigma) in which surface tension moves liquid over the length L, m (equation 2.29). It
+    /// is not the period of an oscillation.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
@@ -58,14 +57,14 @@ pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// Returns the time scale sqrt(L/a) on which the acceleration a, m/s2, moves liquid over the length
-/// L, m (equation 2.28).
+/// Returns the time sqrt(L/a) in which the acceleration a, m/s2, moves liquid over the length L, m (equation 2.28).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }
 
-/// Names the dominant force among gravity, surface tension and inertia: the largest of Bo, 1 and We (the
-/// thesis's section 2.5). If inertia dominates, the liquid crosses the tank and no pendulum represents it.
+/// Returns a text with the dominant force among gravity, surface tension and inertia: the one that belongs to the
+/// largest of Bo, 1 and We (Rubaga's thesis, section 2.5). If inertia dominates, the liquid crosses the tank, and
+/// no pendulum represents it.
 pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     match (bond > 1.0, weber > 1.0) {
         (_, true) if weber > bond => {
@@ -76,8 +75,8 @@ pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     }
 }
 
-/// Describes the behaviour of a liquid at a Bond number. The limits, from the thesis's section 2.5, are
-/// approximate.
+/// Returns a text on the behaviour of a liquid at a Bond number. The limits between the texts are approximate
+/// (Rubaga's thesis, section 2.5).
 pub fn regime(bond: f64) -> &'static str {
     match bond {
         b if b > 1000.0 => "high g: flat surface, linear and weakly nonlinear models hold",
@@ -87,8 +86,8 @@ pub fn regime(bond: f64) -> &'static str {
     }
 }
 
-/// Describes the agility of a spacecraft with this angular acceleration, rad/s2, in the words of the thesis's
-/// Table 2.2.
+/// Returns a text on the agility of a spacecraft with this angular acceleration, rad/s2, in the words of Table
+/// 2.2 of Rubaga's thesis.
 pub fn agility(alpha: f64) -> &'static str {
     match alpha {
         a if a < 5e-5 => "low agility",
@@ -97,9 +96,9 @@ pub fn agility(alpha: f64) -> &'static str {
     }
 }
 
-/// Returns Froude's scale factors from model to full size, each with the quantity's name and unit. `lambda`
-/// is the ratio of lengths, `density` of densities and `gravity` of accelerations, each full size over model.
-/// The thesis's Table 2.3 has gravity = 1.
+/// Returns Froude's scale factors from model to full size, each with name and unit of its quantity. `lambda` is the ratio of
+/// lengths, `density` of densities and `gravity` of accelerations, each full size divided by model. In Table 2.3 of Rubaga's
+/// thesis gravity = 1.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'static str, f64); 10] {
     let volume = lambda * lambda * lambda;
     let force = volume * density * gravity;
@@ -118,8 +117,8 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'stat
     ]
 }
 
-/// Returns the ratio of the kinematic viscosities of full size and model that would give both the same
-/// Reynolds number. Froude scaling alone does not preserve it.
+/// Returns the ratio of kinematic viscosities, full size divided by model, for which both have the same Reynolds number.
+/// Froude scaling alone does not preserve the Reynolds number.
 pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
     lambda * sqrt(lambda * gravity)
 }
@@ -136,7 +135,7 @@ mod tests {
         assert_eq!(liquid.acceleration(bond, 0.25), 0.5);
         assert_eq!(liquid.radius(bond, 0.5), 0.25);
         assert_eq!(liquid.rotational_bond(2.0, 0.25, 0.25), bond);
-        // a cube root, to its last digit
+        // The result is a cube root, exact to its last digit.
         assert!((liquid.radius_by_cube(bond, 2.0) - 0.25).abs() < 1e-16);
     }
 

@@ -1,17 +1,17 @@
-//! The first mode in an upright cylinder to third order in its amplitude, without fitted numbers. The
-//! model is a mass m on a paraboloid with a quartic spring, both functions of the fill,
+//! The first mode in an upright cylinder to third order in its amplitude, without fitted numbers. The model is a mass m on a
+//! paraboloid with a quartic spring. Its coefficients s and kappa are functions of the fill:
 //!
 //! ```text
 //! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s (q.q')^2/l^2]/2
 //!     + m (g/l) [|q|^2/2 + kappa |q|^4/(8 l^2)]
 //! ```
 //!
-//! The amplitude a l changes omega^2 of a planar motion by the factor 1 + (3 kappa/8 - s/2) a^2. The factor of a circular
-//! motion is 1 + (kappa/2) a^2. A pendulum has s = kappa = 1. Here s and kappa are chosen so that both shifts are those
-//! of potential flow. `harness/tank/src/third_order.rs` derives them and computes them by another method;
-//! tests/physics/liquid.rs compares. The closed form below has R = g = 1, T = xi_1 tanh(xi_1 h) = omega_1^2. It sums
-//! over the modes with azimuthal numbers 0 and 2 that the square of the first mode excites (zero xi, overlap e, t = xi
-//! tanh(xi h)):
+//! At the amplitude a l the squared frequency omega^2 of planar motion changes by the factor 1 + (3 kappa/8 - s/2) a^2, and
+//! that of circular motion by the factor 1 + (kappa/2) a^2. A pendulum has s = kappa = 1. Here s and kappa are chosen so
+//! that both shifts are those of potential flow. `harness/tank/src/third_order.rs` derives them and computes them by another
+//! method, and tests/physics/liquid.rs compares the results. The closed form below is for R = g = 1, with T = xi_1 tanh(xi_1
+//! h) = omega_1^2. The sums are over the modes with azimuthal numbers 0 and 2 that the square of the first mode excites
+//! (zero xi, overlap e, t = xi tanh(xi h)):
 //! ```text
 //! A = xi_1^2 - xi^2/2 - T^2,   F = xi^2/2 - T t
 //! static  = e A^2/(16 T^2),    carried = e T t/8
@@ -20,21 +20,21 @@
 //! circular = -4 B { xi_1^2 M/8 + sum_0 static + sum_2 (driven/2 - carried) }
 //! ```
 //!
-//! At t = 4 T an excited mode has twice the frequency. Near this secondary resonance the third
+//! At t = 4 T an excited mode has twice the frequency of the first mode. Near this secondary resonance the third
 //! order is not valid.
 
 use crate::cylinder::XI;
 
-/// Integral M = int J1(xi_1 r)^4 r dr/int J1(xi_1 r)^2 r dr of the first mode's shape over the
-/// section of a cylinder of radius 1.
+/// Integral M = int J1(xi_1 r)^4 r dr/int J1(xi_1 r)^2 r dr of the first mode's shape over the cross-section of a
+/// cylinder of radius 1.
 const M: f64 = 0.278_821_981_660_245_8;
 
-/// Squared amplitude of the wave per squared slosh angle, B = (2/((xi_1^2 - 1) J1(xi_1)))^2.
+/// Squared amplitude of the wave divided by the squared slosh angle, B = (2/((xi_1^2 - 1) J1(xi_1)))^2.
 const B: f64 = 2.068_401_064_148_324;
 
 /// Modes that the first mode excites, for the azimuthal numbers 0 and 2: the zero xi of each mode and its coupling e =
-/// c^2/(n n_1) with the first mode, where c = int J1^2 J r dr, n = int J^2 r dr and n_1 = int J1^2 r dr. Leaving out
-/// higher modes changes s and kappa by less than 1e-4 from h/R 0.2 on.
+/// c^2/(n n_1) with the first mode, where c = int J1^2 J r dr, n = int J^2 r dr and n_1 = int J1^2 r dr. The modes that are
+/// left out would change s and kappa by less than 1e-4 from h/R = 0.2 on.
 const EXCITED: [[(f64, f64); 8]; 2] = [
     [
         (3.831_705_970_207_513, 4.011_801_530_216_258e-2),
@@ -58,21 +58,20 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
     ],
 ];
 
-/// Relative distance of 2 omega_1 from the frequency of an excited mode within which the third order is not
-/// valid.
+/// Relative difference between 2 omega_1 and the frequency of an excited mode, below which the third order is not valid.
 const DETUNING: f64 = 0.01;
 
-/// Range of fills h/R in which the coefficients are interpolated, because the modes (2,2) and (0,2) resonate
-/// with twice the frequency of mode 1 at 0.831 and 1.010.
+/// Range of fills h/R in which the coefficients are interpolated, because twice the frequency of mode 1 is a frequency of
+/// mode (2,2) at 0.831 and of mode (0,2) at 1.010.
 pub const BRIDGED: [f64; 2] = [0.70, 1.20];
 
 /// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of the first mode of an upright cylinder
 /// filled to h/R = `fill`.
 ///
-/// Within [`BRIDGED`] the third-order theory has poles, and close to a pole it is valid only at very small
-/// amplitudes. Both coefficients are therefore interpolated linearly between the ends of that range. With the
-/// interpolated coefficients, the frequencies differ from fully nonlinear potential flow at h/R = 0.8 and 1.0 by at
-/// most 0.3 % up to 16 degrees. A pendulum, in contrast, is 26 % too low in a forced response at h/R = 1.0.
+/// Within [`BRIDGED`] the third-order theory has poles, and close to a pole it is valid only at very small amplitudes. Both
+/// coefficients are therefore interpolated linearly between the ends of this range. With the interpolated coefficients, the
+/// frequencies at h/R = 0.8 and 1.0 differ from fully nonlinear potential flow by at most 0.3 % up to 16 degrees. In
+/// contrast, the forced response of a pendulum is 26 % too low at h/R = 1.0.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let [low, high] = BRIDGED;
     if fill <= low || fill >= high {
@@ -89,8 +88,8 @@ pub fn shifts(s: f64, kappa: f64) -> [f64; 2] {
     [0.375 * kappa - 0.5 * s, 0.5 * kappa]
 }
 
-/// Returns the large-wave coefficients s and kappa of third-order theory at h/R = `fill` without the interpolation of
-/// [`coefficients`], so that they grow without bound near 0.831 and 1.010.
+/// Returns the large-wave coefficients s and kappa of third-order theory at h/R = `fill`, without the interpolation of
+/// [`coefficients`]. They grow without bound near 0.831 and 1.010.
 pub fn unbridged(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     let k2 = XI[0] * XI[0];
@@ -112,8 +111,8 @@ pub fn unbridged(fill: f64) -> (f64, f64) {
     (1.5 * circular - 2.0 * planar, 2.0 * circular)
 }
 
-/// Returns azimuthal number and radial number, which counts from 1, of the excited mode whose frequency is twice the
-/// first mode's frequency within [`DETUNING`] at h/R = `fill`, if there is one.
+/// Returns azimuthal number and radial number (which counts from 1) of an excited mode whose frequency is twice the first
+/// mode's frequency within [`DETUNING`] at h/R = `fill`; `None` if there is no such mode.
 pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
@@ -139,10 +138,9 @@ mod tests {
         }
     }
 
-    /// The expected values are twelve digits of the same shifts by another method, Lagrange's averaged
-    /// function: its stationary values follow from solving for the excited modes, with integrals by Gauss's
-    /// rule and Bessel functions by their integral. They check sign and magnitude of every term, also close
-    /// to the resonance at 0.15.
+    /// The expected values have twelve digits. They are the same shifts, computed by Lagrange's averaged function: its
+    /// stationary values follow from solving for the excited modes, with integrals by Gauss's rule and Bessel functions by
+    /// their integral. They verify sign and magnitude of every term, also close to the resonance at 0.15.
     #[test]
     fn third_order_coefficients_equal_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [
@@ -170,7 +168,7 @@ mod tests {
         }
     }
 
-    /// At h/R = 0.831 twice the frequency of mode 1 is the frequency of mode (2,2), at 1.01 of mode (0,2).
+    /// Twice the frequency of mode 1 is the frequency of mode (2,2) at h/R = 0.831, and that of mode (0,2) at 1.01.
     #[test]
     fn a_depth_with_a_secondary_resonance_is_reported_with_the_resonant_mode() {
         assert_eq!(secondary_resonance(0.831), Some((2, 2)));

@@ -1,16 +1,16 @@
-//! Frequencies of an upright cylinder's slosh modes under gravity that is tilted from its axis.
+//! Frequencies of the slosh modes of an upright cylinder whose axis is tilted from gravity.
 //!
-//! Gravity has the component g along the axis and g s across it, with s the tangent of the tilt. At rest the surface is the plane
-//! z = s x, with x in the direction of gravity's component across the axis. The depth in the middle is that of the upright tank.
-//! With Lambda = omega^2/g
+//! Gravity has the component g along the axis and g s across it, where s is the tangent of the tilt angle. The surface at
+//! rest is the plane z = s x, with x in the direction of gravity's component across the axis. The depth in the middle is
+//! that of the upright tank. With Lambda = omega^2/g
 //!
 //! ```text
 //! Laplace(phi) = 0,   dphi/dn = 0 on the wetted wall,   dphi/dz - s dphi/dx = Lambda phi at z = s x
 //! ```
 //!
-//! so that Lambda makes K - Lambda M singular. By Green's identity `K_ij = int_D phi_i (phi_j,z - s phi_j,x)` and
-//! `M_ij = int_D phi_i phi_j`, over the section D of the tank, both at z = s x. Here g times the surface element equals
-//! that of gravity along the normal. The modes of the upright tank, `J_m(xi r) cos(m theta) cosh(xi (z + h))/cosh(xi h)`
+//! so that K - Lambda M is singular. By Green's identity `K_ij = int_D phi_i (phi_j,z - s phi_j,x)` and `M_ij = int_D phi_i
+//! phi_j`, both at z = s x over the cross-section D of the tank. Here g times the element of D equals gravity along the
+//! normal times the surface element. The modes of the upright tank, `J_m(xi r) cos(m theta) cosh(xi (z + h))/cosh(xi h)`
 //! with the zeros xi of J_m', satisfy the wall condition for every s. Expansion to s^2 and Rayleigh-Schroedinger
 //! perturbation of the mode a = xi_n of m = 1 give
 //!
@@ -24,18 +24,17 @@
 //! N_2 = 2 (a^2 b^2 - a^2 - b^2) - lambda^2 (a^2 + b^2 - 4)
 //! ```
 //!
-//! Integrals of products of Bessel functions are Lommel's. We derived the formulas with the method of Kato,
-//! Perturbation Theory for Linear Operators (1966), chapter II. The tests compare with finite elements in three
-//! dimensions.
+//! The integrals of products of Bessel functions are Lommel's. We derived the formulas by the method of Kato, Perturbation
+//! Theory for Linear Operators (1966), chapter II. The tests compare them with finite elements in three dimensions.
 
 use crate::cylinder::XI;
 
 /// Number of modes of each azimuthal number in the sums. With all modes c would change by less than 1e-6 of its value for
-/// mode 1, and by 0.003 for mode 10 (from h/R = 0.2 on).
+/// mode 1, and by 0.003 for mode 10 (for h/R from 0.2 on).
 const ZEROS: usize = 16;
 
-/// Zeros of J0', the derivative of the Bessel function J0, that follow the zero at 0. The zeros of
-/// J2' are in `XI_2` below.
+/// Zeros of J0', the derivative of the Bessel function J0, that follow the zero at 0. `XI_2` below contains the zeros of
+/// J2'.
 const XI_0: [f64; ZEROS] = [
     3.831_705_970_207_512_5,
     7.015_586_669_815_619,
@@ -73,9 +72,8 @@ const XI_2: [f64; ZEROS] = [
     51.004_297_672_458_87,
 ];
 
-/// Returns the slope s of the surface up to which [`factors`] gives the frequency of the first mode within 1
-/// % at h/R = `fill`. At half of this slope the error is 0.15 %. If the slope reaches h/R, the bottom falls
-/// dry.
+/// Returns the slope s of the surface up to which the error of [`factors`] for the frequency of the first mode is at most 1
+/// % at h/R = `fill`. At half of this slope the error is 0.15 %. If the slope reaches h/R, a part of the bottom is dry.
 pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
@@ -114,8 +112,8 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
 /// for motion along the slope and across it. The surface has the slope s, and the gravity g along the axis is
 /// unchanged.
 ///
-/// The factor is 1 + c s^2. For negative c it is 1/(1 - c s^2), which equals it to second order, is more
-/// accurate beyond, and never becomes negative.
+/// The factor is 1 + c s^2. If c is negative, it is 1/(1 - c s^2), which is equal to second order, more accurate at larger
+/// slopes, and never negative.
 pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
     coefficients(n, fill).map(|c| {
         let x = c * slope * slope;
@@ -127,10 +125,10 @@ pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Rows of h/R, slope, and the change of Lambda relative to the upright tank, of the first mode along the
-    /// slope and across it. The values come from finite elements in three dimensions, `hubslosh.liquid_modes`
-    /// (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for R = 1 and the fill h cos + sin of the tilt. Two
-    /// meshes differ by up to 4e-4; upright they are within 1.4e-4 of tanh.
+    /// Each row contains h/R, the slope, and the change of Lambda of the first mode relative to the upright tank, along the
+    /// slope and across it. The values were computed by finite elements in three dimensions, `hubslosh.liquid_modes`
+    /// (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for R = 1 and the fill h cos + sin of the tilt. Results of two
+    /// meshes differ by up to 4e-4; for the upright tank they agree with tanh within 1.4e-4.
     const FINITE_ELEMENTS: [(f64, f64, [f64; 2]); 12] = [
         (0.35, 0.0525, [-0.00382, -0.00129]),
         (0.35, 0.1225, [-0.02139, -0.00764]),
@@ -146,8 +144,8 @@ mod tests {
         (3.0, 0.7, [-0.15777, 0.10438]),
     ];
 
-    /// At small tilts the tolerance is the difference of the two meshes. At larger tilts it is the stated error of the
-    /// frequency, which is half the stated error of Lambda.
+    /// At small tilts the tolerance is the difference of the results of two meshes. At larger tilts it is the stated error
+    /// of the frequency, which is half the error of Lambda.
     #[test]
     fn frequencies_equal_those_of_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {
@@ -164,8 +162,8 @@ mod tests {
         }
     }
 
-    /// At the slope 0.2 the factors of the second mode equal those of finite elements on two meshes, which differ from each other by 0.009
-    /// of Lambda for the upright and for the tilted cylinder.
+    /// At the slope 0.2 the factors of the second mode agree with finite elements on two meshes, whose results differ by
+    /// 0.009 of Lambda for the upright and for the tilted cylinder.
     #[test]
     fn the_second_mode_changes_as_by_finite_elements() {
         for (fill, change) in [
@@ -178,9 +176,8 @@ mod tests {
         }
     }
 
-    /// The coefficients equal sums that are evaluated without a closed form: by Simpson's rule from
-    /// the expansion of the matrices K and M, with the error (b/2000)^4/180 for the zero b of J_0'
-    /// or J_2'.
+    /// The coefficients equal sums that are computed without a closed form, by Simpson's rule from the expansion of the
+    /// matrices K and M. The error is (b/2000)^4/180 for the zero b of J_0' or J_2'.
     #[test]
     fn coefficients_of_a_tilted_cylinder_equal_the_perturbation_integrals_by_quadrature() {
         const N: usize = 2000;
@@ -194,8 +191,8 @@ mod tests {
             let u = |r: f64| libm::j1(a * r);
             let d = |r: f64| a * (libm::jn(0, a * r) - libm::jn(2, a * r)) / 2.0;
             let u_r = |r: f64| a * (libm::jn(0, a * r) + libm::jn(2, a * r)) / 2.0; // u/r
-            // divided by pi: norm; x^2 psi^2 and x psi psi_x with the angle's 3/4 and 1/4 or 1/4
-            // and -1/4
+            // Integrals divided by pi: the norm, and those of x^2 psi^2 and x psi psi_x, in which the angle contributes 3/4
+            // and 1/4, or 1/4 and -1/4.
             let norm = integral(&|r| r * u(r) * u(r));
             let (u2, ud, uu) = (
                 integral(&|r| r * r * r * u(r) * u(r)),
@@ -225,17 +222,17 @@ mod tests {
         }
     }
 
-    /// Short waves do not reach the bottom. The surface is longer by the root of 1 + s^2 along the slope, and
-    /// g is larger by the same factor. For waves whose directions are distributed as cos^2 of the angle, the
-    /// coefficient of the frequency's change is 1/8 for modes along the slope and 3/8 across it. Mode 10 differs by 0.003.
+    /// Short waves do not reach the bottom. Along the slope the surface is longer by the root of 1 + s^2, and g is larger by
+    /// the same factor. For waves whose directions are distributed as cos^2 of the angle, the coefficient of the frequency's
+    /// change is 1/8 for modes along the slope and 3/8 across it. Mode 10 differs from this by 0.003.
     #[test]
     fn high_modes_are_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);
         assert!((along - 0.125).abs() < 0.01 && (across - 0.375).abs() < 0.01, "{along} {across}");
     }
 
-    /// In a cylinder whose axis leans from gravity no mode has a negative squared frequency, for
-    /// surface slopes up to 14.
+    /// In a cylinder whose axis is tilted from gravity no mode has a negative squared frequency, for surface
+    /// slopes up to 14.
     #[test]
     fn zero_tilt_changes_nothing_and_no_frequency_is_negative() {
         assert_eq!(factors(0, 1.0, 0.0), [1.0; 2]);
@@ -252,7 +249,7 @@ mod tests {
     fn zeros_equal_those_of_the_derivative_of_the_bessel_function() {
         for (b, b_2) in XI_0.into_iter().zip(XI_2) {
             assert!(libm::j1(b * (1.0 - 1e-15)) * libm::j1(b * (1.0 + 1e-15)) < 0.0, "{b}");
-            // J2' = J1 - 2 J2/x
+            // The derivative is J2' = J1 - 2 J2/x.
             let slope = |x: f64| libm::j1(x) - 2.0 * libm::jn(2, x) / x;
             assert!(slope(b_2 * (1.0 - 4e-15)) * slope(b_2 * (1.0 + 4e-15)) < 0.0, "{b_2}");
         }

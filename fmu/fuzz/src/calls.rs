@@ -1,7 +1,7 @@
-//! Fuzzes the C interface of FMI 2.0 or 3.0. A hostile host in C (`host.c`) makes calls in any
-//! order; random bytes choose the calls and their arguments.
+//! Fuzzing of the C interface of FMI 2.0 or 3.0. A hostile host in C (`host.c`) makes calls in any order; random bytes
+//! determine the calls and their arguments.
 
-// This module has one call of a C function.
+// This module calls one C function, which is unsafe.
 #![allow(unsafe_code)]
 
 use std::ffi::{CString, c_char};
@@ -19,16 +19,16 @@ struct HostFmu {
 }
 
 unsafe extern "C" {
-    /// Runs the hostile host in `host.c`. The strings with GUID and token in `fmu` must end with
-    /// NUL, and `data` must have `size` bytes.
+    /// Runs the hostile host in `host.c`. The strings of GUID and token in `fmu` must end with NUL, and `data`
+    /// must have `size` bytes.
     fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
 }
 
-/// Runs the hostile host of `host.c`, whose calls `data` chooses, against the FMU with which this
-/// program is linked. It must be the FMU of the model `M`.
+/// Runs the hostile host of `host.c` against the FMU with which this program is linked. `data` determines the calls. The FMU
+/// must be that of the model `M`.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
-    // Inputs for FMI 3.0 have an odd first byte; every fourth of them is for the FMU with arrays.
+    // The first byte of an input for FMI 3.0 is odd; every fourth of these inputs is for the FMU with arrays.
     let with_arrays = data.first().is_some_and(|first| first % 8 == 7);
     let layout = if with_arrays { Layout::Arrays } else { Layout::Scalars };
     let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token(layout)));

@@ -1,5 +1,5 @@
-//! Makes one sequence of calls by hosts with different clocks: multiplied, accumulated, off by a unit in the
-//! last place, or started at 1e9 s. All of them must get the same outputs.
+//! Fuzzing with hosts that make the same sequence of calls with different clocks: multiplied, accumulated, wrong by a unit
+//! in the last place, or started at 1e9 s. All of them must get the same outputs.
 
 use arbitrary::{Result, Unstructured};
 
@@ -95,12 +95,12 @@ impl Clock {
 
 type Rows = Vec<Vec<f64>>;
 
-/// Runs one case. The first byte chooses the FMI version, the interface, and who handles events; the other
-/// bytes choose parameters and calls. Panics if two hosts get different outputs.
+/// Runs one input. The first byte determines the FMI version, the interface, and who handles events; the other bytes
+/// determine parameters and calls. Panics if two hosts get different outputs.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((how, data)) = data.split_first() else { return };
     let data = &mut Unstructured::new(data);
-    // The run ends when the bytes are used up.
+    // The simulation ends when no bytes are left.
     _ = match how % 5 {
         0 => compare::<M, Fmi2>((Interface::CoSimulation, Events::InStep), data),
         1 => compare::<M, Fmi3>((Interface::CoSimulation, Events::InStep), data),
@@ -118,7 +118,7 @@ fn compare<M: Model, V: Values>(
     let mut settings = data.choose(&settings(table.about.model))?.clone();
     let tick = *data.choose(&[0.005, 1.0 / 128.0, 0.01])?;
     if table.find("imu.rate").is_some() {
-        // On the grid of the communication points; in Co-Simulation also between them.
+        // The time is a multiple of the communication step, and in Co-Simulation also a fraction of it.
         let ticks = f64::from(data.int_in_range(1..=6)?);
         let is_between = interface == Interface::CoSimulation && data.ratio(1, 3)?;
         let rate = if is_between { 37.3 } else { 1.0 / (ticks * tick) };
@@ -143,15 +143,20 @@ fn compare<M: Model, V: Values>(
         let off = play(clock);
         let what =
             || format!("{interface:?}, {events:?}, {kind:?}, {start:?}, {settings:?}, {calls:?}");
-        assert_eq!(off.len(), same_steps.len(), "another number of steps: {}", what());
+        assert_eq!(
+            off.len(),
+            same_steps.len(),
+            "the hosts made different numbers of steps: {}",
+            what()
+        );
         for (n, scalar) in outputs::<M>().enumerate() {
-            // A sample is due at the end of a step that is shorter by the rounding at 1e9 s, but not at the
-            // end of a step that is known to be shorter by as much.
+            // A gyro sample is due at the end of a step that is shorter because of the rounding at 1e9 s. It is not due at
+            // the end of a step whose size is smaller by the same amount.
             let is_sampled = scalar.variable.name == "omega_imu" && has_own_steps;
             let exact = if is_sampled { &even_steps } else { same_steps };
             let is_placed = is_sampled || interface == Interface::ModelExchange;
             let mut allowed = allowed(exact, n, tick, is_placed, start);
-            // An output whose value is a time of the host.
+            // This output is a time of the host's clock.
             let is_time = scalar.variable.name == "event_time";
             let begin = if is_time { start } else { 0.0 };
             allowed += if is_time { last_digits(start) } else { 0.0 };
@@ -170,9 +175,9 @@ fn compare<M: Model, V: Values>(
     Ok(())
 }
 
-/// Returns the difference of output number `n` that two hosts may have: 1e-9 of its magnitude. If the host's
-/// clock determines the ends of steps (Model Exchange, samples; `is_placed`), the rounding of its times
-/// multiplied by the output's fastest change is added, because a unit in the last place is 1.2e-7 s at 1e9 s.
+/// Returns the difference of output number `n` that two hosts may have: 1e-9 of its magnitude. If the host's clock
+/// determines the ends of steps (`is_placed`: Model Exchange, samples), the rounding error of its times multiplied by the
+/// output's fastest change is added, because a unit in the last place is 1.2e-7 s at 1e9 s.
 fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64 {
     let size = rows.iter().fold(1.0f64, |most, row| most.max(row[n].abs()));
     let pairs = rows.windows(2).map(|pair| (pair[1][n] - pair[0][n]).abs());
@@ -184,8 +189,8 @@ fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
 
-/// Lists outputs and local variables. Derivatives of states are left out, because they are slow to read one
-/// by one and follow from the states.
+/// Iterates over outputs and local variables, except for derivatives of states, which are slow to read one by one and
+/// follow from the states.
 fn outputs<M: Model>() -> impl Iterator<Item = &'static Scalar<M>> {
     let is_shown = |s: &&Scalar<M>| {
         matches!(s.variable.causality, Causality::Output | Causality::Local)
@@ -241,8 +246,8 @@ fn begin<M: Model, V: Values>(
     Some(instance)
 }
 
-/// Makes a call that exists in both interfaces. Returns the instance with which the run continues, which may
-/// be a deserialised one.
+/// Makes a call that exists in both interfaces. Returns the instance with which the simulation continues, which
+/// may have been deserialised.
 fn common<M: Model, V: Values>(mut instance: Instance<M, V>, call: Call) -> Instance<M, V> {
     let table = M::table();
     match call {
@@ -329,7 +334,7 @@ fn step_all<M: Model, V: Values>(
                 }
                 at = clock.name(instance.time());
                 h = end - at;
-                // The end is reached except for the host's rounding.
+                // The end is reached, except for the host's rounding error.
                 if h <= 0.0 {
                     break;
                 }
@@ -357,7 +362,7 @@ fn model_exchange<M: Model, V: Values>(
     rows.extend(read(&mut instance));
     for call in calls {
         let Call::Step(ticks) = *call else {
-            // Inputs are discontinuous at events.
+            // Inputs may jump at events.
             instance.enter_event_mode().expect("allowed");
             instance = common(instance, *call);
             let Ok(info) = instance.new_discrete_states() else { return rows };
@@ -365,7 +370,7 @@ fn model_exchange<M: Model, V: Values>(
             instance.enter_continuous_time_mode().expect("allowed");
             continue;
         };
-        // Short enough for Euler's method.
+        // The step is so short that Euler's method is accurate enough.
         for _ in 0..ticks {
             let h = clock.tick;
             instance.event_indicators(&mut indicators[0]).expect("allowed");
@@ -386,7 +391,7 @@ fn model_exchange<M: Model, V: Values>(
             let Ok(wanted) = instance.completed_integrator_step() else { return rows };
             let [before, after] = &indicators;
             let crossed = before.iter().zip(after).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
-            // The host is at this time or nearly so; some hosts are early by a rounding error.
+            // The host is at the time of the event, or before it by a rounding error.
             let due = next.is_some_and(|next| next <= now + 0.01 * h);
             if wanted || crossed || due {
                 instance.enter_event_mode().expect("allowed");

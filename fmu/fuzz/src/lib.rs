@@ -1,7 +1,5 @@
-//! Functions for the fuzzer that exercise an instance of any model with random bytes. The tests call them
-//! too.
-//!
-//! They panic if the instance violates its contract, for any bytes.
+//! Fuzz targets that exercise an instance of any model with random bytes. The tests call them, too. They panic if the
+//! instance violates its contract, whatever the bytes are.
 
 #[cfg(feature = "libfuzzer")]
 pub mod calls;
@@ -20,11 +18,10 @@ use runtime::v3::{self, Fmi3};
 use runtime::variable::{Access, Causality, Kind, Value};
 use runtime::version::Version;
 
-/// Runs the fuzz target that the environment variable `HUBSLOSH_FUZZ_TARGET` names.
+/// Runs the fuzz target whose name is in the environment variable `HUBSLOSH_FUZZ_TARGET`.
 ///
 /// # Panics
-///
-/// If the variable names no target, or the FMU violates its contract.
+/// If the variable does not contain the name of a target, or the FMU violates its contract.
 #[cfg(feature = "libfuzzer")]
 pub fn run<M: Model>(data: &[u8]) {
     static TARGET: std::sync::OnceLock<fn(&[u8])> = std::sync::OnceLock::new();
@@ -38,9 +35,8 @@ pub fn run<M: Model>(data: &[u8]) {
     target(data);
 }
 
-/// Returns the sizes that the hostile host needs in addition to GUID and token (`host.h`): the numbers of
-/// scalar variables, outputs, continuous states and event indicators, and the value reference of the first
-/// input in FMI 3.0.
+/// Returns the numbers that the hostile host needs in addition to GUID and token (`host.h`): the numbers of scalar
+/// variables, outputs, continuous states and event indicators, and the value reference of the first input in FMI 3.0.
 pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     let table = M::table();
     if layout == Layout::Arrays {
@@ -56,8 +52,8 @@ pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     [table.scalars.len(), outputs, states, table.about.event_indicators, input as usize]
 }
 
-/// Names of the calls that get and set values in one version of FMI, for reals, integers,
-/// enumerations and Booleans in this order.
+/// The functions of one version of FMI that get and set values, for reals, integers, enumerations and Booleans in this
+/// order.
 pub trait Values: Version {
     const GET: [&'static Call; 4];
     const SET: [&'static Call; 4];
@@ -128,8 +124,8 @@ fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
 fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let shown = |scalar: &&Scalar<M>| {
         matches!(scalar.variable.causality, Causality::Output | Causality::Local)
-            // Derivatives are read one by one from all states together, which is slow, and their errors show
-            // in the states.
+            // Derivatives are left out: each is computed from all states together, which is slow, and their errors are
+            // visible in the states.
             && !matches!(scalar.variable.access, Access::Derivative(_))
     };
     for scalar in M::table().scalars.iter().filter(shown) {
@@ -141,15 +137,14 @@ fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     }
 }
 
-/// Serialises an instance, deserialises it, and checks that it serialises to the same bytes again. Returns
-/// the new instance.
+/// Serialises an instance, deserialises it, and checks that it is serialised to the same bytes again. Returns the new
+/// instance.
 ///
 /// # Panics
-///
 /// If the bytes are refused or differ.
 fn survives_being_saved<M: Model, V: Version>(instance: &Instance<M, V>) -> Instance<M, V> {
     let bytes = to_bytes(instance);
     let again = from_bytes(&bytes).unwrap_or_else(|why| panic!("own bytes are refused: {why}"));
-    assert!(to_bytes(&again) == bytes, "bytes that were read are written otherwise");
+    assert!(to_bytes(&again) == bytes, "a deserialised state is serialised to other bytes");
     again
 }

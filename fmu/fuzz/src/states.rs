@@ -1,5 +1,5 @@
-//! Fuzzes saved states that were modified and given a new checksum: deserialising them must be refused or
-//! give an instance that works as any other, and must never panic.
+//! Fuzzing of saved states that were modified and have a valid checksum. Deserialising them must either be refused or give
+//! an instance that works as any other. It must never panic.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -18,9 +18,9 @@ use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_
 
 const CHECKSUM: usize = 16;
 
-/// Runs one case. The first byte chooses the FMI version and the saved state. Patches follow, each a place
-/// (two bytes), a length (one byte) and that many bytes of new content. If the first byte is 255, the
-/// remaining bytes are themselves used as a saved state.
+/// Runs one input. The first byte determines the FMI version and the saved state. Modifications follow, each with a
+/// position (two bytes), a length (one byte) and this number of bytes of new content. If the first byte is 255, the other
+/// bytes are the saved state.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((which, patches)) = data.split_first() else { return };
     if *which == u8::MAX {
@@ -50,7 +50,7 @@ fn damaged<M: Model, V: Values>(which: usize, mut patches: &[u8]) {
     bytes[body..].copy_from_slice(&checksum);
     let Ok(read) = from_bytes::<M, V>(&bytes) else { return };
     let read = survives_being_saved(&read);
-    // The state's host must handle events in the same way as the instance's host.
+    // The saved state and the instance must handle events in the same way.
     let mut instance = lives::<V>()
         .filter(|(interface, _)| *interface == read.interface())
         .map(|(interface, events)| Instance::with_events(interface, events))
@@ -67,8 +67,8 @@ fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     all.filter(|(interface, events)| V::allows(*interface, *events))
 }
 
-/// Continues the simulation as a host might. The FMU may refuse calls, but after a successful step all values
-/// must be finite.
+/// Continues the simulation as a host could. The FMU may refuse calls, but after a successful step all values must be
+/// finite.
 fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let table = M::table();
     for input in table.inputs() {
@@ -116,8 +116,8 @@ fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     survives_being_saved(instance);
 }
 
-/// Returns saved states of an FMU for both interfaces, Co-Simulation and Model Exchange, with each
-/// of the model's [`settings`], in every instance state that can be reached without an error.
+/// Returns saved states of an FMU for Co-Simulation and Model Exchange, with each of the model's [`settings`], in every
+/// instance state that can be reached without an error.
 fn bases<M: Model, V: Values>() -> &'static [Vec<u8>] {
     static BASES: Mutex<BTreeMap<[&str; 2], &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
     let mut bases = BASES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -154,7 +154,7 @@ fn life_of<M: Model, V: Values>(
             to_steps(&mut instance);
             instance.step_to_event(1.0, 0.5, true).expect("a good step");
             if events == Events::Reported {
-                // Both before event mode, with pending events, and in event mode.
+                // States are saved before event mode, with pending events, and in event mode.
                 all.push(to_bytes(&instance));
                 instance.enter_event_mode().expect("allowed");
             }
@@ -168,14 +168,14 @@ fn life_of<M: Model, V: Values>(
     all.push(to_bytes(&instance));
 }
 
-/// Returns sets of parameters with which the FMU runs before its saved states are modified.
-/// Together they use every part of the model, in motion.
+/// Returns sets of parameters with which the FMU runs before its saved states are modified. Together they use every part of
+/// the model, in motion.
 ///
 /// # Panics
-/// If there are no settings for the model.
+/// If the model has no settings here.
 pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
     match model {
-        // Each slosh model with one friction law; the linear ones with a baffle.
+        // Each slosh model occurs with one friction law; the linear model also with a baffle.
         "HubSlosh" => [(1, 2), (2, 3), (3, 4), (4, 5), (5, 3), (2, 5)]
             .map(|(liquid, friction)| {
                 vec![
@@ -193,7 +193,7 @@ pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 ]
             })
             .into(),
-        // Free, and on a pivot (2).
+        // The craft is free, or on a pivot (2).
         "Spacecraft" => [(1, 0), (1, 1), (1, 4), (2, 2)]
             .map(|(mount, tanks)| {
                 vec![
@@ -214,8 +214,8 @@ pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 ]
             })
             .into(),
-        // Split, lumped (2), rigid_body (3). Two of them drain, and in one the liquid detaches from the
-        // bottom.
+        // The couplings are split, lumped (2) and rigid_body (3). Two of the tanks drain, and in one tank the liquid
+        // detaches from the bottom.
         "SloshTank" => {
             [(1, 0, 0), (1, 1, 0), (1, 3, 0), (2, 2, 0), (3, 1, 8), (1, 2, 8), (1, 2, 0)]
                 .into_iter()
@@ -238,6 +238,6 @@ pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 })
                 .collect()
         }
-        _ => panic!("nobody has said what to damage in {model}"),
+        _ => panic!("settings() has no parameters for {model}"),
     }
 }

@@ -1,5 +1,5 @@
-//! Fuzzes parameters, inputs and step sizes: a run must give finite values or an error, a refused call must
-//! change nothing, and repeating a step from a saved state must give bit-identical results.
+//! Fuzzing of parameters, inputs and step sizes. All values must be finite or there must be an error, a refused call must
+//! change nothing, and a step that is repeated from a saved state must give bit-identical results.
 
 use std::time::{Duration, Instant};
 
@@ -16,17 +16,18 @@ use runtime::variable::{Causality, Kind, Quantity, Value};
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
 const STEPS: usize = 12;
-/// Longest step, s. The model bounds the work of a step; this limit keeps the fuzzer fast.
+/// Longest step, s. The model limits the work of a step; this limit makes the fuzzer faster.
 const LONGEST: f64 = 2.0;
-/// A run that took this long ends, because stiff models may use all allowed solver steps in every step.
+/// A simulation that takes more CPU time than this ends, because stiff models may use all allowed solver steps in every
+/// step.
 const SLOW: Duration = Duration::from_secs(1);
 
-/// Runs one case: creates an instance, sets some values, and simulates. The first byte chooses the FMI
-/// version and who handles events.
+/// Runs one input: creates an instance, sets some values, and simulates. The first byte determines the FMI version
+/// and who handles events.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((how, data)) = data.split_first() else { return };
     let data = &mut Unstructured::new(data);
-    // The run ends when the bytes are used up.
+    // The simulation ends when no bytes are left.
     _ = match how % 4 {
         0 | 1 => co_simulation::<M, Fmi2>(Events::InStep, data),
         2 => co_simulation::<M, Fmi3>(Events::InStep, data),
@@ -67,7 +68,7 @@ fn co_simulation<M: Model, V: Values>(events: Events, data: &mut Unstructured) -
         let mut again = survives_being_saved(&instance);
         let at = instance.time();
         let done = step(&mut instance, at, h);
-        assert_eq!(step(&mut again, at, h), done, "the same step, another answer");
+        assert_eq!(step(&mut again, at, h), done, "the repeated step has another status");
         if let Ok(info) = &done {
             everything_is_a_number(&mut instance);
             match info.early {
@@ -77,12 +78,12 @@ fn co_simulation<M: Model, V: Values>(events: Events, data: &mut Unstructured) -
         } else if instance.state() == InstanceState::Stepping {
             assert!(to_bytes(&instance) == before, "a refused step has changed something");
         } else {
-            // The instance has kept its time, and its variables can be read.
+            // The instance is still at the same time, and its variables can be read.
             everything_is_a_number(&mut instance);
             assert_eq!(instance.time(), at);
         }
         everything_is_a_number(&mut again);
-        assert!(to_bytes(&again) == to_bytes(&instance), "the same step, another state");
+        assert!(to_bytes(&again) == to_bytes(&instance), "the repeated step has another result");
     }
     Ok(())
 }
@@ -113,8 +114,8 @@ fn set_something<M: Model, V: Values>(
     Ok(())
 }
 
-/// Limits an input to magnitudes that occur in simulations, because at 1e12 N.m every step would use all
-/// allowed solver steps.
+/// Limits an input to magnitudes that occur in simulations. At 1e12 N.m, for example, every step would use all allowed
+/// solver steps.
 fn everyday(quantity: Quantity) -> Quantity {
     let near = |limit: Option<f64>| limit.filter(|limit| limit.abs() <= 1e6);
     Quantity { min: near(quantity.min), max: near(quantity.max), ..quantity }
@@ -127,7 +128,7 @@ fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
         0 => min,
         1 => max,
         2 => min + share * (max - min),
-        // Uniform in the logarithm.
+        // The logarithm is uniformly distributed.
         3 | 4 if min > 0.0 => min * (max / min).powf(share),
         5 | 6 => quantity.nominal.unwrap_or(1.0) * (2.0 * share - 1.0),
         _ => real(data)?,
