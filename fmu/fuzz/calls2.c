@@ -1,4 +1,4 @@
-/* The hostile host's calls of all 44 functions of FMI 2.0: see host.c. The functions' types are the official headers'. */
+/* Calls of all 44 functions of FMI 2.0 by the hostile host; see host.c. The official headers declare the functions. */
 #include "choices.h"
 
 #include <math.h>
@@ -34,7 +34,7 @@ static void instantiate(void) {
     unsigned kind = byte();
     if (instances[which])
         free_instance(which);
-    /* on the heap, and gone after the call, as is all the FMU was given */
+    /* The struct is on the heap and is freed after the call, because the FMU must not use it later. */
     fmi2CallbackFunctions *callbacks = malloc(sizeof *callbacks);
     if (!callbacks)
         fail("no memory");
@@ -56,7 +56,7 @@ static void instantiate(void) {
         fail("no instance");
 }
 
-/* To where the model moves, so that not all inputs have to find the way. */
+/* Initialises an instance, so that not every input has to find this sequence of calls. */
 static void initialise(void) {
     fmi2Component c = instance();
     CALL(fmi2SetupExperiment, c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
@@ -75,7 +75,7 @@ static int do_step(fmi2Component c, double t, double h) {
     return status;
 }
 
-/* The communication point, or something else. */
+/* Returns the present communication point, or sometimes another time. */
 static double time_of(fmi2Component c) {
     double t = 0.0;
     if (one_in(16) || CALL(fmi2GetRealStatus, c, fmi2LastSuccessfulTime, &t) != HOST_OK)
@@ -90,7 +90,7 @@ static void step(void) {
     do_step(c, t, h);
 }
 
-/* The bytes of an instance's state; NULL if it gives none. Freed by the caller. */
+/* Returns the bytes of an instance's state, which the caller frees; NULL if the instance cannot save its state. */
 static char *take(fmi2Component c, size_t *size) {
     fmi2FMUstate handle = NULL;
     if (CALL(fmi2GetFMUstate, c, &handle) != HOST_OK)
@@ -106,7 +106,7 @@ static char *take(fmi2Component c, size_t *size) {
     return taken;
 }
 
-/* Back and again: the same bytes. */
+/* Makes a step, restores the state before it and repeats the step: the saved states must have the same bytes. */
 static void step_twice(void) {
     fmi2Component c = instance();
     fmi2FMUstate here = NULL;
@@ -229,7 +229,7 @@ static void call(void) {
     case 27:
         handle = &states[slot()];
         if (*handle && one_in(8)) {
-            /* by itself in place of its address, as fmusim does; the host forgets it if it is gone */
+            /* passes the handle itself instead of its address, as fmusim does */
             if (CALL(fmi2FreeFMUstate, c, (fmi2FMUstate *)*handle) == HOST_OK)
                 *handle = NULL;
             break;

@@ -1,8 +1,8 @@
-/* The hostile host's calls of all 75 functions of FMI 3.0: see host.c. The functions' types are the official headers'.
+/* Calls of all 75 functions of FMI 3.0 by the hostile host; see host.c. The official headers declare the functions.
  *
- * Besides what holds in every version: a step returns early, or tells of events, only where the host has allowed it, and
- * ends where it says. Within a step, in intermediate update, the host calls whatever it likes but what frees the
- * instance. After an error an instance is terminated: mostly the host resets it then and starts again. */
+ * In addition to the rules of every version, a step must return early or report events only if the host has allowed this, and
+ * must end at the time that it returns. Within a step, in intermediate updates, the host calls any function that does not free
+ * the instance. An error terminates an instance; usually the host then resets and initialises it. */
 #include "choices.h"
 
 #include <math.h>
@@ -12,11 +12,11 @@
 
 #include "fmi3Functions.h"
 
-/* What the host has said of each instance. */
+/* Arguments with which each instance was created: Co-Simulation, event mode, early return. */
 static struct {
     int steps, events, early;
 } made[SLOTS];
-/* Whether the host is within a step; whether it leaves steps alone. */
+/* True within a step; true if the host makes no calls within steps. */
 static int within, quiet;
 
 static int slot_of(void *c) {
@@ -41,7 +41,7 @@ static void free_instance(int which) {
 
 static int has_arrays(void) { return fmu->outputs == 0; }
 
-/* How many values: as many as references, mostly; of arrays as many as they may have elements. */
+/* Returns a number of values for n references: usually n, and for arrays n times a possible number of elements. */
 static size_t values_of(size_t n) {
     static const size_t elements[] = {1, 1, 3, 3, 3, 4, 9, 12};
     if (has_arrays())
@@ -77,7 +77,7 @@ static void some_values(void *c) {
     }
 }
 
-/* Types that no variable has, and clocks. */
+/* Calls a function for a type that no variable has, or for clocks. */
 static void values_of_no_variable(void *c) {
     size_t n = one_in(2) ? 0 : length(), m = values_of(n);
 #define VALUES(type) (type *)array(m, sizeof(type))
@@ -119,7 +119,7 @@ static void values_of_no_variable(void *c) {
     }
 }
 
-/* At random, or as it should be. */
+/* Updates the discrete states, sometimes with a NULL argument. */
 static void update_discrete_states(void *c) {
     fmi3Boolean flags[5];
     double next = 0.0;
@@ -128,7 +128,7 @@ static void update_discrete_states(void *c) {
                       which == 2 ? NULL : &flags[2], which == 3 ? NULL : &flags[3], which == 4 ? NULL : &flags[4],
                       which == 5 ? NULL : &next);
     if (status == HOST_OK && (flags[0] || flags[1] || flags[2]))
-        fail("asks for another update, for the end, or for other nominal values");
+        fail("the FMU requests another update, the end, or other nominal values");
 }
 
 static void handle_event(void *c) {
@@ -136,7 +136,7 @@ static void handle_event(void *c) {
     CALL(fmi3EnterStepMode, c);
 }
 
-/* Where most calls are allowed, so that not all inputs have to find the way. */
+/* Initialises an instance up to a state in which most calls are allowed, so that not every input has to find this sequence. */
 static void initialise(void *c) {
     int which = slot_of(c);
     int defined = one_in(2);
@@ -151,12 +151,12 @@ static void initialise(void *c) {
     }
 }
 
-/* Within a step: the host answers anything and calls anything. */
+/* Intermediate update: within a step the host makes any calls and returns any answer. */
 static void intermediate_update(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set_requested,
                                 fmi3Boolean get_allowed, fmi3Boolean step_finished, fmi3Boolean can_return_early,
                                 fmi3Boolean *early_return_requested, fmi3Float64 *early_return_time) {
     if (environment != nothing || set_requested == get_allowed || step_finished != get_allowed)
-        fail("an intermediate update with another environment, or for nothing");
+        fail("an intermediate update has a wrong environment or inconsistent flags");
     if (*early_return_requested || *early_return_time != time)
         fail("the answers of an intermediate update have no values");
     if (within || quiet)
@@ -210,7 +210,7 @@ static void instantiate(void) {
         instances[which] = fmi3InstantiateModelExchange(name, token, resources, one_in(2), one_in(2), nothing, log);
         timed();
     } else {
-        /* inputs follow parameters; what is no input or output is refused */
+        /* The required variables are an output and an input; other variables would be refused. */
         size_t n = well ? 0 : length();
         unsigned some[2] = {1 + looks_in % 4, (unsigned)(fmu->inputs + (has_arrays() ? 0 : looks_in % 3))};
         unsigned *required = well ? some : references(n);
@@ -237,9 +237,9 @@ static int do_step(void *c, double t, double h) {
                       missing == 2 ? NULL : &early, missing == 3 ? NULL : &last);
     if (which >= 0 && missing == 4) {
         if (status == HOST_OK && (over || (event && !made[which].events) || (early && !made[which].early)))
-            fail("tells what the host has not allowed");
+            fail("the step reports an event or an early return that the host has not allowed");
         if (isnan(last) || (status == HOST_OK && !early && last != t + h))
-            fail("has not ended where it says");
+            fail("the step has not ended at the time that it returned");
     }
     if (status != HOST_OK)
         return status;
@@ -251,7 +251,7 @@ static int do_step(void *c, double t, double h) {
     return status;
 }
 
-/* The communication point, or something else. */
+/* Returns the present communication point, or sometimes another time. */
 static double time_of(void *c) {
     double t = 0.0;
     unsigned time = (unsigned)fmu->variables + 1;
@@ -267,7 +267,7 @@ static void step(void) {
     do_step(c, t, h);
 }
 
-/* The bytes of an instance's state; NULL if it gives none. Freed by the caller. */
+/* Returns the bytes of an instance's state, which the caller frees; NULL if the instance cannot save its state. */
 static char *take(void *c, size_t *size) {
     void *handle = NULL;
     if (CALL(fmi3GetFMUState, c, &handle) != HOST_OK)
@@ -283,7 +283,8 @@ static char *take(void *c, size_t *size) {
     return taken;
 }
 
-/* Back and again: the same bytes. The host keeps out of these steps. */
+/* Makes a step, restores the state before it and repeats the step: the saved states must have the same bytes. The host makes no
+ * calls within these steps. */
 static void step_twice(void) {
     void *c = instance(), *here = NULL;
     size_t size[2];
@@ -371,7 +372,7 @@ static void call_of(unsigned which, void *c) {
     case 27:
         handle = &states[slot()];
         if (*handle && one_in(8)) {
-            /* by itself in place of its address, as fmusim does; the host forgets it if it is gone */
+            /* passes the handle itself instead of its address, as fmusim does */
             if (CALL(fmi3FreeFMUState, c, (void **)*handle) == HOST_OK)
                 *handle = NULL;
             break;
@@ -416,7 +417,7 @@ static void call_of(unsigned which, void *c) {
     }
 }
 
-/* After an error: as new, mostly. */
+/* After an error, usually resets and initialises the instance. */
 static void begin_again(void *c) {
     if (slot_of(c) < 0 || one_in(4))
         return;

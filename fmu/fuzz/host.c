@@ -1,14 +1,14 @@
-/* A hostile host in C: turns bytes into calls of all functions of FMI 2.0 (calls2.c) or 3.0 (calls3.c), the first byte says
- * which, in any order, with any arguments, NULL among them. One rule it keeps: memory is valid. Arrays are exactly
- * as long as it says (an address sanitizer or valgrind sees one element more), handles point
- * to something, nothing is used after it was freed.
+/* A hostile host in C. It turns bytes into calls of all functions of FMI 2.0 (calls2.c) or 3.0 (calls3.c), in any order and with
+ * any arguments, also NULL. The first byte determines the version. The host obeys only one rule: memory is valid. Arrays have
+ * exactly the length that it passes (so that an address sanitizer or valgrind detects an access to one element more), handles
+ * point to memory, and nothing is used after it was freed.
  *
- * What must hold whatever it does: no crash, no status but OK, Discard and Error, no call
- * that works longer than `host_slowest_allowed`, log messages that are text, finite outputs after
- * a step that succeeded, no division by zero, invalid operation or overflow in a call that succeeded
- * (some hosts trap these), and the same state after going back and stepping again.
+ * Whatever the calls are, there must be no crash, no status except OK, Discard and Error, and no call that takes longer than
+ * `host_slowest_allowed`. Log messages must be text, outputs must be finite after a successful step, and a successful call must
+ * not divide by zero, overflow or make an invalid operation, because some hosts trap these. If the host restores a state and
+ * repeats a step, the result must be the same.
  *
- * `src/calls.rs` gives it to a fuzzer, `replay.c` to a packed FMU. */
+ * `src/calls.rs` links this host with a fuzzer, and `replay.c` with a packed FMU. */
 #define _POSIX_C_SOURCE 200809L
 #include "choices.h"
 
@@ -19,14 +19,14 @@
 #include <string.h>
 #include <time.h>
 
-/* Simulated seconds per input in steps of more than one second: they are slow, not bad. */
+/* Number of steps of more than one second per input. They are allowed, but slow. */
 #define LONG_STEPS 1
-/* What a host may trap. */
+/* Floating-point exceptions that a host may trap. */
 #define EXCEPTIONS (FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW)
-/* Numbers of such size are judged: products of ten of them do not overflow on the way to an answer. */
+/* True for arguments with which a call must not raise exceptions: products of ten such numbers do not overflow. */
 #define MODERATE(x) ((x) == 0.0 || (fabs(x) > 1e-30 && fabs(x) < 1e30))
 
-/* For a fuzzer: under its sanitizer a call takes some ten times as long. replay.c is told its own. */
+/* Value for a fuzzer, under whose sanitizer a call takes about ten times as long. replay.c sets its own value. */
 double host_slowest_allowed = 100.0;
 struct host_report host_report;
 
@@ -35,8 +35,8 @@ static unsigned references_end;
 static const uint8_t *bytes;
 static size_t left;
 static const char *at = "start";
-/* Whether other numbers are among the arguments of the call at hand; whether the FMU has taken any
- * since this input began. */
+/* True if an argument of the present call is not MODERATE; true if the FMU has accepted such an argument from the present
+ * input. */
 static int offers_extreme, has_extreme;
 static int long_steps;
 
@@ -44,7 +44,7 @@ void *instances[SLOTS];
 void *states[SLOTS];
 struct host_saved saved[SLOTS];
 uint64_t nothing[8];
-/* Arrays of the call at hand. */
+/* Arrays of the present call. */
 static void *arrays[16];
 static int arrays_count;
 
@@ -83,7 +83,7 @@ double real(void) {
     } else if (kind < 60) {
         uint64_t x = word();
         memcpy(&y, &x, sizeof y);
-    } else { /* something of everyday size */
+    } else { /* a number of usual size */
         y = ((int)byte() - 128) * pow(10.0, (int)(kind % 8) - 6);
     }
     offers_extreme |= !MODERATE(y);
@@ -118,7 +118,7 @@ const char *text(void) {
 
 /* ---- Arguments ---- */
 
-/* n elements that the next `done` frees; sometimes NULL. */
+/* Returns an array of n elements, which the next `done` frees, or sometimes NULL. */
 void *array(size_t n, size_t size) {
     if (one_in(24))
         return NULL;
@@ -159,7 +159,7 @@ const char **texts(size_t n) {
     return x;
 }
 
-/* Mostly the first, so that something comes of it. */
+/* Returns the number of a slot. It is usually 0, so that most calls use the same instance. */
 int slot(void) {
     unsigned kind = byte();
     return kind < 160 ? 0 : (int)(kind % SLOTS);
@@ -228,7 +228,7 @@ int done(int status) {
 }
 
 double shortened(double h) {
-    /* Long steps are bounded by the model's number of steps; one is enough for a while. */
+    /* The model limits the work of a long step, but it is slow, so that there is only one per input. */
     return h > 1.0 && isfinite(h) && long_steps++ >= LONG_STEPS ? 1.0 : h;
 }
 
@@ -254,7 +254,7 @@ void judge_message(int status, const char *category, const char *message) {
         fail("the FMU panicked");
     }
     if (!category || strncmp(category, "log", 3))
-        fail("the logger got a category that is none");
+        fail("the logger got an unknown category");
     host_report.messages++;
 }
 
@@ -262,15 +262,15 @@ void check_outputs(unsigned first, int (*read)(void *, const unsigned *, size_t,
     unsigned all[MAX_OUTPUTS];
     double values[MAX_OUTPUTS];
     if (fmu->outputs > MAX_OUTPUTS)
-        fail("has more outputs than MAX_OUTPUTS");
+        fail("the FMU has more outputs than MAX_OUTPUTS");
     for (unsigned i = 0; i < fmu->outputs; i++)
         all[i] = first + i;
     if (read(c, all, fmu->outputs, values) != HOST_OK)
-        fail("no outputs after a step that succeeded");
+        fail("the outputs cannot be read after a successful step");
     for (unsigned i = 0; i < fmu->outputs; i++) {
         if (!isfinite(values[i])) {
             fprintf(stderr, "output %u is %g\n", first + i, values[i]);
-            fail("outputs are no numbers after a step that succeeded");
+            fail("an output is not finite after a successful step");
         }
     }
 }
@@ -286,7 +286,7 @@ void host_run(const struct host_fmu *the_fmu, const uint8_t *data, size_t size) 
     with->start();
     for (int n = 0; n < CALLS && left; n++)
         with->call();
-    /* Saved states are an instance's to free. */
+    /* The instances free their saved states. */
     left = 0;
     with->end();
     for (int i = 0; i < SLOTS; i++) {

@@ -1,10 +1,10 @@
-/* Lets the hostile host of host.c loose on the FMU's binary that this program is linked with: with
- * files (a fuzzer's corpus), or with noise of a seed.
+/* Runs the hostile host of host.c against the FMU with which this program is linked. The inputs are files (the corpus of a
+ * fuzzer), or random bytes from a seed.
  *
- *   replay FMU… SLOWEST FILE…            # SLOWEST: seconds that one call may take
+ *   replay FMU… SLOWEST FILE…            # SLOWEST: largest CPU time of a call, s
  *   replay FMU… SLOWEST --noise COUNT SEED
  *
- * FMU…: what `struct host_fmu` has, in its order: GUID, token and five numbers. */
+ * FMU…: the fields of `struct host_fmu` in their order: GUID, token and five numbers. */
 #include "host.h"
 
 #include <stdio.h>
@@ -13,7 +13,7 @@
 
 static uint8_t bytes[1 << 16];
 
-/* SplitMix64 (Steele, Lea, Flood 2014) */
+/* Returns the next number of the SplitMix64 generator (Steele, Lea, Flood 2014). */
 static uint64_t next(uint64_t *state) {
     uint64_t z = *state += 0x9E3779B97F4A7C15;
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
