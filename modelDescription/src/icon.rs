@@ -1,13 +1,12 @@
-//! Draws the FMU's icon from `modelDescription/icon/icon.svg`, because FMI importers expect a PNG and few can display an
-//! SVG.
+//! Draws the FMU's icon from `modelDescription/icon/icon.svg`, because FMI importers expect a PNG and few
+//! can display an SVG.
 //!
 //! `icon/SHA256SUMS` contains the hash of the drawing from which the committed picture was made. The feature `icon` is
 //! needed to draw, because its library takes longer to compile than everything else.
 
 use sha2::{Digest, Sha256};
 
-/// Folder of the drawing (`icon.svg`), the picture (`icon.png`, which becomes each FMU's `model.png`) and
-/// their hashes.
+/// Folder of the drawing (`icon.svg`), the picture (`icon.png`, which becomes each FMU's `model.png`) and their hashes.
 pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon");
 pub const SIZE: u32 = 512;
 

@@ -350,8 +350,8 @@ pub(crate) struct Flexing {
     momentum: Vector,
     moment: Vector,
     growth: [Symmetric; ORDER + 1],
-    /// `turned` and `grown` are the vectors w x y and D w; `flow` and `spin` are their sums with K and L (see the module's
-    /// head).
+    /// `turned` and `grown` are the vectors w x y and D w; `flow` and `spin` are their sums with K and L
+    /// (see the module's head).
     turned: Vector,
     grown: Vector,
     flow: Vector,
@@ -506,8 +506,7 @@ impl Flexing {
         ]
     }
 
-    /// Sets coefficient n + 1 of the rates of all modes from coefficient n of the craft's
-    /// accelerations [a; w'].
+    /// Sets coefficient n + 1 of the rates of all modes from coefficient n of the craft's accelerations [a; w'].
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let order = (n + 1) as f64;
         for (j, mode) in self.structure.modes.iter().enumerate() {
@@ -521,8 +520,8 @@ impl Flexing {
         self.grown[n + 1] = add(self.grown[n + 1], times(&symmetric(self.growth[0]), w));
     }
 
-    /// Returns coefficient n of eta' and eta'' of all modes; in a directional derivative, coefficient 1 is the derivative of
-    /// both.
+    /// Returns coefficient n of eta' and eta'' of all modes; in a directional derivative, coefficient 1 is
+    /// the derivative of both.
     pub fn rates(&self, n: usize) -> [[f64; APPENDAGES]; 2] {
         [self.coefficients(&self.rate, n), self.second]
     }
@@ -534,8 +533,8 @@ impl Flexing {
             .fold(0.0, |sum, (mode, rate)| sum + mode.damping * series::square(n, rate))
     }
 
-    /// Returns the scale to which the allowed error of the modes' rates eta' is relative, estimated over the next `t`
-    /// seconds.
+    /// Returns the scale to which the allowed error of the modes' rates eta' is relative, estimated over
+    /// the next `t` seconds.
     pub fn speed_scale(&self, t: f64) -> f64 {
         let [eta, rate, second] = [(&self.eta, 0), (&self.rate, 0), (&self.rate, 1)]
             .map(|(of, n)| self.coefficients(of, n));

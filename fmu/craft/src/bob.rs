@@ -55,9 +55,9 @@ pub(crate) struct BobNow<T> {
     pub spin: Option<Vec3<T>>,
 }
 
-/// One bob that is a pendulum: its parameters and the power series of its motion, in body axes. `tank` and `mode` count from
-/// 0. `follows` is true if the drag coefficient c depends on acceleration or amplitude, so that c and c p' are power series.
-/// The fields after the series are the terms of the current order that do not depend on [a; w'] of this order.
+/// One bob that is a pendulum: its parameters and the power series of its motion, in body axes. `tank` and `mode` count
+/// from 0. `follows` is true if the drag coefficient c depends on acceleration or amplitude, so that c and c p' are power
+/// series. The fields after the series are the terms of the current order that do not depend on [a; w'] of this order.
 #[derive(Clone, Debug)]
 pub struct Bob {
     pub tank: usize,

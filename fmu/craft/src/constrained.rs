@@ -170,9 +170,8 @@ impl HigherSeries {
         self.m = [-q[1], q[0], 0.0];
     }
 
-    /// Computes the terms of order n of the force f from the coefficients of the position r and of u up to order n + 1,
-    /// and from the coefficients of r' and w_e up to order n. Returns the sum of the terms of f that are known at this
-    /// order.
+    /// Computes the terms of order n of the force f from the coefficients of the position r and of u up to order n + 1, and
+    /// from the coefficients of r' and w_e up to order n. Returns the sum of the terms of f that are known at this order.
     #[inline(never)]
     fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
         let HigherSeries { by, .. } = *self;
@@ -257,8 +256,8 @@ impl HigherSeries {
         self.share * (self.known[2] + dot(self.m, y) + w_e_d * u)
     }
 
-    /// Sets coefficient n of D and P', which the module's head defines. `inner` is S sigma' and `pull` is T tau' of the
-    /// newest order.
+    /// Sets coefficient n of D and P', which the module's head defines. `inner` is S sigma' and `pull` is T tau'
+    /// of the newest order.
     fn set(&mut self, n: usize, inner: f64, pull: f64) {
         (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
     }
@@ -718,9 +717,9 @@ impl ConstrainedBob {
         largest(self.v[n])
     }
 
-    /// Updates the rate r' of the bob for an impulse that changes the velocity of O by `dv` and the angular velocity by
-    /// `dw`, both in body axes: l r' changes by -(1 - H)(dv + dw x rho). `x` has the bob's six states at the start of
-    /// the expansion.
+    /// Updates the rate r' of the bob for an impulse that changes the velocity of O by `dv` and the angular velocity
+    /// by `dw`, both in body axes: l r' changes by -(1 - H)(dv + dw x rho). `x` has the bob's six states at the
+    /// start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
         let mut change = scale(-self.inv_l, sub(kick, self.held(kick)));

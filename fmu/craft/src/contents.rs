@@ -300,8 +300,8 @@ impl MountedTank {
         Some(spin.now(l, w, reaction))
     }
 
-    /// Writes the derivatives p' and p'' of the bobs' states, six numbers for each bob in tank axes, for the accelerations
-    /// [a; w'].
+    /// Writes the derivatives p' and p'' of the bobs' states, six numbers for each bob in tank axes, for
+    /// the accelerations [a; w'].
     pub fn write_rates<T: Number>(
         &self,
         contents: &Contents<'_, T>,
@@ -719,8 +719,8 @@ impl<T: Number> Contents<'_, T> {
         self.spin.as_ref().map(|now| (now.rate, [now.energy, now.turning[0]]))
     }
 
-    /// Returns the force of the liquid on the craft and its torque about O if a = w' = 0, without those of the rigid
-    /// liquid's inertia.
+    /// Returns the force of the liquid on the craft and its torque about O if a = w' = 0, without those of
+    /// the rigid liquid's inertia.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(Swing::load);
         let sum =

@@ -331,8 +331,8 @@ impl Draining {
         self.evaluate(&state.x, &acting).outputs(&state.x, |_| None).energy
     }
 
-    /// Returns the specific force a at the pivot, which is minus gravity in body axes, because the pivot does not
-    /// accelerate.
+    /// Returns the specific force a at the pivot, which is minus gravity in body axes, because the
+    /// pivot does not accelerate.
     fn held_acceleration<T: Number>(&self, axes: &Mat3<T>) -> Vec3<T> {
         transposed_times(axes, constant(self.gravity)).map(|x| -x)
     }

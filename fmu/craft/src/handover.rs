@@ -33,8 +33,8 @@ pub(crate) trait Carrier {
     /// Returns the position and velocity (six numbers) of detached liquid in the carrier's state vector.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
-    /// Returns direction p and rate p' (six numbers) of bob `n` in the tank of the detached liquid, in the carrier's state
-    /// vector.
+    /// Returns direction p and rate p' (six numbers) of bob `n` in the tank of the detached liquid, in
+    /// the carrier's state vector.
     fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
 
     fn directions(&self, lump: usize) -> Directions;

@@ -169,8 +169,8 @@ pub(crate) struct Lump {
     sum: Vector,
     turned: Vector,
     u_turned: Vec3,
-    /// Derivative of the shape's inertia J_a for a directional derivative, kg m2, body axes; 0 if the expansion is over
-    /// time.
+    /// Derivative of the shape's inertia J_a for a directional derivative, kg m2, body axes; 0 if the
+    /// expansion is over time.
     pub shape_slope: Mat3,
     known_pull: f64,
     known_force: Vec3,
@@ -586,8 +586,8 @@ impl Lump {
         self.pull[0] > 0.0
     }
 
-    /// Returns the directions of the bobs' rods for which the common centre of the pendulums is nearest to the detached
-    /// liquid.
+    /// Returns the directions of the bobs' rods for which the common centre of the pendulums is nearest
+    /// to the detached liquid.
     pub fn hanging(&self) -> Directions {
         let in_tank = transposed_times(&self.axes, self.x_0);
         let [x, y] = [in_tank[0] / self.gyration, in_tank[1] / self.gyration];
@@ -623,8 +623,7 @@ impl Lump {
         })
     }
 
-    /// Returns the coefficients below n of the specific force along the tank's axis at the hinge of
-    /// mode 1.
+    /// Returns the coefficients below n of the specific force along the tank's axis at the hinge of mode 1.
     fn axial(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> Series {
         let turned = cross(self.hinge, self.e);
         let height = dot(self.e, self.hinge);

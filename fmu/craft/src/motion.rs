@@ -286,8 +286,8 @@ impl CraftMotion {
         }
     }
 
-    /// Replaces the rigid liquids and the bobs by the contents of `tanks`, which must have as many tanks and modes as
-    /// before.
+    /// Replaces the rigid liquids and the bobs by the contents of `tanks`, which must have as many tanks
+    /// and modes as before.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
@@ -344,10 +344,9 @@ impl CraftMotion {
         self.factors.solve([force, torque])
     }
 
-    /// Sets the angular momentum of the wheels to `h`. If it differs from the present momentum by dh, the craft
-    /// receives an impulse: velocity and angular velocity change by [dV; dw] = M^-1 [0; -dh], the direction p of each
-    /// bob by l dp' = -(1 - p p^T)(dV + dw x rho), and the wheels do the work -dh.(w + dw/2). Returns true if the
-    /// momentum jumps.
+    /// Sets the angular momentum of the wheels to `h`. If it differs from the present momentum by dh, the craft receives an
+    /// impulse: velocity and angular velocity change by [dV; dw] = M^-1 [0; -dh], the direction p of each bob by l dp' =
+    /// -(1 - p p^T)(dV + dw x rho), and the wheels do the work -dh.(w + dw/2). Returns true if the momentum jumps.
     pub fn set_wheels(&mut self, h: Vec3) -> bool {
         if h == self.state.h_wheels {
             return false;
@@ -461,8 +460,8 @@ impl CraftMotion {
     /// Advances the states by `h` > 0, s. If the inputs have jumped (`has_jumped`), the step starts from the present
     /// states, otherwise from the states in `before`. If an error is returned, the states are invalid, and the expansion
     /// in `state.kept` is unchanged.
-    // This is a function apart from the preparation of a step, because both take more instructions if they are compiled
-    // together.
+    // This is a function apart from the preparation of a step, because both take more instructions if
+    // they are compiled together.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
         let (begin, mut steps) = (self.state.time, limits.steps());

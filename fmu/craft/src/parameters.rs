@@ -312,8 +312,8 @@ impl Tank {
         }
     }
 
-    /// Returns the coefficients of mode `n`, which counts from 0, if the spin of the liquid changes this mode; otherwise
-    /// `None`.
+    /// Returns the coefficients of mode `n`, which counts from 0, if the spin of the liquid changes
+    /// this mode; otherwise `None`.
     pub(crate) fn gyroscopic(&self, n: usize) -> Option<Higher> {
         Some(self.higher(n)).filter(|higher| higher.gyroscopic != [0.0; 2])
     }
@@ -1111,8 +1111,8 @@ impl Craft {
         if problems.0.len() > before {
             return;
         }
-        // If two moments of inertia and their product of inertia are inconsistent, this principal minor of the matrix is
-        // negative.
+        // If two moments of inertia and their product of inertia are inconsistent, this principal minor of
+        // the matrix is negative.
         let minors = [
             ("Jxx", "Jyy", "Jxy", xx * yy, xy * xy),
             ("Jxx", "Jzz", "Jxz", xx * zz, xz * xz),

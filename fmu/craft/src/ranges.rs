@@ -22,8 +22,8 @@
 //! rotation rate of the tank about its axis. If x/l + k/m is below 0, a slosh mass would swing over while real liquid would
 //! fall. Beyond 45 degrees from the tank's axis a slosh mass does not represent a liquid surface.
 //!
-//! Motion counts as rotary if the ellipse of the bob's path has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2
-//! + q'^2). This condition does not depend on the phase of the motion.
+//! Motion counts as rotary if the ellipse of the bob's path has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2
+//! q^2 + q'^2). This condition does not depend on the phase of the motion.
 
 use crate::lump::COS_45;
 use crate::outputs::TankOutputs;
@@ -216,9 +216,8 @@ impl Bounds {
         self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest)
     }
 
-    /// Returns the event indicator of a tank without a model of detached liquid, m/s2: it is negative where
-    /// the specific force `axial` along the tank no longer holds the liquid of every mode at the bottom, and
-    /// never 0.
+    /// Returns the event indicator of a tank without a model of detached liquid, m/s2: it is negative where the specific
+    /// force `axial` along the tank no longer holds the liquid of every mode at the bottom, and never 0.
     pub fn held_indicator(&self, axial: f64) -> f64 {
         /// Smallest value of the indicator while the liquid is held. Without thrust the margin of the condition is 0, but
         /// the indicator of an FMU must not be 0 between events.

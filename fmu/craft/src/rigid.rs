@@ -114,9 +114,9 @@ impl<T: Number> Rigid<T> {
     }
 }
 
-/// Adds the inertia of a bob of mass `m` at the end of a rod to a mass matrix. Because the bob
-/// moves freely across the rod, it has inertia only along the rod: the matrix gains m u u^T with u
-/// = [p; P x p], where p is the direction of the rod and P its hinge.
+/// Adds the inertia of a bob of mass `m` at the end of a rod to a mass matrix. Because the bob moves freely across the
+/// rod, it has inertia only along the rod: the matrix gains m u u^T with u = [p; P x p], where p is the direction of the
+/// rod and P its hinge.
 #[inline(always)]
 pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     for i in 0..6 {
@@ -190,8 +190,8 @@ impl<T: Number, const N: usize> Factors<T, N> {
         factors
     }
 
-    /// Replaces the factors by those of another matrix in place, because a copy would take a fortieth of a step's
-    /// instructions.
+    /// Replaces the factors by those of another matrix in place, because a copy would take a fortieth
+    /// of a step's instructions.
     #[inline(always)]
     pub fn set(&mut self, matrix: &[[T; N]; N]) {
         for j in 0..N {
@@ -200,8 +200,8 @@ impl<T: Number, const N: usize> Factors<T, N> {
         }
     }
 
-    /// Sets row j of the triangular factor L from the rows before it. Returns the element of the diagonal factor D in
-    /// this row.
+    /// Sets row j of the triangular factor L from the rows before it. Returns the element of the diagonal factor
+    /// D in this row.
     #[inline(always)]
     fn set_row(&mut self, matrix: &[[T; N]; N], j: usize) -> T {
         let Factors { l, inverse } = self;
@@ -255,9 +255,9 @@ impl<M: Copy, const N: usize> Factors<M, N> {
     }
 }
 
-/// Returns the smallest ratio of an element of D, in the factorisation L D L^T, to the matrix's diagonal element. It is
-/// small if the matrix is nearly singular, and 0 if the matrix is not positive definite or its inverse exceeds
-/// [`LARGEST_INVERSE`].
+/// Returns the smallest ratio of an element of D, in the factorisation L D L^T, to the matrix's diagonal
+/// element. It is small if the matrix is nearly singular, and 0 if the matrix is not positive definite or
+/// its inverse exceeds [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
     let Factors { inverse, .. } = Factors::new(matrix);
     // NaN is outside the range.
@@ -269,9 +269,8 @@ pub fn smallest_pivot(matrix: &Mat6) -> f64 {
 }
 
 impl Factors {
-    /// Returns L^-1 b with each row divided by the square root of its pivot, where L is the triangular factor of this
-    /// matrix M. Applied to rows and columns of an added mass M_a, it gives the symmetric matrix with the eigenvalues
-    /// of M^-1 M_a.
+    /// Returns L^-1 b with each row divided by the square root of its pivot, where L is the triangular factor of this matrix
+    /// M. Applied to rows and columns of an added mass M_a, it gives the symmetric matrix with the eigenvalues of M^-1 M_a.
     fn half_solve(&self, b: &[f64; 6]) -> [f64; 6] {
         let mut x = *b;
         for i in 1..6 {
@@ -338,8 +337,8 @@ mod tests {
             let b = matrix.map(|row| (0..6).map(|i| row[i] * x[i]).sum::<f64>());
             let [a, w_d] = factors.solve([[b[0], b[1], b[2]], [b[3], b[4], b[5]]]);
             for (got, want) in a.iter().chain(&w_d).zip(x) {
-                // The error is rounding times the condition number of the matrix, which is below 100 after its rows are
-                // scaled.
+                // The error is rounding times the condition number of the matrix, which is below 100 after
+                // its rows are scaled.
                 assert!((got - want).abs() < 1e-13, "{got} {want}");
             }
         }

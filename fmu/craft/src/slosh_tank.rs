@@ -129,8 +129,8 @@ const SPIN: usize = BALL + 6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Coupling {
-    /// `added_mass` is the current added mass M, and `bias` is force and torque at a = w' = 0. For hosts that solve (M_host
-    /// + M) [a; w'] = forces + bias.
+    /// `added_mass` is the current added mass M, and `bias` is force and torque at a = w' = 0. For hosts that solve
+    /// (M_host + M) [a; w'] = forces + bias.
     Split = 1,
     /// `added_mass` is a constant matrix M, in which each bob is a point mass at its hinge, and `bias` is the total force
     /// and torque plus M [a; w'] with the given a and w'. For hosts that solve with a constant matrix.
@@ -244,8 +244,8 @@ pub struct TankInputs {
 }
 
 impl TankInputs {
-    /// Returns the host's angular velocity `t` seconds after the start of the step, rad/s: the integral of the ramp of
-    /// `omega_dot`.
+    /// Returns the host's angular velocity `t` seconds after the start of the step, rad/s: the integral of
+    /// the ramp of `omega_dot`.
     fn omega_at(&self, t: f64) -> Vec3 {
         let TankInputs { omega, omega_dot, .. } = self;
         [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t)
@@ -375,8 +375,8 @@ struct Run<'a> {
 type Acting<T> = ([Vec3<T>; 3], T);
 
 fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
-    // The dissipated energy and the mass of liquid follow from the other states, and a tank that drains has no detached
-    // liquid.
+    // The dissipated energy and the mass of liquid follow from the other states, and a tank that drains
+    // has no detached liquid.
     let mut scale = [f64::INFINITY; TANK_STATES];
     for at in (0..DISSIPATED).step_by(6) {
         scale[at..at + 3].fill(1.0);
@@ -589,8 +589,8 @@ impl TankMotion {
         self.expand_rates::<1>();
     }
 
-    // This is a function apart from the preparation of a step, because both take more instructions if they are compiled
-    // together.
+    // This is a function apart from the preparation of a step, because both take more instructions if
+    // they are compiled together.
     #[inline(never)]
     fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
         let begin = self.state.time;
@@ -1435,9 +1435,8 @@ impl SloshTank {
         SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
-    /// Updates the rates of the bobs after an impulse of the host, which changes the velocity of O by `dv` (m/s) and
-    /// the host's angular velocity by `dw` (rad/s), both in host axes. The bobs keep their velocities across their
-    /// rods.
+    /// Updates the rates of the bobs after an impulse of the host, which changes the velocity of O by `dv` (m/s) and the
+    /// host's angular velocity by `dw` (rad/s), both in host axes. The bobs keep their velocities across their rods.
     pub fn apply_host_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, constrained, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
@@ -1454,9 +1453,9 @@ impl SloshTank {
         self.motion.follow_impulse(dv, dw);
     }
 
-    /// Returns the coupling ratio, which is the largest eigenvalue lambda of M_host^-1 M_a: the added mass of the
-    /// liquid over the mass of the host, at the current directions of the pendulums. `None` if the host's mass
-    /// properties are unknown.
+    /// Returns the coupling ratio, which is the largest eigenvalue lambda of M_host^-1 M_a: the added mass of
+    /// the liquid over the mass of the host, at the current directions of the pendulums. `None` if the host's
+    /// mass properties are unknown.
     ///
     /// A host that applies the total force and torque one step late diverges, at any step size, if the ratio is above 1
     /// (values held over the step), 1/3 (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear extrapolation).

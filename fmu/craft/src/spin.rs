@@ -116,9 +116,9 @@ pub(crate) struct SpinScale {
 }
 
 impl SpinScale {
-    /// Returns the spin ratio 2 Omega/omega_0 and the spin number Omega^2 R/g, which show how close the tank is to the
-    /// limits of the model. `axial` is the specific force along the tank, m/s2, and `rate` the rate Omega at which the
-    /// liquid turns, rad/s.
+    /// Returns the spin ratio 2 Omega/omega_0 and the spin number Omega^2 R/g, which show how close the tank is to
+    /// the limits of the model. `axial` is the specific force along the tank, m/s2, and `rate` the rate Omega at
+    /// which the liquid turns, rad/s.
     pub fn numbers<T: Number>(&self, axial: T, rate: T) -> [T; 2] {
         let omega2 = axial.at_least(self.g_floor) * self.inv_l + T::constant(self.k_m);
         let share = rate * rate / omega2;
@@ -178,8 +178,7 @@ impl SpinSeries {
         (times(&axes, torque), friction[0] * xx + friction[1] * yy + friction[2] * zz)
     }
 
-    /// Returns the liquid's angular momentum L at `t` (s) after the start of the expansion, from its series up to order
-    /// n.
+    /// Returns the liquid's angular momentum L at `t` (s) after the start of the expansion, from its series up to order n.
     pub fn state_at(&self, n: usize, t: f64) -> Vec3 {
         space::value(&self.l, n, t)
     }

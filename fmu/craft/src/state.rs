@@ -184,8 +184,8 @@ impl Kept {
         self.clock[0] > 0.0
     }
 
-    /// Returns true if the next step continues the expansion, because `inputs` are constant over the step and have not
-    /// changed.
+    /// Returns true if the next step continues the expansion, because `inputs` are constant over the step
+    /// and have not changed.
     #[inline(always)]
     pub fn is_continued(&self, inputs: &Inputs) -> bool {
         // The comparison has no branches, which saves a hundred instructions.

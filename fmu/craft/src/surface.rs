@@ -84,9 +84,9 @@
 //! E_i gains m l^2 epsilon W^2 u/2
 //! ```
 //!
-//! In a tank that turns with its liquid, small motions with and against the spin have, seen from the tank, the frequencies l
-//! = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C) W^2). A pendulum, which does not take part in the spin, has C = 1 and
-//! epsilon = 0. The FMUs' parameters are C (`gyroscopic`) and epsilon + 1 - 2 C (`gyroscopic_stiffness`).
+//! In a tank that turns with its liquid, small motions with and against the spin have, seen from the tank, the frequencies
+//! l = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C) W^2). A pendulum, which does not take part in the spin, has C = 1
+//! and epsilon = 0. The FMUs' parameters are C (`gyroscopic`) and epsilon + 1 - 2 C (`gyroscopic_stiffness`).
 //!
 //! Source: the coefficients come from `formulas::third_order` and `formulas::energy_terms`; the equations follow from these
 //! energies by Lagrange's method. tests/craft/surface.rs checks the equations against Newton's law in Cartesian coordinates
@@ -433,8 +433,8 @@ impl<T: Number> Meridian<T> {
         columns
     }
 
-    /// Adds the terms of rotary motion to the bob's contribution `matrix` to the mass matrix. Their direction is [n; rho x n
-    /// - l u e] instead of [n; rho x n], because the rate tau is relative to inertial axes.
+    /// Adds the terms of rotary motion to the bob's contribution `matrix` to the mass matrix. Their direction is [n; rho x
+    /// n - l u e] instead of [n; rho x n], because the rate tau is relative to inertial axes.
     pub fn add_rotary(&self, [m, l]: [T; 2], rho: Vec3<T>, matrix: &mut [[T; 6]; 6]) {
         let Some((n, share)) = self.around else { return };
         let arm = cross(rho, n);

@@ -267,8 +267,8 @@ mod tests {
         }
     }
 
-    /// The derivatives of modal masses, lengths, hinges and inertias with respect to the mass of liquid agree with finite
-    /// differences.
+    /// The derivatives of modal masses, lengths, hinges and inertias with respect to the mass of liquid
+    /// agree with finite differences.
     #[test]
     fn derivatives_equal_finite_differences() {
         let default = crate::Tank::default().fill;
@@ -294,8 +294,8 @@ mod tests {
         }
     }
 
-    /// A table whose points are computed from the formulas of an upright cylinder agrees with these formulas between its
-    /// points.
+    /// A table whose points are computed from the formulas of an upright cylinder agrees with these
+    /// formulas between its points.
     #[test]
     fn a_fill_table_reproduces_a_cylinder_between_its_points() {
         let (d, r) = (0.9, 0.45);

@@ -52,10 +52,10 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
-/// Returns diameter and fill height, m, of the upright cylinder whose first mode has a pendulum with this `length`,
-/// m, and `mass`, kg, with a liquid of `density`, kg/m3. The equations of the module's head give d^4 = 8 xi^2 (xi^2 -
-/// 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the fill, so that
-/// tanh is limited to 0.995.
+/// Returns diameter and fill height, m, of the upright cylinder whose first mode has a pendulum with this
+/// `length`, m, and `mass`, kg, with a liquid of `density`, kg/m3. The equations of the module's head give d^4 = 8
+/// xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
+/// fill, so that tanh is limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     let xi = XI[0];
     let d4 = 8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (density * core::f64::consts::PI);
@@ -78,8 +78,8 @@ pub fn capped_inertia(d: f64, h: f64) -> f64 {
     h * h / 12.0 - 0.75 * radius * radius + 16.0 * radius * radius * radius / h * (sum + rest)
 }
 
-/// Returns zero `n` of J1', which counts from 1. Zeros that are not in the table are computed by McMahon's expansion (DLMF
-/// 10.21.20).
+/// Returns zero `n` of J1', which counts from 1. Zeros that are not in the table are computed by
+/// McMahon's expansion (DLMF 10.21.20).
 fn zero(n: usize) -> f64 {
     if n <= MODES { XI[n - 1] } else { mcmahon(n) }
 }
@@ -155,8 +155,8 @@ mod tests {
         }
     }
 
-    /// The expected values were computed by hand for R = 1 m and h = 1 m, with tanh(xi_2) = 0.99995313 and
-    /// tanh(xi_2/2) = 0.99037.
+    /// The expected values were computed by hand for R = 1 m and h = 1 m, with tanh(xi_2) = 0.99995313
+    /// and tanh(xi_2/2) = 0.99037.
     #[test]
     fn the_second_mode_has_its_mass_length_and_hinge() {
         let second = pendulum(1, 2.0, 1.0, 3.0);

@@ -19,9 +19,9 @@ use libm::{cosh, exp, log, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
-/// Damping of a slosh mode divided by the damping of the laminar layer at the wall, for a tank of a shape without
-/// measurements. It lies between the values of measured cylinders, 1.49 (Stephens) and 1.39 to 1.54 (Mikishev and
-/// Dorozhkin).
+/// Damping of a slosh mode divided by the damping of the laminar layer at the wall, for a tank of a shape
+/// without measurements. It lies between the values of measured cylinders, 1.49 (Stephens) and 1.39 to
+/// 1.54 (Mikishev and Dorozhkin).
 pub const UNMEASURED: f64 = 1.45;
 
 pub const SCATTER: f64 = 0.3;
@@ -333,9 +333,8 @@ pub fn covered(radius: f64, width: f64) -> f64 {
     w * (2.0 - w)
 }
 
-/// Returns the ratio of the liquid's motion at a ring baffle to its motion at the surface, exp(-1.84 d/R), for the
-/// first mode of an upright cylinder. The ring is `depth` (m) below the surface, and `radius` (m) is the radius of the
-/// cylinder.
+/// Returns the ratio of the liquid's motion at a ring baffle to its motion at the surface, exp(-1.84 d/R), for the first
+/// mode of an upright cylinder. The ring is `depth` (m) below the surface, and `radius` (m) is the radius of the cylinder.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
     // The limit keeps a division by this ratio finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))

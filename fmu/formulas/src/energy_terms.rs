@@ -22,8 +22,8 @@ use crate::third_order;
 pub const DEPTHS: [f64; 2] = [0.25, third_order::BRIDGED[0]];
 
 /// Each row contains h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle, degrees, at which the slosh mass was
-/// compared with potential flow. In this table the frequency of circular motion is defined by omega^2 (1 + t A^2 + t_2 A^4)
-/// = (dz/dA)/A, so that t and t_2 are two and three times the t and t_2 of the equations above.
+/// compared with potential flow. In this table the frequency of circular motion is defined by omega^2 (1 + t A^2 + t_2
+/// A^4) = (dz/dA)/A, so that t and t_2 are two and three times the t and t_2 of the equations above.
 const ROWS: [[f64; 8]; 7] = [
     [0.25, 111.6366, 67.2399, 48.6774, -3776.617, -2326.024, -1494.947, 8.0],
     [0.3, 38.3052, 21.5892, 15.4987, -429.434, -236.528, -188.836, 12.5],

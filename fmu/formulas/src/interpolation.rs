@@ -59,8 +59,8 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     }
 }
 
-/// Returns the first and the second derivative, at `x0`, of the polynomial through up to five points, by Fornberg's
-/// recurrence (1988).
+/// Returns the first and the second derivative, at `x0`, of the polynomial through up to five points,
+/// by Fornberg's recurrence (1988).
 fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     let mut weights = [[0.0; 5]; 3];
     weights[0][0] = 1.0;
@@ -135,8 +135,8 @@ mod tests {
         }
     }
 
-    /// Slope and curvature of the interpolant of exp(x) at its points equal the derivatives of the polynomial through the
-    /// five nearest points.
+    /// Slope and curvature of the interpolant of exp(x) at its points equal the derivatives of the polynomial through
+    /// the five nearest points.
     #[test]
     fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
         let y = X.map(libm::exp);

@@ -26,8 +26,8 @@ use crate::cylinder::XI;
 use crate::energy_terms::energy_terms;
 use crate::third_order;
 
-/// Reason why a pendulum does not represent the liquid of a tank in its present state. [`LimitedBy::ITEMS`] describes each
-/// reason.
+/// Reason why a pendulum does not represent the liquid of a tank in its present state.
+/// [`LimitedBy::ITEMS`] describes each reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LimitedBy {
@@ -82,8 +82,8 @@ impl LimitedBy {
     }
 }
 
-/// Largest relative error of a slosh model's natural frequency within its range, compared with fully nonlinear potential
-/// flow.
+/// Largest relative error of a slosh model's natural frequency within its range, compared with
+/// fully nonlinear potential flow.
 pub const FREQUENCY: f64 = 3e-3;
 /// Relative error of the model's natural frequency at which the error of a forced response is 3 %, if the response is wrong
 /// only because the model's frequency changes with the slosh angle in another way than the liquid's frequency.
@@ -97,11 +97,11 @@ pub const FORCED_UNCOMPARED: f64 = 1.7e-4;
 /// third order. It is for a tank in which only free motion was compared with potential flow, and is the smallest such
 /// ratio in upright cylinders.
 pub const ENERGY_UNCOMPARED: f64 = 1.06;
-/// Largest slosh angle, rad, at which the error of a forced response of the third order was below 3 % in any upright
-/// cylinder.
+/// Largest slosh angle, rad, at which the error of a forced response of the third order was below 3 %
+/// in any upright cylinder.
 pub const LARGEST_FORCED: f64 = 9.3 * PI / 180.0;
-/// Largest slosh angle, rad, at which the error of a forced response with [`energy_terms`] was below 3 % in any upright
-/// cylinder.
+/// Largest slosh angle, rad, at which the error of a forced response with [`energy_terms`] was below 3 %
+/// in any upright cylinder.
 pub const LARGEST_FORCED_ENERGY: f64 = 10.2 * (PI / 180.0);
 
 /// Each row contains h/R and two slosh angles of planar motion in an upright cylinder, degrees. At the first angle the
@@ -235,8 +235,8 @@ impl SpinLimit {
     /// Creates the limits for a pendulum of this length, m, in a tank with this radius of the free surface, m. The radius is
     /// 0 if it is unknown; the liquid then counts as deep.
     ///
-    /// The gyroscopic coefficient of the liquid is C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1), with the wave number k and tanh kh
-    /// = 1/(k l). It is 0.418 in deep liquid and 0.837 in shallow liquid.
+    /// The gyroscopic coefficient of the liquid is C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1), with the wave number k and tanh
+    /// kh = 1/(k l). It is 0.418 in deep liquid and 0.837 in shallow liquid.
     pub fn new(length: f64, radius: f64) -> SpinLimit {
         let deep = 1.0 / XI[0];
         let ratio = if radius > 0.0 { radius / length } else { XI[0] };

@@ -33,8 +33,8 @@ use crate::cylinder::XI;
 /// mode 1, and by 0.003 for mode 10 (for h/R from 0.2 on).
 const ZEROS: usize = 16;
 
-/// Zeros of J0', the derivative of the Bessel function J0, that follow the zero at 0. `XI_2` below contains the zeros of
-/// J2'.
+/// Zeros of J0', the derivative of the Bessel function J0, that follow the zero at 0. `XI_2` below contains
+/// the zeros of J2'.
 const XI_0: [f64; ZEROS] = [
     3.831_705_970_207_512_5,
     7.015_586_669_815_619,
@@ -78,9 +78,9 @@ pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
 
-/// Returns the coefficient c with which the slope of the surface changes the squared frequency of mode `n` at h/R =
-/// `fill`, for motion along the slope and across it (see [`factors`]). Modes count from 0, and `n` must be below
-/// [`crate::cylinder::MODES`].
+/// Returns the coefficient c with which the slope of the surface changes the squared frequency of mode `n`
+/// at h/R = `fill`, for motion along the slope and across it (see [`factors`]). Modes count from 0, and `n`
+/// must be below [`crate::cylinder::MODES`].
 pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     let a2 = XI[n] * XI[n];
     let lambda = XI[n] * libm::tanh(XI[n] * fill);
@@ -108,9 +108,8 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// Returns the factors by which a sloping surface changes the squared frequency omega^2 of mode `n` at h/R = `fill`,
-/// for motion along the slope and across it. The surface has the slope s, and the gravity g along the axis is
-/// unchanged.
+/// Returns the factors by which a sloping surface changes the squared frequency omega^2 of mode `n` at h/R = `fill`, for
+/// motion along the slope and across it. The surface has the slope s, and the gravity g along the axis is unchanged.
 ///
 /// The factor is 1 + c s^2. If c is negative, it is 1/(1 - c s^2), which is equal to second order, more accurate at larger
 /// slopes, and never negative.

@@ -52,8 +52,8 @@ pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     [table.scalars.len(), outputs, states, table.about.event_indicators, input as usize]
 }
 
-/// The functions of one version of FMI that get and set values, for reals, integers, enumerations and Booleans in this
-/// order.
+/// The functions of one version of FMI that get and set values, for reals, integers, enumerations and
+/// Booleans in this order.
 pub trait Values: Version {
     const GET: [&'static Call; 4];
     const SET: [&'static Call; 4];
@@ -137,8 +137,8 @@ fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     }
 }
 
-/// Serialises an instance, deserialises it, and checks that it is serialised to the same bytes again. Returns the new
-/// instance.
+/// Serialises an instance, deserialises it, and checks that it is serialised to the same bytes again.
+/// Returns the new instance.
 ///
 /// # Panics
 /// If the bytes are refused or differ.

@@ -67,8 +67,8 @@ fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     all.filter(|(interface, events)| V::allows(*interface, *events))
 }
 
-/// Continues the simulation as a host could. The FMU may refuse calls, but after a successful step all values must be
-/// finite.
+/// Continues the simulation as a host could. The FMU may refuse calls, but after a successful step all
+/// values must be finite.
 fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let table = M::table();
     for input in table.inputs() {

@@ -18,8 +18,8 @@ use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_
 const STEPS: usize = 12;
 /// Longest step, s. The model limits the work of a step; this limit makes the fuzzer faster.
 const LONGEST: f64 = 2.0;
-/// A simulation that takes more CPU time than this ends, because stiff models may use all allowed solver steps in every
-/// step.
+/// A simulation that takes more CPU time than this ends, because stiff models may use all allowed solver
+/// steps in every step.
 const SLOW: Duration = Duration::from_secs(1);
 
 /// Runs one input: creates an instance, sets some values, and simulates. The first byte determines the FMI version
@@ -114,8 +114,8 @@ fn set_something<M: Model, V: Values>(
     Ok(())
 }
 
-/// Limits an input to magnitudes that occur in simulations. At 1e12 N.m, for example, every step would use all allowed
-/// solver steps.
+/// Limits an input to magnitudes that occur in simulations. At 1e12 N.m, for example, every step would use
+/// all allowed solver steps.
 fn everyday(quantity: Quantity) -> Quantity {
     let near = |limit: Option<f64>| limit.filter(|limit| limit.abs() <= 1e6);
     Quantity { min: near(quantity.min), max: near(quantity.max), ..quantity }

@@ -353,8 +353,8 @@ fn continuous_states_cannot_be_set_in_co_simulation() {
     assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
 }
 
-/// Returns work_axial and omega_imu after 1 s in steps of 20 ms, with a g_axial that jumps between steps and is constant
-/// within them.
+/// Returns work_axial and omega_imu after 1 s in steps of 20 ms, with a g_axial that jumps between steps and
+/// is constant within them.
 fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     let mut instance = Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);
     set(&mut instance, "imu.enabled", Value::Boolean(true));

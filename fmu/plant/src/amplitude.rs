@@ -7,8 +7,8 @@
 //! q is the slosh angle in both directions, rad (in the slosh model `liquid`, displacement divided by length). Waves of
 //! finite height dissipate more energy per period than the laminar layer at the wall, because the surface film stretches
 //! and the contact line moves. There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The
-//! drag on the slosh mass is 2 zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation A'
-//! = -omega_n zeta(A) A.
+//! drag on the slosh mass is 2 zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation
+//! A' = -omega_n zeta(A) A.
 //!
 //! Waves break above a steepness s_b. Steepness is k a, with the wave's amplitude a at the wall and the mode's wave
 //! number k. Linear theory gives a = `wave` A, so k a = sigma A with sigma = k `wave`. In an upright cylinder k = xi_n/R

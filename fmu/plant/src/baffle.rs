@@ -34,8 +34,8 @@ use crate::parameters::{Parameters, Ring, SloshSource};
 /// times exp(-1.84 d/R), to the ring's width.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 divided by the smallest wave amplitude for which the baffle's law holds. At this amplitude A_0 adds 2e-4 to the
-/// damping.
+/// A_0 divided by the smallest wave amplitude for which the baffle's law holds. At this amplitude A_0 adds
+/// 2e-4 to the damping.
 const FLOOR: f64 = 0.03;
 
 /// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
@@ -124,8 +124,8 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     warnings
 }
 
-/// Range of validity of the baffle's law. `stroke` is the liquid's stroke at the ring divided by its width, per wave
-/// amplitude, 1/m.
+/// Range of validity of the baffle's law. `stroke` is the liquid's stroke at the ring divided by its width,
+/// per wave amplitude, 1/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     stroke: f64,

@@ -1,5 +1,5 @@
-//! The plant as equations x' = f(x, u) with events, and their partial derivatives, for hosts that integrate the states
-//! themselves.
+//! The plant as equations x' = f(x, u) with events, and their partial derivatives, for hosts that
+//! integrate the states themselves.
 //!
 //! x is defined in `state.rs`. The contact of hub and bearing and the slosh regime are discrete states. They change only in
 //! [`Plant::take_event`], after an event indicator has crossed zero.
@@ -19,8 +19,8 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples that are taken at one instant. If more are due, the host does not handle the FMU's time
-/// events.
+/// Largest number of gyro samples that are taken at one instant. If more are due, the host does not handle
+/// the FMU's time events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
@@ -201,8 +201,8 @@ impl Plant {
             || self.present_ranges(inputs) != self.state.ranges
     }
 
-    /// Returns the number of contact changes since the start, the time of the last one, s, and the number of
-    /// the present [`Contact`].
+    /// Returns the number of contact changes since the start, the time of the last one, s, and the number
+    /// of the present [`Contact`].
     pub fn last_contact(&self) -> (i32, f64, i32) {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)
     }
@@ -608,8 +608,7 @@ mod tests {
         assert!(plant.take_event(&inputs).is_err());
     }
 
-    /// A step of 1e12 s with the gyro enabled would take 5e13 samples, more than `solver.max_steps`
-    /// allows.
+    /// A step of 1e12 s with the gyro enabled would take 5e13 samples, more than `solver.max_steps` allows.
     #[test]
     fn a_step_with_more_samples_than_allowed_is_refused_at_once() {
         let mut p = Parameters::default();

@@ -24,8 +24,8 @@ pub struct HubMotion {
 /// e = g d, d = t (cos(phi - theta), sin(phi - theta))
 /// ```
 ///
-/// where g is the specific force along the axis. A mass M at the position X has the potential energy -M e.X, and d'
-/// = w (d_y, -d_x).
+/// where g is the specific force along the axis. A mass M at the position X has the potential energy -M e.X, and
+/// d' = w (d_y, -d_x).
 #[derive(Clone, Debug)]
 pub struct Tilt {
     pub tangent: f64,

@@ -13,14 +13,14 @@
 
 use crate::parameters::Imu;
 
-/// Fraction of a sampling period by which the gyro may take a sample early, in addition to the resolution of the host's
-/// clock.
+/// Fraction of a sampling period by which the gyro may take a sample early, in addition to the resolution
+/// of the host's clock.
 const SLACK: f64 = 1e-6;
 
 pub(crate) const FLICKERS: usize = 8;
 const RATIO: f64 = 6.0;
-/// Shortest correlation time of the flicker noise, s. At 0.1 s the white noise of a gyro is far larger than
-/// the flicker noise.
+/// Shortest correlation time of the flicker noise, s. At 0.1 s the white noise of a gyro is far larger
+/// than the flicker noise.
 const SHORTEST: f64 = 0.1;
 
 /// State of the gyro: the number `next` of its next sample (sample k is taken k/rate seconds after the start), the reading
@@ -334,8 +334,8 @@ mod tests {
         let imu = clean(50.0);
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 0.0);
-        // From 13 ms on, 0.1 s contain the samples at 20, 40, ... 100 ms, when the rate is 7, 27, ... 87 ms after the
-        // beginning.
+        // From 13 ms on, 0.1 s contain the samples at 20, 40, ... 100 ms, when the rate is 7, 27, ... 87
+        // ms after the beginning.
         assert_eq!(imu.follow(&mut gyro, 0.013, 0.1, |t| 2.0 + t, 9), 5);
         assert_eq!((gyro.next, gyro.held), (6, 2.0 + (0.1 - 0.013)));
         // Within a step no sample is taken early. At the end of a step a sample may be early by a millionth of a period

@@ -82,8 +82,8 @@ impl Leaning {
         Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
     }
 
-    /// Returns the frequency of mode 1's pendulum in the radial direction divided by the liquid's frequency
-    /// in that direction.
+    /// Returns the frequency of mode 1's pendulum in the radial direction divided by the liquid's
+    /// frequency in that direction.
     fn radial_frequency(self, p: &Parameters) -> f64 {
         let fill = 2.0 * p.tank.h / p.tank.d;
         let [tangential, radial] = self.factors(0, fill);

@@ -344,8 +344,8 @@ impl Motion {
         !self.varies && !self.suspension.exists
     }
 
-    /// Advances the motion as [`Motion::advance`] does, for one slosh model. `UNROLLED` is allowed only for a constant specific force and
-    /// plain motion ([`Motion::is_plain`]).
+    /// Advances the motion as [`Motion::advance`] does, for one slosh model. `UNROLLED` is allowed only for a constant
+    /// specific force and plain motion ([`Motion::is_plain`]).
     #[inline(always)]
     fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,

@@ -154,8 +154,8 @@ pub struct Ring {
     pub depth: f64,
 }
 
-/// Attitude of the bench: its axis is tilted by `tilt`, and the component of gravity across the axis points
-/// to `tilt_azimuth`.
+/// Attitude of the bench: its axis is tilted by `tilt`, and the component of gravity across the
+/// axis points to `tilt_azimuth`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Bench {
@@ -243,8 +243,7 @@ pub struct Imu {
     pub seed: i32,
 }
 
-/// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one call may
-/// take.
+/// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one call may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Solver {

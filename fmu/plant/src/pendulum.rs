@@ -229,8 +229,7 @@ impl Pendulum {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
     }
 
-    /// Returns coefficient n of the product of a rate v of the liquid and the drag coefficient, which may change in
-    /// time.
+    /// Returns coefficient n of the product of a rate v of the liquid and the drag coefficient, which may change in time.
     #[inline(always)]
     pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
         if varies { mul(n, &self.course, v) } else { v[n] }

@@ -312,8 +312,7 @@ fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
     })
 }
 
-/// Bond number of the tank below which capillarity adds more than 3 % to the squared frequency of
-/// mode 1.
+/// Bond number of the tank below which capillarity adds more than 3 % to the squared frequency of mode 1.
 const LOW_BOND: f64 = 100.0;
 
 impl Calculated {

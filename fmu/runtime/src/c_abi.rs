@@ -22,8 +22,8 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of an FMI function, by which the host learns if the call has succeeded: [`OK`], [`DISCARD`], [`ERROR`] or
-/// [`FATAL`].
+/// Return value of an FMI function, by which the host learns if the call has succeeded: [`OK`],
+/// [`DISCARD`], [`ERROR`] or [`FATAL`].
 pub type Status = c_int;
 /// The call succeeded.
 pub const OK: Status = 0;
@@ -311,8 +311,8 @@ pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     unsafe { perform(handle, call, if_allowed) }
 }
 
-/// Runs `body` as [`perform`] does. If the simulation starts with this call, logs warnings about initial parameters and
-/// inputs.
+/// Runs `body` as [`perform`] does. If the simulation starts with this call, logs warnings about
+/// initial parameters and inputs.
 pub unsafe fn perform_start<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,

@@ -154,8 +154,7 @@ pub struct Call {
     /// Name of the function, with which error messages begin.
     pub name: &'static str,
     allowed: u16,
-    /// The C type of the values if the function reads or sets values of variables; `None` for all
-    /// other functions.
+    /// The C type of the values if the function reads or sets values of variables; `None` for all other functions.
     pub c_type: Option<CType>,
     only_in: Option<Interface>,
 }
@@ -165,8 +164,8 @@ impl Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// Checks that the host may make this call, for the interface, the handling of events and the present state of the
-    /// instance.
+    /// Checks that the host may make this call, for the interface, the handling of events and the present
+    /// state of the instance.
     ///
     /// # Errors
     /// If the call is not allowed; the message contains the instance states in which it is allowed.
@@ -228,8 +227,8 @@ impl Call {
         Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
     }
 
-    /// Returns a fault with the status Discard, because the result of the call cannot be computed and the instance is
-    /// unchanged.
+    /// Returns a fault with the status Discard, because the result of the call cannot be computed and
+    /// the instance is unchanged.
     #[cold]
     pub fn discard(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Discard, text: format!("{}: {why}", self.name) }

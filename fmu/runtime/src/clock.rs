@@ -63,8 +63,7 @@ impl Clock {
         ROUNDING * self.start.abs().max(time.abs())
     }
 
-    /// Returns the difference, s, below which a time near `time` counts as the expected end of a step of size
-    /// `h`.
+    /// Returns the difference, s, below which a time near `time` counts as the expected end of a step of size `h`.
     fn tolerance(&self, time: f64, h: f64) -> f64 {
         DRIFT * (time - self.start).abs().max(h) + self.resolution(time)
     }

@@ -68,8 +68,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         tolerance: f64,
     ) -> Result<Self, Vec<String>>;
 
-    /// Returns warnings, one sentence each, if parameters or initial inputs are outside the range in which the model was
-    /// verified.
+    /// Returns warnings, one sentence each, if parameters or initial inputs are outside the range in which
+    /// the model was verified.
     fn warnings(&self, parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
         let _ = (parameters, inputs);
         Vec::new()
@@ -84,9 +84,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         None
     }
 
-    /// Appends the states of the model to `words` for a saved state; parameters and inputs are
-    /// saved by the caller. The number of words is always
-    /// [`About::saved_words`](crate::table::About::saved_words).
+    /// Appends the states of the model to `words` for a saved state; parameters and inputs are saved by the caller. The
+    /// number of words is always [`About::saved_words`](crate::table::About::saved_words).
     fn save(&self, words: &mut Vec<u64>);
 
     /// Restores a saved state of a model with the same parameters. Returns `None` if the words are not a valid state.

@@ -162,8 +162,8 @@ impl Extent {
         &self.starts
     }
 
-    /// Returns the start values of inputs that differ from the start values in the table, each with the input's position in
-    /// the table.
+    /// Returns the start values of inputs that differ from the start values in the table, each with the input's
+    /// position in the table.
     pub fn inputs(&self) -> &[(usize, f64)] {
         &self.inputs
     }

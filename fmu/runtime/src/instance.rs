@@ -212,14 +212,14 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state
     }
 
-    /// Returns the present simulation time, s: the end of the last step, or in Model Exchange the time that the host has
-    /// set.
+    /// Returns the present simulation time, s: the end of the last step, or in Model Exchange the time that
+    /// the host has set.
     pub fn time(&self) -> f64 {
         self.clock.time
     }
 
-    /// Makes the instance unusable after a panic, because its values may be wrong: every further call except freeing is
-    /// refused.
+    /// Makes the instance unusable after a panic, because its values may be wrong: every further call
+    /// except freeing is refused.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
     }
@@ -557,8 +557,8 @@ impl<M: Model, V: Version> Instance<M, V> {
                 _ => Err(call.discard(state_refusal(scalar, value))),
             };
         }
-        // Parameters that are not allowed are refused together when initialization ends. All other values are refused
-        // immediately.
+        // Parameters that are not allowed are refused together when initialization ends. All other
+        // values are refused immediately.
         if !is_input {
             self.check_set_parameter(call, scalar)?;
         }
@@ -1402,8 +1402,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.model.as_ref().and_then(M::step_warning)
     }
 
-    /// Returns the number of events since the start, from which callers notice that a step had events. It may overflow and
-    /// restart.
+    /// Returns the number of events since the start, from which callers notice that a step had events. It
+    /// may overflow and restart.
     #[inline]
     pub fn event_count(&self) -> i32 {
         self.model.as_ref().map_or(0, M::event_count)

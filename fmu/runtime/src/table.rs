@@ -49,8 +49,8 @@ pub struct Table<M: Dynamics> {
 pub enum Layout {
     /// Each element of an array is a variable.
     Scalars = 0,
-    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that determine array sizes are
-    /// structural.
+    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that determine
+    /// array sizes are structural.
     Arrays = 1,
 }
 
@@ -84,8 +84,8 @@ pub const fn join<M: Dynamics, const N: usize>(parts: &[&[Variable<M>]]) -> [Var
 /// Range of consecutive scalars in the table: the index of the first scalar, and the index after that of the last scalar.
 type Span = (usize, usize);
 
-/// Returns the range of indices of one kind of scalars: 'i' for inputs, 'p' for parameters, any other character for
-/// derivatives.
+/// Returns the range of indices of one kind of scalars: 'i' for inputs, 'p' for parameters, any
+/// other character for derivatives.
 const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
     let (mut begin, mut end, mut n) = (0, 0, 0);
     while n < scalars.len() {
@@ -121,8 +121,7 @@ pub struct Scalar<M: Dynamics> {
     /// If this scalar is a continuous state, the function that returns the number of the state. It is copied from the entry
     /// in the table, because every call needs it.
     pub state: Option<Place>,
-    /// Index among all scalars, from which the value reference follows (see
-    /// [`Version`](crate::version::Version)).
+    /// Index among all scalars, from which the value reference follows (see [`Version`](crate::version::Version)).
     pub index: u32,
     /// Number of the element in its array, 0 for the first.
     pub element: usize,
@@ -219,8 +218,8 @@ impl<M: Dynamics> Scalar<M> {
         self.variable.start(&mut parameters, &mut inputs, self.element)
     }
 
-    /// Returns true if the list of dependencies `names` contains the scalar `other`. The list may contain names of whole
-    /// arrays.
+    /// Returns true if the list of dependencies `names` contains the scalar `other`. The list may contain
+    /// names of whole arrays.
     pub(crate) fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {

@@ -52,8 +52,8 @@ pub static UNITS: &[Unit] = &[
     unit("N.m",     [ 1,  2, -2, 0], &[("mN.m", 1e3)]),
     unit("N.m.s",   [ 1,  2, -1, 0], &[]),
     unit("N.m/s",   [ 1,  2, -3, 0], &[]),
-    // The radian in the unit of a torsional stiffness or damping is that of the angle or rate to which the torque is
-    // proportional.
+    // The radian in the unit of a torsional stiffness or damping is that of the angle or rate to which
+    // the torque is proportional.
     unit("N.m/rad", [ 1,  2, -2, -1], &[]),
     unit("N.m.s/rad", [ 1, 2, -1, -1], &[]),
     unit("kg.m2",   [ 1,  2,  0, 0], &[]),

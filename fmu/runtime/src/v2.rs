@@ -1,9 +1,8 @@
 //! The C interface of FMI 2.0 for Model Exchange and Co-Simulation: 44 functions with their names, signatures and constants.
 //! The FMI standard documents them; the comments here describe only properties of this implementation.
 //!
-//! Every function is generic in the model; `export_fmi2!` exports them for one model under their names. Their
-//! effects are implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface
-//! in [`crate::c_abi`].
+//! Every function is generic in the model; `export_fmi2!` exports them for one model under their names. Their effects are
+//! implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface in [`crate::c_abi`].
 
 // The standard documents these names.
 #![allow(missing_docs)]
@@ -254,8 +253,7 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
     }))
 }
 
-/// Returns the interface of the requested instance, and the part of the variables that the host's model description
-/// contains.
+/// Returns the interface of the requested instance, and the part of the variables that the host's model description contains.
 ///
 /// # Errors
 /// If the instance cannot be created; the text is the reason.
@@ -353,8 +351,8 @@ c_functions! { $ export_fmi2, v2;
 fn fmi2GetTypesPlatform() -> fmi2String = c"default".as_ptr();
 fn fmi2GetVersion() -> fmi2String = c"2.0".as_ptr();
 
-/// Selects the logged categories: if `loggingOn` is false, nothing is logged; if it is true and no categories are given, everything is
-/// logged.
+/// Selects the logged categories: if `loggingOn` is false, nothing is logged; if it is true and no categories are
+/// given, everything is logged.
 fn fmi2SetDebugLogging(c: fmi2Component, loggingOn: fmi2Boolean, nCategories: usize, categories: *const fmi2String) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, &SET_DEBUG_LOGGING, |component| {
         component.log.filter = match loggingOn {

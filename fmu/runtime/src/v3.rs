@@ -1,9 +1,8 @@
 //! The C interface of FMI 3.0 for Model Exchange and Co-Simulation: 75 functions with their names, signatures and constants.
 //! The FMI standard documents them; the comments here describe only properties of this implementation.
 //!
-//! Every function is generic in the model; `export_fmi3!` exports them for one model under their names. Their
-//! effects are implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface
-//! in [`crate::c_abi`].
+//! Every function is generic in the model; `export_fmi3!` exports them for one model under their names. Their effects are
+//! implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface in [`crate::c_abi`].
 //!
 //! The value reference of a scalar is its position among the variables, counted from 1. After the variables of the table
 //! follow the independent variable and the event indicators, which are not variables in FMI 2.0. There are no clocks and no

@@ -113,8 +113,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
-/// Function from the number of an array's element, 0 for the first, to the number of the continuous state that the element
-/// is.
+/// Function from the number of an array's element, 0 for the first, to the number of the continuous state
+/// that the element is.
 pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
@@ -371,8 +371,7 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Declares that events can make this continuous state discontinuous, such as a velocity at an
-    /// impact.
+    /// Declares that events can make this continuous state discontinuous, such as a velocity at an impact.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
@@ -402,8 +401,7 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Returns the number of scalars that the variable has: the product of the largest lengths of
-    /// all dimensions.
+    /// Returns the number of scalars that the variable has: the product of the largest lengths of all dimensions.
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {
@@ -526,8 +524,7 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns true if an input may change at this rate, which must be finite and at most
-    /// [`Variable::fastest`].
+    /// Returns true if an input may change at this rate, which must be finite and at most [`Variable::fastest`].
     #[inline]
     pub fn allows_rate(&self, rate: f64) -> bool {
         let Kind::Real(Quantity { min, max, .. }) = &self.kind else { return is_finite(rate) };

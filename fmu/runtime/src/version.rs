@@ -6,8 +6,8 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 
 /// A version of FMI. Each constant of the type [`Call`] is the function that performs an operation of
-/// [`Instance`](crate::instance::Instance). Functions that read and set values are not among them, because a version has
-/// several.
+/// [`Instance`](crate::instance::Instance). Functions that read and set values are not among them, because
+/// a version has several.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
     const PREFIX: &'static str;
@@ -47,8 +47,8 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// Returns the text by which the FMU recognises its model description: the GUID (FMI 2.0) or the instantiationToken (FMI
-    /// 3.0).
+    /// Returns the text by which the FMU recognises its model description: the GUID (FMI 2.0) or
+    /// the instantiationToken (FMI 3.0).
     fn token<M: Model>(layout: Layout) -> &'static str;
 
     /// Returns who handles the events of an instance with this interface if the host does not choose.

@@ -23,8 +23,7 @@ pub enum StepError {
 }
 
 impl StepError {
-    /// Returns true if a shorter step may succeed, because the motion itself is still within the model's
-    /// range.
+    /// Returns true if a shorter step may succeed, because the motion itself is still within the model's range.
     pub fn shorter_may_succeed(&self) -> bool {
         matches!(self, StepError::TooManySteps { .. } | StepError::NotFinite { .. })
     }

@@ -96,8 +96,8 @@ pub enum Convergence {
     Decay,
 }
 
-/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and n
-/// + 1, or n + 1 and n + 2. Terms after n are predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
+/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and
+/// n + 1, or n + 1 and n + 2. Terms after n are predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
 /// divided by its tolerance.
 ///
 /// For the prediction the slower of two decays over two orders is used: t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)),
@@ -878,8 +878,8 @@ mod tests {
         assert_eq!(end, Err(StepError::NotFinite { time: 7.0 }));
     }
 
-    /// A series of the highest order over 50 s is used only up to the time at which one of its last two terms reaches the
-    /// tolerance.
+    /// A series of the highest order over 50 s is used only up to the time at which one of its last two
+    /// terms reaches the tolerance.
     #[test]
     fn a_step_too_long_for_the_highest_order_is_cut_to_where_the_last_two_terms_are_allowed() {
         for highest in [10, ORDER] {

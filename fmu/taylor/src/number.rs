@@ -2,8 +2,8 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Number type over which a formula is generic: with [`f64`] the formula gives its value, with [`Dual`] its directional
-/// derivative.
+/// Number type over which a formula is generic: with [`f64`] the formula gives its value, with
+/// [`Dual`] its directional derivative.
 pub trait Number:
     Copy
     + Add<Output = Self>

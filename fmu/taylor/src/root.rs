@@ -2,8 +2,8 @@
 
 use crate::series::ORDER;
 
-/// Number of iterations with one bound for the whole interval, after which [`first_root`] uses bounds for parts of the
-/// interval.
+/// Number of iterations with one bound for the whole interval, after which [`first_root`] uses bounds for
+/// parts of the interval.
 const COARSE_STEPS: usize = 200;
 
 /// Returns the first t in (0, h] at which the polynomial `a`, which is positive at t = 0, has fallen to zero; `None` if it

@@ -95,8 +95,7 @@ pub fn square(n: usize, a: &Series) -> f64 {
     2.0 * (half + a[0] * a[n]) + middle
 }
 
-/// Returns coefficient n of a^(1/2) from coefficient n of a, with a_0 above 0, and the coefficients of `root`
-/// below n.
+/// Returns coefficient n of a^(1/2) from coefficient n of a, with a_0 above 0, and the coefficients of `root` below n.
 pub fn sqrt(n: usize, a: f64, root: &Series) -> f64 {
     if n == 0 {
         return libm::sqrt(a);

@@ -71,8 +71,8 @@ pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
 /// Returns coefficient N of the six different products of a vector's components: xx, yy, zz, xy, xz, yz.
 #[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
-    // Terms j and N - j are added together: 2 a_j b_(N-j) for a square, and a_j b_(N-j) + a_(N-j) b_j for the other
-    // products.
+    // Terms j and N - j are added together: 2 a_j b_(N-j) for a square, and a_j b_(N-j) + a_(N-j) b_j
+    // for the other products.
     let mut sum = [EMPTY; 6];
     for j in (0..N.div_ceil(2)).rev() {
         let (a, b) = (a[j], a[N - j]);
@@ -129,8 +129,7 @@ pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of the scalar product a.b without its term a_0.b_N, because b_N may not be
-/// known yet.
+/// Returns coefficient N of the scalar product a.b without its term a_0.b_N, because b_N may not be known yet.
 #[inline(always)]
 pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     let mut sum = [EMPTY; 3];

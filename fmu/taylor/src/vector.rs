@@ -66,8 +66,8 @@ pub fn norm<T: Number>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
-/// Returns the matrix of a rotation. If q rotates from frame B to frame A, the matrix maps components in B to components in
-/// A.
+/// Returns the matrix of a rotation. If q rotates from frame B to frame A, the matrix maps components in B
+/// to components in A.
 #[inline(always)]
 pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
     let [w, x, y, z] = *q;

@@ -231,8 +231,8 @@ impl Panel {
         let (sin, cos) = angle.sin_cos();
         let (sin_p, cos_p) = (angle + bend).sin_cos();
         let both = turn + swing;
-        // Velocity of the panel's centre per rate of hub and panel, and the part of its acceleration without second
-        // derivatives.
+        // Velocity of the panel's centre per rate of hub and panel, and the part of its
+        // acceleration without second derivatives.
         let swung = [-d * sin_p, d * cos_p];
         let turned = [-hinge * sin + swung[0], hinge * cos + swung[1]];
         let left = [

@@ -18,8 +18,8 @@ use super::records::{STEP, inputs, parameters, records, steps};
 
 const END: usize = if cfg!(debug_assertions) { 5_000 } else { 50_000 };
 
-/// Iterates over the nodes of Lobatto's rule in a step of length 1 and their weights, with the step divided into `panels`
-/// parts.
+/// Iterates over the nodes of Lobatto's rule in a step of length 1 and their weights, with the step
+/// divided into `panels` parts.
 fn lobatto(panels: usize) -> impl Iterator<Item = (f64, f64)> {
     let far = f64::sqrt(3.0 / 7.0) / 2.0;
     let (end, inner, middle) = (1.0 / 20.0, 49.0 / 180.0, 16.0 / 45.0);

@@ -448,8 +448,8 @@ pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     ((tank.m_0 * tank.h_0 + bobs) / mass + a, V::new(b, b, a), mass)
 }
 
-/// Returns J_a, the inertia of all parts of the liquid about their common centre, for the directions `p` of the rods, body
-/// axes.
+/// Returns J_a, the inertia of all parts of the liquid about their common centre, for the directions `p` of
+/// the rods, body axes.
 pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     let tank = &p.tank[i];
     let axes = *rotation(&tank.q).matrix();

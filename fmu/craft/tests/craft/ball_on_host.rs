@@ -304,8 +304,8 @@ fn runge_kutta(x: &[f64], h: f64, mut rates: impl FnMut(f64, &[f64]) -> Vec<f64>
     (0..x.len()).map(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])).collect()
 }
 
-/// Returns a craft with one tank, off the craft's axis and inclined to it. The drag of its bobs does not depend on the
-/// acceleration.
+/// Returns a craft with one tank, off the craft's axis and inclined to it. The drag of its bobs does not
+/// depend on the acceleration.
 fn one(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1, ..off_axis_craft(random) };
     let tank = &mut p.tank[0];

@@ -138,8 +138,8 @@ fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
     }
 }
 
-/// The remaining mass is the initial mass minus the integral of the flow, and the motion is the same for steps of any
-/// length.
+/// The remaining mass is the initial mass minus the integral of the flow, and the motion is the same for
+/// steps of any length.
 #[test]
 fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     let (p, mut u) = draining_craft(7, 2);

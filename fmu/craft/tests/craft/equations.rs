@@ -211,8 +211,8 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
         assert_same(&exact, &rates, &now[0], &format!("{seed} rate"));
         let exact = flat_tank(&tank.output_derivatives(&u, &dx, &du));
         assert_same(&exact, &outputs, &now[1], &format!("{seed} output"));
-        // The sum of the waves of all modes is left out where the waves nearly cancel, because it is too curved for
-        // differences.
+        // The sum of the waves of all modes is left out where the waves nearly cancel, because it is
+        // too curved for differences.
         let (out, slope) = (tank.outputs(&u).tank, tank.output_derivatives(&u, &dx, &du).tank);
         let wave = |angle: &[f64; MODES]| -> f64 {
             (0..p.tank.modes).map(|n| p.tank.wave[n] * angle[n]).sum()

@@ -1,9 +1,9 @@
 //! Tests of the events of detached liquid: impacts, release and settling occur at the same instants for every integrator and
 //! every length of step.
 //!
-//! The reference is a simulator in maximal coordinates: the craft is a rigid body, the detached liquid is a point mass, and the
-//! wall is a constraint with a Lagrange multiplier. The integrator is an extrapolation method of order 10, and events are located by
-//! bisection.
+//! The reference is a simulator in maximal coordinates: the craft is a rigid body, the detached liquid is a point mass, and
+//! the wall is a constraint with a Lagrange multiplier. The integrator is an extrapolation method of order 10, and events
+//! are located by bisection.
 
 use craft::{BallState, Inputs, Parameters, Ramp, Spacecraft, State, TANKS, index};
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion};
@@ -467,13 +467,12 @@ pub(super) struct Method {
     /// Relative and absolute tolerance of a step. If it is 0, all steps have the length `longest`.
     pub tolerance: f64,
     pub longest: f64,
-    /// True if the integrator locates events within a step. Otherwise events are handled at the end
-    /// of the step.
+    /// True if the integrator locates events within a step. Otherwise events are handled at the end of the step.
     pub locates: bool,
 }
 
-/// Coefficients of the method of Dormand and Prince: stages, the result of order 5, the error estimate, the continuous
-/// extension.
+/// Coefficients of the method of Dormand and Prince: stages, the result of order 5, the error
+/// estimate, the continuous extension.
 const A: [&[f64]; 6] = [
     &[1.0 / 5.0],
     &[3.0 / 40.0, 9.0 / 40.0],

@@ -301,8 +301,8 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
             m[(k, at + 3)] = -shape.normal[k] * unless(NoAddedMass);
             m[(3 + k, at + 3)] = -arm.cross(&shape.normal)[k] * unless(NoAddedMass);
         }
-        // The internal kinetic energy exerts the force m_i (|q'|^2 + q.q'') q on the bob and the opposite force on the
-        // craft.
+        // The internal kinetic energy exerts the force m_i (|q'|^2 + q.q'') q on the bob and the opposite
+        // force on the craft.
         let q = perp * l;
         let m_i = mass * (tank.nonlinear_inertia[n] - 1.0) / (l * l);
         let q_d = rate * l - e * (e.dot(&rate) * l);
@@ -352,8 +352,8 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         seen.push((i, axes, shape.normal, across, rho, phi + inner, own));
         shapes.push((shape, l, e));
     }
-    // Newton's law of each appendage mode: its mass moves by y = p eta relative to the craft, measured from the interface
-    // point.
+    // Newton's law of each appendage mode: its mass moves by y = p eta relative to the craft, measured
+    // from the interface point.
     for (j, mode) in p.appendage[..p.appendages].iter().enumerate() {
         let (at, row) = (v(&mode.position), first + j);
         let (along, about) = (v(&mode.participation), v(&mode.participation[3..]));

@@ -584,8 +584,8 @@ fn an_impossible_outflow_is_refused() {
         assert!(matches!(error, StepError::Model(_)), "{message}");
         assert!(message.contains("(allowed: 10 to 20 kg"), "{message}");
     }
-    // Within the step the flow of 6 - 3 t kg/s reverses: after 2 s of 4 s 6 kg have drained, and at the end all have
-    // returned.
+    // Within the step the flow of 6 - 3 t kg/s reverses: after 2 s of 4 s 6 kg have drained, and at the
+    // end all have returned.
     for (value, missing) in [(6.0, 6.0), (-6.0, -6.0)] {
         u.mass_flow = flow(value);
         u.mass_flow[0].slope = -value / 2.0;

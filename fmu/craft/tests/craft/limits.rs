@@ -29,8 +29,8 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     assert_eq!([9.2, 9.4].map(|x| at(third, x, false)), [LimitedBy::None, LimitedBy::ThirdOrder]);
     let rotary = [LimitedBy::None, LimitedBy::SecondaryResonance];
     assert_eq!([5.8, 6.0].map(|x| at(third, x, true)), rotary);
-    // At h/R = 0.5 the limit is 6.5 degrees with the third order, and 11.8 degrees with the coefficients of the wave's
-    // energy.
+    // At h/R = 0.5 the limit is 6.5 degrees with the third order, and 11.8 degrees with the coefficients
+    // of the wave's energy.
     for (has_energy, ends) in [(false, 6.5), (true, 11.8)] {
         let limited = [0.99, 1.01].map(|factor| {
             let mut tank = Tank { diameter: 0.2, depth: 0.05, g_ref: 9.81, ..Tank::default() };

@@ -79,8 +79,8 @@ fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
         let same = (0..index::BOBS).map(|i| (i, i)).chain(bob(along).zip(bob(0)));
         for (i, k) in same {
             let (got, want) = (planar[i], around[k]);
-            // Each step has an error of 1e-12, which grows over 4 s. The two motions are computed by bob.rs and
-            // constrained.rs.
+            // Each step has an error of 1e-12, which grows over 4 s. The two motions are computed
+            // by bob.rs and constrained.rs.
             assert!((got - want).abs() < 1e-10 * (1.0 + want.abs()), "{along} [{i}]: {got} {want}");
         }
         // Nothing moves perpendicular to the plane.
@@ -174,8 +174,8 @@ fn options_of_axisymmetric_tanks_are_refused_together_with_options_of_asymmetric
     assert!(p.problems()[0].starts_with(names));
 }
 
-/// Rigid liquid of negative mass is allowed only with planar modes, and only if craft and liquid together have positive
-/// inertia.
+/// Rigid liquid of negative mass is allowed only with planar modes, and only if craft and liquid
+/// together have positive inertia.
 #[test]
 fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_positive() {
     let mut p = craft(a_box());
@@ -358,8 +358,8 @@ fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
         let (whole, cut) = (whole.continuous_states(), cut.continuous_states());
         for i in 0..TANK_STATES {
             let size = 1.0 + whole[i].abs();
-            // Each step has an error of 1e-12, which grows over 2 s. The error of the Runge-Kutta method is explained in
-            // `exchange.rs`.
+            // Each step has an error of 1e-12, which grows over 2 s. The error of the Runge-Kutta method
+            // is explained in `exchange.rs`.
             assert!(
                 (cut[i] - whole[i]).abs() < 1e-10 * size,
                 "{seed} [{i}] {} {}",

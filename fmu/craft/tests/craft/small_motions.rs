@@ -97,8 +97,8 @@ fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f
     [rate[PITCH_RATE], rate[SLOSH_RATE]]
 }
 
-/// Returns the squared pole, the damping 2 zeta_p w_p, and the squared zero of theta with respect to the input that `du`
-/// describes.
+/// Returns the squared pole, the damping 2 zeta_p w_p, and the squared zero of theta with respect to the
+/// input that `du` describes.
 fn pole_and_zero(p: &Parameters, du: [f64; INPUTS]) -> [f64; 3] {
     let mut craft = Spacecraft::new(p, &inputs(), 0.0, 1e-9).unwrap();
     let [alpha, gamma] = column(&mut craft, Some(SLOSH), [0.0; INPUTS]);

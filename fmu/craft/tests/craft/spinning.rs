@@ -28,8 +28,8 @@ const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([50.0, 90.0, 80.0, 0.3, 0.4], [[0.783443734998, 0.0], [-0.71017527478, 0.0]]),
 ];
 
-/// Returns a craft that rotates about its z axis at `rate`, rad/s. `decay` is the decay rate of the liquid's spin by
-/// friction.
+/// Returns a craft that rotates about its z axis at `rate`, rad/s. `decay` is the decay rate of the
+/// liquid's spin by friction.
 fn spheroid([across, axial, m, a, c]: [f64; 5], rate: f64, decay: [f64; 2]) -> Parameters {
     let mut p = Parameters::default();
     let j = Inertia { xx: across, yy: across, zz: axial, xy: 0.0, xz: 0.0, yz: 0.0 };

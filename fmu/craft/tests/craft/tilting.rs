@@ -47,9 +47,9 @@ fn tilted([x, y]: [f64; 2]) -> [f64; 4] {
     [1.0, x / 2.0, y / 2.0, 0.0]
 }
 
-/// The tilt angles theta = theta_x + i theta_y in rotating axes are phi = theta e^(i W t) in space. They fulfil I phi''
-/// - i I_a W phi' + (k - M g h) phi = 0, where W is the spin, and I and I_a are the moments of inertia about O across
-/// and along the axis.
+/// The tilt angles theta = theta_x + i theta_y in rotating axes are phi = theta e^(i W t) in space. They fulfil I
+/// phi'' - i I_a W phi' + (k - M g h) phi = 0, where W is the spin, and I and I_a are the moments of inertia about O
+/// across and along the axis.
 #[test]
 fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_spring() {
     let mut p = platform();
@@ -127,8 +127,8 @@ fn an_unbalanced_platform_leaks_into_the_tilt_by_its_products_of_inertia() {
     }
 }
 
-/// A centre of mass at the distance d from the axis also couples by gravity: at rest the platform is tilted by M g d/(k
-/// - M g h).
+/// A centre of mass at the distance d from the axis also couples by gravity: at rest the platform is tilted by M g
+/// d/(k - M g h).
 #[test]
 fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     let mut p = platform();
@@ -240,8 +240,8 @@ fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
     let (mut x, mut t, h) = (0.0, 0.0, 2e-4);
     let mut most: f64 = 0.0;
     for k in 0..2000 {
-        // The torque on the craft is linear within its steps of 2 ms, which differs from the sine by tau w^2 h^2/8
-        // = 4e-7 N m.
+        // The torque on the craft is linear within its steps of 2 ms, which differs from the sine by tau w^2
+        // h^2/8 = 4e-7 N m.
         let at = |k: i32| tau * (w * 2e-3 * f64::from(k)).sin();
         let slope = (at(k + 1) - at(k)) / 2e-3;
         let torque = Ramp { value: [0.0, 0.0, at(k)], slope: [0.0, 0.0, slope] };

@@ -1,7 +1,6 @@
 //! Friction of the bearing: one law per file, each with the power series of its terms.
 //!
-//! The directional factor B of dry friction is in `directional.rs`, Stribeck's curve in
-//! `curve.rs`.
+//! The directional factor B of dry friction is in `directional.rs`, Stribeck's curve in `curve.rs`.
 
 mod curve;
 mod directional;
@@ -47,8 +46,8 @@ pub trait FrictionLaw {
     /// Sets coefficient n + 1 of this state.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
-    /// Returns coefficient n of the bearing's dissipated power, W. [`FrictionLaw::torque`] must have computed
-    /// coefficient n before.
+    /// Returns coefficient n of the bearing's dissipated power, W. [`FrictionLaw::torque`] must have
+    /// computed coefficient n before.
     #[inline(always)]
     fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
         -series::mul(n, tau_f, omega)

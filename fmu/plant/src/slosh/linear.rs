@@ -6,8 +6,7 @@
 //! al'' = -(c/m) al' - (g/l) al - (r/l) w'
 //! ```
 //!
-//! Thesis 4.27, 4.29 with the sign of the slosh torque corrected. With the printed sign the plant
-//! would generate energy.
+//! Thesis 4.27, 4.29 with the sign of the slosh torque corrected. With the printed sign the plant would generate energy.
 //! ```text
 //! E = m (r w + l al')^2/2 + m g l al^2/2,  H = m r (r w + l al')
 //! ```

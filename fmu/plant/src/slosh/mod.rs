@@ -201,8 +201,8 @@ pub trait SloshMode {
     fn coefficient_norm(&self, n: usize) -> f64;
     /// Returns coefficient n of the power that the mode dissipates, W. `hub_reaction` must have computed order n.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
-    /// Returns coefficient n of the slosh mass times its height above rest (kg m), which is the potential energy
-    /// divided by g.
+    /// Returns coefficient n of the slosh mass times its height above rest (kg m), which is the potential
+    /// energy divided by g.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
     /// Returns the coordinates at the time `t` (s) after the start of the expansion, when the hub has the rate `omega`,
     /// from their series up to order n. `varies` is true if g, drag or weight change along the expansion; otherwise the

@@ -75,8 +75,8 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// Sets coefficient n of the direction p and the velocity v from coefficient n of the coordinates xi, by p' = k xi'
-    /// - v_z xi and v_z = k^2 xi.xi'.
+    /// Sets coefficient n of the direction p and the velocity v from coefficient n of the coordinates xi, by p' = k xi' -
+    /// v_z xi and v_z = k^2 xi.xi'.
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
         let one = constant(n, 1.0);
@@ -307,8 +307,8 @@ impl SloshMode for Spherical {
         self.p.c * self.p.l * self.p.l * speed2
     }
 
-    /// Returns coefficient n of the slosh mass times its height above rest, m l (1 + p_z). It is computed with 1 + p_z
-    /// = |xi|^2 k, because this form has no cancellation near rest.
+    /// Returns coefficient n of the slosh mass times its height above rest, m l (1 + p_z). It is computed with 1 + p_z =
+    /// |xi|^2 k, because this form has no cancellation near rest.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];

@@ -170,8 +170,8 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
 fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::None);
-        // The limit allows 20 halvings of g to a millionth, 34 growths by half from there, and the steps that the motion
-        // needs.
+        // The limit allows 20 halvings of g to a millionth, 34 growths by half from there, and the steps
+        // that the motion needs.
         p.solver = Solver { max_steps: 100 };
         let inputs = |value, slope| Inputs { g_axial: Ramp { value, slope }, ..Inputs::default() };
         let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
@@ -339,8 +339,8 @@ fn work_of_a_changing_g_is_added_at_accepted_steps_only() {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (tilt, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (4.0 * tilt, 2.0);
-        // If g is linear in time, the residual is of fourth order, as the host's integrator; for a sine it is of second
-        // order.
+        // If g is linear in time, the residual is of fourth order, as the host's integrator; for a sine it
+        // is of second order.
         for (order, g) in [
             (4, (|t: f64| 9.0 - 3.0 * t) as fn(f64) -> f64),
             (2, |t: f64| 9.0 + 2.0 * libm::sin(5.0 * t)),

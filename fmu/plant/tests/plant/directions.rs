@@ -130,8 +130,8 @@ impl Newton<'_> {
                 (row[j], row[count]) = (with - without, -without);
             }
         }
-        // The row of the hub is full, and the row of each slosh mass has two elements, so that the slosh masses are
-        // eliminated first.
+        // The row of the hub is full, and the row of each slosh mass has two elements, so that the slosh
+        // masses are eliminated first.
         let (hub, bobs) = rows.split_first_mut().unwrap();
         for (n, bob) in bobs.iter().enumerate() {
             let factor = hub[1 + n] / bob[1 + n];

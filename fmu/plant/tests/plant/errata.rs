@@ -121,8 +121,8 @@ fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
     assert!((mass / plant.calculated().m_liq - 1.0).abs() < 1e-3, "{mass}");
 }
 
-/// Errata A4 of Rubaga's thesis (book/errata.md): under viscous friction the rate of a hub with rigid liquid decays
-/// exponentially.
+/// Errata A4 of Rubaga's thesis (book/errata.md): under viscous friction the rate of a hub with
+/// rigid liquid decays exponentially.
 #[test]
 fn errata_a4_friction_opposes_the_motion() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -168,8 +168,8 @@ fn errata_a9_the_frequency_of_circular_motion_rises_with_amplitude() {
     assert!(o.slosh_angle.abs() < 1e-9);
 }
 
-/// Errata A10 and A11 of Rubaga's thesis (book/errata.md): after the time π/√(g/l) a pendulum on a heavy hub is at the
-/// opposite angle.
+/// Errata A10 and A11 of Rubaga's thesis (book/errata.md): after the time π/√(g/l) a pendulum on a heavy hub is
+/// at the opposite angle.
 #[test]
 fn errata_a10_a11_a_displaced_bob_swings_at_the_root_of_g_over_l() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);

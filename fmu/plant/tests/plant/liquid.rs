@@ -1,5 +1,5 @@
-//! Tests of the frequency of free oscillations as a function of the amplitude, for a pendulum and for a liquid to third
-//! order.
+//! Tests of the frequency of free oscillations as a function of the amplitude, for a pendulum and for a
+//! liquid to third order.
 
 use super::free_oscillation::{held, shifts, shifts_of};
 use formulas::third_order::coefficients;
@@ -16,9 +16,9 @@ fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
     assert!((found[1] / 0.5 - 1.0).abs() < 0.01, "{found:?}");
 }
 
-/// The model `liquid` with the coefficients s (inertia) and kappa (spring) has the relative frequency shifts 3 kappa/8
-/// - s/2 in planar motion and kappa/2 in circular motion. `tests/physics/liquid.rs` compares them with potential flow
-/// at the two depths.
+/// The model `liquid` with the coefficients s (inertia) and kappa (spring) has the relative frequency shifts 3
+/// kappa/8 - s/2 in planar motion and kappa/2 in circular motion. `tests/physics/liquid.rs` compares them with
+/// potential flow at the two depths.
 #[test]
 fn the_liquid_model_has_the_frequency_shifts_of_the_third_order() {
     for (depth, potential_flow) in [(0.10, [-0.4285, 0.3671]), (0.05, [-0.2566, 0.4208])] {

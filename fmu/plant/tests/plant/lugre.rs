@@ -232,8 +232,8 @@ fn lugre_friction_lags_behind_the_rate_the_more_the_faster_the_rate_changes() {
 
 #[test]
 fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
-    // As in figure 4 of Canudas de Wit et al. w_s is as small as theirs, so that the rate passes w_s while the bristles
-    // still deflect.
+    // As in figure 4 of Canudas de Wit et al. w_s is as small as theirs, so that the rate passes w_s while
+    // the bristles still deflect.
     let break_away = |slope: f64| {
         let mut p = bench(SloshModel::Frozen);
         (p.friction.sigma0, p.friction.omega_s) = (10.0, 1e-3);
@@ -256,8 +256,8 @@ fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
     assert!(fast > 0.003498 * 0.99, "the torque must not fall below Coulomb friction: {fast}");
 }
 
-/// A torque of 2 mN·m, less than the break-away torque, turns a hub with LuGre friction by torque divided by bristle
-/// stiffness.
+/// A torque of 2 mN·m, less than the break-away torque, turns a hub with LuGre friction by torque
+/// divided by bristle stiffness.
 #[test]
 fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     let mut p = bench(SloshModel::Frozen);

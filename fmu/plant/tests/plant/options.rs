@@ -361,8 +361,8 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     }
 }
 
-/// For example, `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the reason contains the name
-/// `slosh.zeta_from_correlation`.
+/// For example, `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the reason
+/// contains the name `slosh.zeta_from_correlation`.
 #[test]
 fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
     let why = |p: &Parameters, name: &str| p.overridden(name).unwrap_or_default();

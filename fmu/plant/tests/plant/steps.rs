@@ -90,8 +90,8 @@ fn a_second_takes_few_internal_steps() {
     );
 }
 
-/// The tolerance is relative to the size of the motion, so that small waves on a hub at rest take no more steps than large
-/// waves.
+/// The tolerance is relative to the size of the motion, so that small waves on a hub at rest take no more
+/// steps than large waves.
 #[test]
 fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     for slosh in SloshModel::ALL {

@@ -111,8 +111,8 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
     }
 }
 
-/// Coulomb friction c_f reduces the amplitude by 2 c_f/k in each half swing of pi sqrt(I/k), until the line can no longer
-/// overcome the friction.
+/// Coulomb friction c_f reduces the amplitude by 2 c_f/k in each half swing of pi sqrt(I/k), until the line can no
+/// longer overcome the friction.
 #[test]
 fn dry_friction_stops_a_hub_on_a_suspension_line_at_the_predicted_angle_and_time() {
     let mut p = frozen(FrictionModel::Stribeck);

@@ -30,8 +30,8 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The table is tested with and without a wave height; its default is the wave height of a cylinder with the diameter
-/// tank.d.
+/// The table is tested with and without a wave height; its default is the wave height of a cylinder
+/// with the diameter tank.d.
 #[test]
 fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {
@@ -125,8 +125,8 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
     );
 }
 
-/// Liquid that rotates with the walls of the tank (`tank.I_own`) adds to the inertia of the hub, independent of the tank's
-/// position.
+/// Liquid that rotates with the walls of the tank (`tank.I_own`) adds to the inertia of the hub, independent
+/// of the tank's position.
 #[test]
 fn the_tanks_own_inertia_is_turned_with_the_hub() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);

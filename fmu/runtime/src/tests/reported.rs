@@ -41,8 +41,8 @@ fn valve_outputs(host: &mut Host) -> [Value; 3] {
 const CLOSED: [Value; 3] = [Value::Boolean(false), Value::Integer(0), Value::Integer(1)];
 const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Integer(2)];
 
-/// In FMI 3.0 with event mode, discrete outputs do not change in a step that ends at an event, but only in the following
-/// event mode.
+/// In FMI 3.0 with event mode, discrete outputs do not change in a step that ends at an event, but only in
+/// the following event mode.
 #[test]
 fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
@@ -124,8 +124,8 @@ fn a_step_ends_at_an_event_if_the_host_allows_early_return_and_input_ramps_end_t
     assert_eq!(after(Events::InStep, true, 6.0), ((false, false), (7.0, 1.5)), "not told");
 }
 
-/// A time before the last event is allowed within 1e-9 of the time since the start, plus 8 rounding errors of the largest
-/// time.
+/// A time before the last event is allowed within 1e-9 of the time since the start, plus 8 rounding errors
+/// of the largest time.
 #[test]
 fn time_may_go_back_to_the_last_event_at_most() {
     for (start, last, slack) in [

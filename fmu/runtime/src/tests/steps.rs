@@ -81,8 +81,8 @@ fn communication_point_may_be_off_by_rounding_errors() {
     }
 }
 
-/// The stop time may be passed by 1e-9 of the step size or the time since the start, whichever is larger, plus 8 rounding
-/// errors.
+/// The stop time may be passed by 1e-9 of the step size or the time since the start, whichever is larger,
+/// plus 8 rounding errors.
 #[test]
 fn the_last_step_may_pass_the_stop_time_by_rounding_errors() {
     for (start, stop, slack) in [
@@ -253,8 +253,8 @@ fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
     assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
 }
 
-/// Between steps the outputs show the valve in the position that the present inputs cause, but the model itself is not
-/// changed.
+/// Between steps the outputs show the valve in the position that the present inputs cause, but the model
+/// itself is not changed.
 #[test]
 fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     let mut instance = started(CS, &[]);

@@ -69,8 +69,8 @@ fn start_values_equal_those_of_the_model() {
     assert_eq!(scalar("sum").start(), None);
 }
 
-/// A table states dependencies by the name of an array or of an element; for example `net[2]` depends on `level[2]` and
-/// `q[2]`.
+/// A table states dependencies by the name of an array or of an element; for example `net[2]` depends
+/// on `level[2]` and `q[2]`.
 #[test]
 fn dependencies_are_resolved_to_array_elements() {
     let depends = |name: &str| names(scalar(name).depends_on());

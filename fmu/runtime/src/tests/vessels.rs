@@ -16,8 +16,7 @@ pub const OPENS: f64 = 2.0;
 /// Level at which a vessel overflows, m.
 pub const OVERFLOWS: f64 = 80.0;
 
-/// Leak, 1/s, levels at the start, m, time of an inspection, s, and further parameters without
-/// effect.
+/// Leak, 1/s, levels at the start, m, time of an inspection, s, and further parameters without effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     pub k: f64,

@@ -26,8 +26,8 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// Creates the arrays with the sizes that the parameters of an instance give. `parameters` are in the order of the
-    /// table.
+    /// Creates the arrays with the sizes that the parameters of an instance give. `parameters` are in the
+    /// order of the table.
     pub fn new<M: Model>(parameters: &[Value]) -> Arrays {
         let table = M::table();
         let mut arrays = Arrays::default();

@@ -27,8 +27,8 @@ pub(super) unsafe fn directional_derivative<M: Model>(
             check_numbers(call, "nSensitivity", n_sensitivity, unknowns.len())?;
             let seed = array(call, "seed", seed, n_seed)?;
             let answers = array_mut(call, "sensitivity", sensitivity, n_sensitivity)?;
-            // The independent variable is not among the knowns, because variables depend on it only through states and
-            // inputs.
+            // The independent variable is not among the knowns, because variables depend on it only
+            // through states and inputs.
             let time = time_reference::<M>();
             if !knowns.contains(&time) {
                 return component

@@ -1,5 +1,5 @@
-//! Translation of the host's value references to scalars of the table, with a check that a call has as many values as
-//! scalars.
+//! Translation of the host's value references to scalars of the table, with a check that a call has as
+//! many values as scalars.
 
 use std::borrow::Cow;
 

@@ -76,8 +76,8 @@ pub(super) fn extra_variable<M: Model>(reference: u32) -> Option<Extra> {
     }
 }
 
-/// Returns the names of the variables that are not in the table (time and event indicators) in the order of their value
-/// references.
+/// Returns the names of the variables that are not in the table (time and event indicators) in the order
+/// of their value references.
 pub fn extra_names<M: Model>() -> Vec<String> {
     let indicators = 1..=M::table().about.event_indicators;
     let indicators = indicators.map(|n| format!("event_indicator[{n}]"));

@@ -1,5 +1,4 @@
-//! Reading and setting variables by type, also within steps. There are no values for clocks and binary
-//! variables.
+//! Reading and setting variables by type, also within steps. There are no values for clocks and binary variables.
 
 #![allow(unsafe_code)]
 
