@@ -452,12 +452,12 @@ impl Tank {
     /// Returns a body of negative mass: the inertia by which bobs with s < 1 reduce the inertia of the craft within
     /// 45 degrees of the tank's axis (`surface.rs`). Craft and rigid liquid together must have more inertia than
     /// this body takes away.
-    fn lent_inertia(&self) -> Rigid {
+    fn inertia_reduction(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {
-            let lent = self.surface(n).map_or(0.0, |surface| surface.lent_inertia());
+            let reduction = self.surface(n).map_or(0.0, |surface| surface.inertia_reduction());
             sum.combined_with(&Rigid::new(
-                -lent * self.mass[n],
+                -reduction * self.mass[n],
                 self.hinge_and_across(n).0,
                 &none.inertia,
             ))
@@ -1177,15 +1177,15 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     if smallest_pivot(&at_rest) < SINGULAR {
         return Some(String::new());
     }
-    // The matrix is checked at the start, and at the points of fill tables.
-    let lends = |point: usize| {
-        let lent = tanks.iter().fold(body, |sum, tank| {
+    // The least inertia of the bobs is checked at the start and at the points of fill tables.
+    let is_singular = |point: usize| {
+        let least = tanks.iter().fold(body, |sum, tank| {
             let tank = tank.at_point(point);
-            sum.combined_with(&tank.rigid()).combined_with(&tank.lent_inertia())
+            sum.combined_with(&tank.rigid()).combined_with(&tank.inertia_reduction())
         });
-        smallest_pivot(&lent.mass_matrix()) < SINGULAR
+        smallest_pivot(&least.mass_matrix()) < SINGULAR
     };
-    if tanks.iter().any(Tank::has_surface) && (0..=POINTS).rev().any(lends) {
+    if tanks.iter().any(Tank::has_surface) && (0..=POINTS).rev().any(is_singular) {
         let within =
             " at slosh angles up to 45 degrees: a nonlinear_inertia below 1 needs a heavier craft";
         return Some(within.into());

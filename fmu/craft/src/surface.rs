@@ -242,14 +242,14 @@ impl Surface {
 
     /// Returns the largest mass by which the bob can reduce the craft's inertia in one direction, divided by the bob's mass:
     /// minus the smallest eigenvalue of N up to 45 degrees or the end of the model, but at least 0. It is at most 1.
-    pub fn lent_inertia(&self) -> f64 {
+    pub fn inertia_reduction(&self) -> f64 {
         let at = |k: u32| {
             let u = 0.5 * f64::from(k) / 64.0;
             let eta = -libm::sqrt(1.0 - u);
             let inertia = self.meridian_inertia(eta, u);
-            let [around, lent] = self.around(u);
+            let [around, reduction] = self.around(u);
             let along = -self.meridian_factor(u) * eta * eta * u / inertia;
-            (inertia >= LEAST_INERTIA && around >= LEAST_INERTIA).then(|| along.max(lent))
+            (inertia >= LEAST_INERTIA && around >= LEAST_INERTIA).then(|| along.max(reduction))
         };
         (0..=64).map_while(at).fold(0.0, f64::max)
     }

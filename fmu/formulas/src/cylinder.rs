@@ -203,7 +203,7 @@ mod tests {
     /// zeros of the sum is then too small by 8/(12 pi end^3) with end = 400 pi + 1.6. In a long column the inertia per mass
     /// tends to h^2/12 - 3 R^2/4.
     #[test]
-    fn the_capped_inertia_has_its_limits() {
+    fn the_inertia_of_a_capped_cylinder_has_the_limits_of_a_disk_and_of_a_long_column() {
         let film = capped_inertia(2.0, 1e-12);
         assert!((film - (0.25 - 1.068e-10)).abs() < 1e-12, "{film}");
         let twice = capped_inertia(4.0, 1e-12);

@@ -164,7 +164,7 @@ mod tests {
     /// At the slope 0.2 the factors of the second mode agree with finite elements on two meshes, whose results differ by
     /// 0.009 of Lambda for the upright and for the tilted cylinder.
     #[test]
-    fn the_second_mode_changes_as_by_finite_elements() {
+    fn tilt_changes_the_second_mode_as_finite_elements_do() {
         for (fill, change) in [
             (0.5, [-0.00252 - 0.00367, 0.01606 - 0.00343]),
             (1.0, [0.00569 - 0.00359, 0.01776 - 0.00346]),
@@ -225,7 +225,7 @@ mod tests {
     /// the same factor. For waves whose directions are distributed as cos^2 of the angle, the coefficient of the frequency's
     /// change is 1/8 for modes along the slope and 3/8 across it. Mode 10 differs from this by 0.003.
     #[test]
-    fn high_modes_are_waves_on_a_longer_surface() {
+    fn tilt_changes_high_modes_as_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);
         assert!((along - 0.125).abs() < 0.01 && (across - 0.375).abs() < 0.01, "{along} {across}");
     }

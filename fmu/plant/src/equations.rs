@@ -648,7 +648,7 @@ mod tests {
     /// A damaged saved state may contain any number as the work of g_axial. If the work after a step would be too large to
     /// be saved, the step is refused.
     #[test]
-    fn work_through_g_axial_beyond_all_magnitudes_is_refused() {
+    fn a_step_in_which_the_work_of_g_axial_overflows_is_refused() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);
         plant.state.axial.work = 1e200;
         let before = *plant.state();

@@ -278,7 +278,7 @@ mod tests {
     /// At rest the reading is the sum of rate, bias and a multiple of the first of the two normal numbers that belong to the
     /// seed and sample k. The second number drives the bias.
     #[test]
-    fn a_reading_is_rate_bias_and_the_seed_s_own_noise() {
+    fn a_gyro_reading_is_the_sum_of_rate_bias_and_the_noise_of_its_seed() {
         let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };
         let mut gyro = imu.start();
         for k in 0..4 {

@@ -258,7 +258,7 @@ mod tests {
 
     /// With `wheel.enabled` = false the torque has no limits; its integral is still added up as a speed.
     #[test]
-    fn an_actuator_without_a_wheel_gives_the_commanded_torque_and_sums_its_reaction() {
+    fn an_actuator_without_a_wheel_gives_the_commanded_torque_and_integrates_it() {
         let w = Wheel { enabled: false, ..wheel() };
         let command = ramp(5.0, -1.0);
         assert_eq!(w.torque(1e6, command), command);

@@ -1157,7 +1157,7 @@ mod tests {
 
     /// The exact integral is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 + eps^2) and s = t - 1.
     #[test]
-    fn a_series_that_does_not_show_a_corner_is_repeated_shorter() {
+    fn an_expansion_across_a_corner_is_repeated_over_a_shorter_time() {
         let error = |tolerance: f64, compares: bool| {
             let now = [-1.0, 0.0];
             let [square, root, y] = [ZERO; 3];

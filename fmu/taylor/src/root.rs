@@ -167,7 +167,7 @@ mod tests {
 
     /// The rounding error of the value, 1e-16, decides between no root and a double root.
     #[test]
-    fn a_minimum_just_above_zero_is_no_root_and_one_just_below_is() {
+    fn a_polynomial_has_a_root_only_if_its_minimum_is_below_zero() {
         for h in [1.0, 10.0, 1e3] {
             for above in [1e-9, 1e-12, 1e-15] {
                 let parabola = |above: f64| [0.25 + above, -1.0, 1.0];

@@ -97,7 +97,7 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
 /// limit, and the mean cosine of the bobs' angles, by modal mass, minus cos 45 degrees. In a tank without a model of
 /// detached liquid it is positive as long as thrust holds the liquid at the bottom.
 #[test]
-fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
+fn an_event_indicator_changes_sign_where_the_mean_cosine_of_the_bobs_passes_45_degrees() {
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         for angle in [0.6, 0.7, 0.9f64] {
             let mut p = Parameters { tanks: 2, ..Parameters::default() };

@@ -623,8 +623,8 @@ fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     (compared_quantities(&mut own.craft, &case.u), own.impacts)
 }
 
-/// Returns two hosts that locate events, each with the largest allowed error of its results: one as CVODE with an output
-/// every 5 ms, and one with fixed steps.
+/// Returns three hosts that locate events, each with the largest allowed error of its results: two with adaptive
+/// steps, of which the second has steps of at most 5 ms, and one with fixed steps.
 fn locating(case: &Case) -> [(Method, f64); 3] {
     let step = case.step();
     let fixed = (step / 4.0).min(5e-3);

@@ -26,7 +26,7 @@ fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
 /// A rod transmits only a force along itself. Therefore the component across the rod of the bob's velocity V + w x rho + l
 /// p' does not change.
 #[test]
-fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
+fn an_impulse_of_the_host_does_not_change_the_bobs_velocities_across_their_rods() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let drains = seed % 2 == 0;
@@ -151,7 +151,7 @@ const STEPS: [[[usize; 2]; 4]; 2] =
 /// The numbers of internal steps of random tanks, alone and on a craft, equal the expected numbers, so that a change that
 /// makes the integrator slower is noticed.
 #[test]
-fn a_step_takes_few_internal_steps() {
+fn a_step_takes_the_expected_number_of_internal_steps() {
     let counted = [0, 1].map(|seed| {
         let mut random = Random::new(seed);
         let tanks = [random.tank(), draining_tank(&mut random, 2)];

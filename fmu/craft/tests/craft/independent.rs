@@ -851,7 +851,7 @@ fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
 }
 
 #[test]
-fn coupling_ratio_is_the_largest_eigenvalue() {
+fn coupling_ratio_is_the_largest_eigenvalue_of_the_added_mass_relative_to_the_host() {
     for seed in 0..50 {
         let mut random = Random::new(seed);
         let host = random.parameters().craft;

@@ -477,7 +477,7 @@ fn random_steps_give_finite_results_or_an_error() {
 /// However long the simulation is, directions and quaternion have the length 1 to rounding, and the rates of directions stay
 /// perpendicular to the directions.
 #[test]
-fn constraints_are_kept_to_rounding() {
+fn directions_and_quaternion_keep_unit_length_to_rounding() {
     let record = record("four_tanks");
     let mut craft = spacecraft(&record, 1e-6);
     for k in 0..1000 {

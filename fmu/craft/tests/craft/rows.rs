@@ -173,7 +173,7 @@ fn the_spacing_of_output_rows_changes_no_bit_of_the_motion_of_detached_liquid() 
 }
 
 #[test]
-fn states_that_are_set_start_a_new_expansion() {
+fn setting_the_states_starts_a_new_expansion() {
     let (p, inputs) = craft_of(0, 3);
     let mut craft = Spacecraft::new(&p, &inputs[0], 0.0, 1e-9).unwrap();
     craft.step(&inputs[0], 0.1).unwrap();

@@ -327,7 +327,7 @@ fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
 
 /// The loop is stable if the damping zeta_p w_p = (c/m) sigma/2 exceeds the growth rate without damping.
 #[test]
-fn damping_that_stabilises_is_predicted_to_5_percent() {
+fn the_damping_that_stabilises_a_slosh_pole_is_predicted_to_5_percent() {
     for z in [0.2, 0.35, 0.5, 0.65] {
         let closed = Closed::new(&craft_with_tank_at(z, 0.0, 0.0));
         let predicted = 2.0 * predicted_growth(z) * closed.m / closed.sigma;

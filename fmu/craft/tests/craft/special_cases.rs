@@ -183,7 +183,7 @@ fn without_force_and_stiffness_a_bob_coasts_on_its_sphere() {
 }
 
 #[test]
-fn a_rigid_body_without_tanks_precesses_by_euler() {
+fn a_rigid_body_without_tanks_precesses_by_eulers_equations() {
     let mut p = Parameters { tanks: 0, ..Parameters::default() };
     p.craft.r = [0.0; 3];
     p.craft.j = Inertia { xx: 900.0, yy: 900.0, zz: 600.0, xy: 0.0, xz: 0.0, yz: 0.0 };
@@ -201,7 +201,7 @@ fn a_rigid_body_without_tanks_precesses_by_euler() {
 
 /// A craft on a pivot moves as a free craft with a very large mass at O on which the force -g times this mass acts.
 #[test]
-fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
+fn a_craft_on_a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
     for seed in 0..5 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();

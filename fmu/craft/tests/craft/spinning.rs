@@ -128,7 +128,7 @@ fn friction_in_full_spheroids_changes_nutation_as_the_closed_form_says() {
 /// doubles in the time in which the closed form predicts a growth by a factor of 1,000. In a stable craft its amplitude
 /// stays within the beat of the two nutations.
 #[test]
-fn spinning_craft_are_stable_where_rumyantsev_says_so() {
+fn spinning_craft_are_stable_exactly_where_rumyantsevs_criterion_holds() {
     let mut random = Random::new(2);
     let (mut stable, mut unstable) = (0, 0);
     while stable + unstable < 30 {
@@ -362,7 +362,7 @@ fn the_spin_of_the_liquid_and_not_of_its_tank_limits_the_range() {
 
 /// Omega/omega_0 and Omega^2 l change by the relative amounts d Omega/Omega - da/(2 a) and 2 d Omega/Omega - da/a.
 #[test]
-fn the_numbers_of_the_spin_have_derivatives() {
+fn directional_derivatives_of_spin_ratio_and_spin_number_equal_the_closed_form() {
     let (mut p, u) = cylinder(1.0, 0.1, 0.5, 0.0);
     for has_spin in [true, false] {
         let (mut dx, mut du) = ([0.0; TANK_STATES], [0.0; TANK_INPUTS]);
@@ -426,7 +426,7 @@ fn bits(change: impl Fn(&mut Parameters)) -> u64 {
 }
 
 #[test]
-fn parameters_of_the_spin_without_spin_inertia_change_no_bit() {
+fn without_spin_inertia_other_spin_parameters_change_no_bit_of_the_motion() {
     let before = bits(|_| ());
     let neutral = |p: &mut Parameters| {
         for tank in &mut p.tank {

@@ -367,7 +367,7 @@ fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
 /// A wave with coefficients beyond the third order decays as its energy does: the dissipated power is 2 c/m times the
 /// kinetic energy, which includes the kinetic energy within the liquid.
 #[test]
-fn drag_acts_on_the_whole_kinetic_energy() {
+fn drag_dissipates_2_c_over_m_times_the_whole_kinetic_energy() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let mut tank = Tank { modes: 1, k: [0.0; MODES], ..random.tank() };
@@ -516,7 +516,7 @@ fn a_tank_at_a_point_of_its_table_has_the_coefficients_of_this_point() {
 /// While the liquid falls from a point of the table with s = 1 to a point with s = -6, the largest valid angle falls until
 /// it reaches 20 degrees, the angle of a bob in circular motion.
 #[test]
-fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
+fn a_step_is_refused_if_the_largest_valid_angle_falls_to_the_angle_of_a_bob() {
     let mut tank = Tank { modes: 1, zeta: [0.0; MODES], ..Tank::default() };
     tank.fill.points = 2;
     tank.fill.nonlinear_inertia[0][0] = -6.0;

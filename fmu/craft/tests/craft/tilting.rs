@@ -109,7 +109,7 @@ fn rates_per_torque(p: &Parameters, frequency: f64) -> [Complex<f64>; 3] {
 /// With two products of inertia and springs about x and y, w_x (k_x - I_xx s^2) = I_xz s^2 w_z, where s is the angular
 /// frequency, and likewise about y. The leakage (Rubaga's thesis, section 6.3.6) is sqrt(w_x^2 + w_y^2)/w_z.
 #[test]
-fn an_unbalanced_platform_leaks_into_the_tilt_by_its_products_of_inertia() {
+fn products_of_inertia_couple_the_rotation_of_a_platform_into_its_tilt() {
     let mut p = platform();
     p.craft.r = [0.0, 0.0, 0.0];
     (p.craft.j.xz, p.craft.j.yz) = (0.02, -0.03);

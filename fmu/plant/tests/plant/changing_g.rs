@@ -210,7 +210,7 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
 /// After g has fallen from 9.81 to 1, 0.1 or 0.01 m/s², the measured damping ratio equals that of a run that
 /// starts at this g.
 #[test]
-fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
+fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
     for correlation in [true, false] {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         p.hub.inertia = 1e9;

@@ -117,7 +117,7 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
 /// models the decrement also depends on the amplitude by itself, by about A^2/16 for a pendulum. The measured difference is
 /// 0.8 %, which the tolerance includes, but 5e-5 for the linear model.
 #[test]
-fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
+fn the_damping_ratio_is_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
         for zeta_a in [0.012, 0.05] {
             let mut p = held(model);

@@ -322,7 +322,7 @@ fn directions_of_modes_are_refused_for_models_without_them() {
 /// Mode 1 moves only along its direction. If it starts along this direction, the outputs equal the initial values exactly.
 /// Any other start is refused, with a message that contains a valid start.
 #[test]
-fn a_start_is_along_the_direction_of_mode_1_or_refused() {
+fn an_initial_state_is_refused_if_it_is_not_along_the_direction_of_mode_1() {
     for model in MODELS {
         for direction in [0.6, -1.2, FRAC_PI_2] {
             let mut p = askew(model, FrictionModel::None);
@@ -370,7 +370,7 @@ fn a_start_is_along_the_direction_of_mode_1_or_refused() {
 /// In the slosh models `linear` and `planar` a mode whose direction has no radial component moves only tangentially. A radial
 /// initial angle then has no effect, and a warning says so.
 #[test]
-fn a_radial_initial_angle_without_effect_brings_a_warning() {
+fn a_radial_initial_angle_without_effect_causes_a_warning() {
     for (model, direction, warned) in [
         (SloshModel::Linear, 0.0, true),
         (SloshModel::Planar, 0.0, true),

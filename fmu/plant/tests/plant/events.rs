@@ -273,7 +273,7 @@ fn continuing_after_events_equals_one_whole_step() {
 /// If the step after a stop has another end or another torque, it is a new step from the present state, which
 /// finds its own events.
 #[test]
-fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
+fn after_a_stop_at_an_event_a_step_with_another_end_or_torque_is_a_new_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
     (p.imu.enabled, p.init.omega, p.init.slosh_angle) = (true, 0.05, 0.1);
     let inputs = torque(0.01);

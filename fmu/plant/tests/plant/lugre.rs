@@ -63,7 +63,7 @@ fn dissipation(plant: &mut Plant, p: &Friction, omega: f64, share: f64) -> f64 {
 }
 
 #[test]
-fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
+fn dissipation_becomes_negative_only_if_sigma1_is_above_its_limit() {
     let mut p = bench(SloshModel::Frozen);
     let limit = p.friction.b * p.friction.c / p.friction.d;
     p.friction.sigma1 = limit;
@@ -182,7 +182,7 @@ fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
 /// Before a hub with LuGre friction slides, its torque as a function of the deflection is a hysteresis loop, which is closed
 /// from the second cycle on.
 #[test]
-fn motion_before_sliding_runs_through_closed_loops() {
+fn friction_before_sliding_follows_a_closed_hysteresis_loop() {
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma1 = 0.0;
     p.friction.b = 0.0;

@@ -464,7 +464,7 @@ fn warnings_name_breaking_parameters_without_effect() {
 /// The onset of breaking for a mode of a table follows from the wave elevation and the wave number in the table. With the
 /// values of a cylinder the waves begin to break as in the cylinder.
 #[test]
-fn the_steepness_of_a_table_has_its_own_wave_and_wave_number() {
+fn steepness_follows_from_the_wave_elevation_and_wave_number_in_the_table() {
     let power = |p: &Parameters| plant(p).outputs(&inputs_with_gravity(9.81)).power_dissipated;
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     (p.slosh.zeta_breaking, p.slosh.breaking_steepness, p.init.slosh_rate) = (0.04, 0.25, 1.0);

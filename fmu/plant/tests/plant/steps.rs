@@ -73,7 +73,7 @@ const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
 /// The number of internal steps for a second of motion is compared with the expected number for every slosh model and
 /// friction law, so that a change that makes the integrator slower is noticed.
 #[test]
-fn a_second_takes_few_internal_steps() {
+fn a_second_of_motion_takes_the_expected_number_of_internal_steps() {
     let found = SloshModel::ALL.map(|slosh| {
         FrictionModel::ALL.map(|friction| {
             let (p, inputs) = start(slosh, friction);

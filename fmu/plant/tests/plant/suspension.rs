@@ -26,7 +26,7 @@ fn inertia(p: &Parameters) -> f64 {
 
 /// If `hub.k` and `hub.c` are 0, the rest angle `hub.theta_0` has no effect.
 #[test]
-fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
+fn a_suspension_line_without_stiffness_and_damping_changes_no_bit_of_the_motion() {
     for slosh in SLOSH {
         for friction in FRICTION {
             let run = |theta_0: f64| {

@@ -167,7 +167,7 @@ fn accepted_steps_may_pass_the_stop_time_by_rounding_errors() {
 }
 
 #[test]
-fn model_without_events_has_none() {
+fn a_model_without_events_reports_no_event() {
     let mut instance = spring(ME);
     let info = EventInfo { states_changed: false, next_time: None };
     assert_eq!(instance.new_discrete_states(), Ok(info));

@@ -192,7 +192,7 @@ fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_re
 
 /// The force should rise to 1 within the step, but the host requests a return at once, and sets nothing in the next step.
 #[test]
-fn after_an_early_return_at_once_inputs_are_held() {
+fn after_a_return_at_the_start_of_a_step_inputs_keep_their_values() {
     let (instance, host) = stepping(true);
     (host.lock().unwrap().force, host.lock().unwrap().wish) = (Some(1.0), Some(-1.0));
     assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, true, 0.0));
@@ -490,7 +490,7 @@ fn model_exchange(host: &Mutex<TestHost>) -> fmi3Instance {
 }
 
 #[test]
-fn model_exchange_goes_through_its_modes_and_takes_single_states() {
+fn a_model_exchange_instance_passes_through_its_modes_and_single_states_can_be_set() {
     let host = Mutex::new(TestHost::default());
     unsafe {
         let instance = model_exchange(&host);
@@ -557,7 +557,7 @@ fn an_fmi3_boolean_may_be_any_byte() {
 }
 
 #[test]
-fn times_come_with_initialization_and_those_that_are_not_defined_may_be_nan() {
+fn initialization_sets_start_and_stop_time_and_undefined_times_may_be_nan() {
     let host = Mutex::new(TestHost::default());
     unsafe {
         let instance = fmi3InstantiateCoSimulation::<Spring>(

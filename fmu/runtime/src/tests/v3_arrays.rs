@@ -192,7 +192,7 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
 /// A square depends on all levels and inputs of the present trays, even where all are 0 and the derivatives vanish. A rate
 /// depends on its own input.
 #[test]
-fn elements_depend_on_elements_also_where_the_derivative_vanishes() {
+fn array_elements_depend_on_others_even_where_the_derivative_vanishes() {
     let lines = Lines::default();
     let instance = instance_with_arrays(&lines);
     unsafe {

@@ -137,7 +137,7 @@ fn all_wrong_parameters_are_reported_when_initialization_ends() {
 }
 
 #[test]
-fn only_inputs_and_tunable_parameters_are_set_in_motion() {
+fn only_inputs_and_tunable_parameters_can_be_set_during_the_simulation() {
     let mut instance = started(CS, &[]);
     assert_eq!(
         unchanged(&mut instance, |i| set(i, "sum", 1.0)),

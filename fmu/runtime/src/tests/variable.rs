@@ -102,7 +102,7 @@ fn values_of_another_type_are_refused() {
 
 /// The largest rate of an input is that with which it crosses its allowed range in 1 ns.
 #[test]
-fn rates_are_bounded_by_the_range() {
+fn the_rate_of_an_input_is_bounded_by_the_range_of_its_value() {
     let free = a_real("m");
     let both = a_real("m").range(-8.0, 2.0);
     let above = a_real("m").range(1.0, 2.0);
