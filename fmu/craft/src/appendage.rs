@@ -310,7 +310,7 @@ impl Structure {
         if self.is_too_heavy {
             return true;
         }
-        // Quick check: usual deflections take far less than the craft's inertia. NaN does not pass it.
+        // Quick check: usual deflections reduce the craft's inertia only slightly. NaN does not pass it.
         let taken =
             self.shares.iter().zip(eta).fold(0.0, |sum, (share, eta)| sum + share * eta.abs());
         if taken < 0.5 {

@@ -1192,7 +1192,7 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     }
     let flies = smallest_pivot(&matrix(Tank::least_rigid)) < SINGULAR;
     (flies && !tanks.iter().any(Tank::is_planar))
-        .then(|| " in flight of detached liquid or with tanks at the start of their tables".into())
+        .then(|| " while the liquid is detached, or at the first point of the fill tables".into())
 }
 
 impl Parameters {

@@ -87,7 +87,7 @@ pub struct fmi2CallbackFunctions {
     pub componentEnvironment: fmi2ComponentEnvironment,
 }
 
-// ---- Which functions there are, and when each may be called ----
+// ---- Functions, and the states in which each may be called ----
 
 /// Functions of FMI 2.0 that are not in [`Version`], with the instance states in which they are allowed.
 #[allow(missing_docs)]

@@ -61,7 +61,7 @@ c_functions! { $ export_fmi3, v3;
 
 fn fmi3GetVersion() -> fmi3String = c"3.0".as_ptr();
 
-// ---- Inquiry, life and death ----
+// ---- Version, logging, creation and destruction of instances ----
 
 /// Selects the messages that are logged. Failures are always logged.
 fn fmi3SetDebugLogging(instance: fmi3Instance, loggingOn: fmi3Boolean, nCategories: usize, categories: *const fmi3String) -> fmi3Status =

@@ -106,8 +106,8 @@ fn drag(r: &mut Random, tank: &mut Tank) {
     }
 }
 
-/// Replaces the tanks of a craft by draining tanks with all kinds of drag. In half of the tanks the surface of the bob
-/// changes with the fill.
+/// Replaces the tanks of a craft by draining tanks with all kinds of drag. In half of the tanks the surface on
+/// which the bob moves changes with the fill.
 fn drain(r: &mut Random, p: &mut Parameters) {
     for tank in &mut p.tank {
         let modes = r.below(4);

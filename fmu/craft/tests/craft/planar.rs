@@ -229,7 +229,7 @@ fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_m
     assert_eq!(p.problems(), [""; 0]);
     p.tank[0].ball.travel = 0.6;
     let said = p.problems();
-    assert!(said.len() == 1 && said[0].contains("in flight of detached liquid"), "{said:?}");
+    assert!(said.len() == 1 && said[0].contains("while the liquid is detached"), "{said:?}");
     p.tank[0].i_z = 1.0;
     assert_eq!(p.problems(), [""; 0]);
 }

@@ -174,12 +174,12 @@ fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_re
     host.lock().unwrap().force = Some(1.0);
     host.lock().unwrap().wish = Some(0.25);
     assert_eq!(step(instance, 0.0, 1.0), (fmi3OK, true, 0.25));
-    // A time before the step, or NaN, ends the step at once.
+    // A requested return before the start of the step, or at NaN, ends the step at once.
     for wish in [0.1, f64::NAN] {
         host.lock().unwrap().wish = Some(wish);
         assert_eq!(step(instance, 0.25, 0.5), (fmi3OK, true, 0.25));
     }
-    // A time after the end of the step has no effect.
+    // A requested return after the end of the step has no effect.
     host.lock().unwrap().wish = Some(9.0);
     assert_eq!(step(instance, 0.25, 0.5), (fmi3OK, false, 0.75));
     unsafe { fmi3FreeInstance::<Spring>(instance) };
