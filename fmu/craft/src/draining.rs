@@ -122,7 +122,8 @@ fn scales(
     swing: impl Fn(usize) -> f64,
     flexing: [f64; 2],
 ) -> [f64; STATES] {
-    // Work, energies and masses of liquid follow from the states with finite scales.
+    // States with an infinite scale have no error of their own: work, energies and masses of liquid follow
+    // from the other states.
     let mut scale = [f64::INFINITY; STATES];
     scale[..index::OMEGA].fill(1.0);
     scale[index::OMEGA..index::POSITION].fill(turn);

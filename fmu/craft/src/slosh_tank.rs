@@ -375,8 +375,8 @@ struct Run<'a> {
 type Acting<T> = ([Vec3<T>; 3], T);
 
 fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
-    // The dissipated energy and the mass of liquid follow from the other states, and a tank that drains
-    // has no detached liquid.
+    // States with an infinite scale have no error of their own: dissipated energy and mass of liquid follow
+    // from the other states, and a tank that drains has no detached liquid.
     let mut scale = [f64::INFINITY; TANK_STATES];
     for at in (0..DISSIPATED).step_by(6) {
         scale[at..at + 3].fill(1.0);

@@ -252,14 +252,14 @@ mod tests {
 
     #[test]
     fn steep_slopes_are_limited() {
-        // The secants are 1 and 10 alternately. Each slope is at most 2.4 times the smaller secant,
+        // The secants are 1 and 10 alternately. Each slope is at most 2.4 times the smaller secant.
         let (x, y) = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 10.0, 11.0, 21.0, 22.0]);
         let (slope, _) = found(x, y, true);
         assert_eq!(found(x, y, true), found(x, y, false), "nothing turns");
         for i in 1..4 {
             assert!(slope[i] <= 2.4 + 1e-15, "{slope:?}");
         }
-        // and the sum of two slopes is at most 2.375 times the smaller secant.
+        // The sum of two slopes is at most 2.375 times the smaller secant.
         for j in [1, 3] {
             assert!((slope[j] + slope[j + 1]) <= 2.375 + 1e-14, "{slope:?}");
         }

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_secondary_resonance_ends_one_per_cent_away_from_its_depth() {
+    fn the_range_of_a_secondary_resonance_ends_one_per_cent_away_from_its_depth() {
         for (near, beyond, mode) in [
             ([0.131207, 0.171408], [0.128838, 0.173340], (0, 1)),
             ([0.781046, 0.892573], [0.776228, 0.899858], (2, 2)),

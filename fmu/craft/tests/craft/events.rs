@@ -31,7 +31,7 @@ impl Case {
 
     /// Returns true if the liquid leaves the bottom at the start and does not settle afterwards. Only for such motions does
     /// the simulator have equations.
-    fn stays_loose(&self) -> bool {
+    fn never_settles(&self) -> bool {
         let mut craft = Spacecraft::new(&self.p, &self.u, 0.0, 1e-9).unwrap();
         (0..100).all(|k| {
             craft.step(&self.u, if k == 0 { 1e-6 } else { self.end / 100.0 }).unwrap();
@@ -707,7 +707,7 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
     let mut figures = Figures::default();
     for seed in first..first + count {
         let case = case(seed);
-        if !case.stays_loose() {
+        if !case.never_settles() {
             figures.settled += 1;
             continue;
         }

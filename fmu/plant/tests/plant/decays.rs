@@ -115,7 +115,7 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
 
 /// The damping ratio that follows from each decrement is zeta + zeta_A A, up to an amplitude of 0.3 rad. In the nonlinear
 /// models the decrement also depends on the amplitude by itself, by about A^2/16 for a pendulum. The measured difference is
-/// 0.8 %, which the tolerance includes, but 5e-5 for the linear model.
+/// 0.8 %, which is within the tolerance; for the linear model it is 5e-5.
 #[test]
 fn the_damping_ratio_is_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -221,7 +221,7 @@ fn breaking_waves_only_dissipate_energy() {
 /// Because of the constant A_0 = 1e-4 rad, the amplitude-dependent damping ratio of a vanishing wave is 1e-4 zeta_A instead
 /// of 0. This is tested without other damping.
 #[test]
-fn a_vanishing_amplitude_leaves_the_viscous_damping() {
+fn at_vanishing_amplitude_the_viscous_damping_remains() {
     let mut p = held(SloshModel::Linear);
     (p.slosh.zeta_amplitude, p.init.slosh_angle) = (1.0, 1e-6);
     let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();

@@ -228,7 +228,7 @@ fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
         let o = still.outputs(&inputs);
         assert!((o.slosh_angle_radial - be).abs() < 1e-11, "{} {be}", o.slosh_angle_radial);
         assert!(be > 0.19 && o.slosh_angle.abs() < 1e-15);
-        // The whole liquid exerts a centrifugal force; each part contributes according to its distance from the axis.
+        // The whole liquid exerts a centrifugal force; each of its masses contributes in proportion to its distance from the axis.
         let thrown = w * w * (0.5 * r + 1.5 * (r + l * be.sin()));
         assert!((o.f_radial - thrown).abs() < 1e-9, "{} {thrown}", o.f_radial);
 

@@ -25,8 +25,8 @@ fn moving(slosh: SloshModel) -> Parameters {
 /// Positions of the masses at an instant: the hub's angle, and for each slosh mass its position in the hub's frame.
 struct Place {
     theta: f64,
-    /// For each slosh mass: x from the axis, y, the height that determines its vertical velocity, and the height that
-    /// determines its potential energy, m.
+    /// For each slosh mass, m: its coordinates x and y from the hub's axis, the height that determines its vertical
+    /// velocity, and the height that determines its potential energy.
     bobs: Vec<[f64; 4]>,
 }
 

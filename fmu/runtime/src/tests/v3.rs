@@ -190,7 +190,8 @@ fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_re
     unsafe { fmi3FreeInstance::<Spring>(instance) };
 }
 
-/// The force should rise to 1 within the step, but the host requests a return at once, and sets nothing in the next step.
+/// The host lets the force rise to 1 within a step, but requests a return at once. In the next step the host
+/// sets no force, so that the force stays 0.
 #[test]
 fn after_a_return_at_the_start_of_a_step_inputs_keep_their_values() {
     let (instance, host) = stepping(true);
