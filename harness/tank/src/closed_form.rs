@@ -1,7 +1,7 @@
 //! Tanks with modes in closed form: upright circular and annular cylinders, boxes.
 //!
-//! Heights in the formulas are above the flat bottom. Separation of variables; the cylinder as in
-//! Abramson, NASA SP-106, and Dodge (2000).
+//! Heights in the formulas are above the flat bottom. The modes follow by separation of variables, those of the
+//! cylinder as in Abramson, NASA SP-106, and Dodge (2000).
 
 use core::f64::consts::PI;
 
@@ -12,12 +12,12 @@ use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
 
 /// Number of terms in the sums over all modes; [`tail`] estimates the rest of the sum.
 const TERMS: usize = 400;
-/// Relative error of the closed forms, from rounding and from the terms that the sums leave out.
+/// Relative error of the closed forms, from rounding and from the terms after the first [`TERMS`], which are left out.
 const ERROR: f64 = 1e-11;
 
-/// Returns the remainder of a series: the sum of tanh(k h/2)/k^5 over all wave numbers k beyond `last`, which are
-/// `step` apart. It is replaced by an integral (midpoint rule in reverse), (1/step) int dk, with u = 1/k. The terms
-/// fall as k^-5 for large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
+/// Returns the sum of tanh(k h/2)/k^5 over all wave numbers k above `last`, which are `step` apart: the remainder of a
+/// series. The sum is replaced by the integral (1/step) int dk (midpoint rule in reverse), with u = 1/k. The terms fall
+/// as k^-5 for large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
 fn tail(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
@@ -78,7 +78,7 @@ fn sampled([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> 
     }
 }
 
-/// Ratios such as sinh(x)/cosh(y) for 0 <= x <= 2 y without overflow: all values are over cosh(kh)^2.
+/// Ratios such as sinh(x)/cosh(y) for 0 <= x <= 2 y, all divided by cosh(kh)^2 so that nothing overflows.
 struct Hyperbolic {
     floor: f64,
     half_tanh: f64,
@@ -131,8 +131,7 @@ pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     let slope = |k: f64| {
         j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)
     };
-    // The distances of the zeros from each other and from 0 are at least 1/(mean radius) and
-    // pi/(outer - inner).
+    // The zeros are at least 1/(mean radius) away from 0, and pi/(outer - inner) away from each other.
     let step = 0.1 / outer;
     let mut found = Vec::with_capacity(count);
     let mut k = 0.5 / outer;
@@ -215,8 +214,8 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
     upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Returns the modal data of a tank of revolution with vertical walls. `inertias` are the inertia
-/// of the rigid liquid across the axis, that about the axis, and the effective inertia.
+/// Returns the modal data of a tank with vertical walls and a flat bottom. `inertias` are, in this order, the inertia
+/// of the rigid liquid across the axis, the inertia of the rigid liquid about the axis, and the effective inertia.
 fn upright(
     [r_inner, r_outer]: [f64; 2],
     h: f64,
@@ -235,7 +234,7 @@ fn upright(
     data
 }
 
-/// Solves a box, `length` along the motion and `width` across it, filled to `h`, m, along one axis.
+/// Solves for the modes of a box along its side of length `length`, m, with the other side `width`, m, filled to `h`, m.
 ///
 /// ```text
 /// k = (2 n - 1) pi/a, m_n/m_liq = 8 tanh(kh)/(a^2 h k^3), wave 4/(a k^2)

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-/// Amplitude dependence of the first mode: its coefficients in the direction of motion or, for a box, along
-/// the first and the second length; `None` if they are not known. `pendulum_limit` is the slosh angle, rad, above which a
-/// pendulum in place of these coefficients is out of range, for each mode that has a direction. `warnings` hold limits of the
-/// coefficients, and reasons for missing ones.
+/// Amplitude dependence of the first mode: its coefficients along the direction of motion or, for a box, along the
+/// first and the second length; `None` if the coefficients are not known. `pendulum_limit` is the slosh angle, rad,
+/// above which a pendulum (s = kappa = 1) is out of range as a model of this mode, one for each direction. `warnings`
+/// state the limits of the coefficients, and the reasons for missing coefficients.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FiniteAmplitude {
     pub mode: Option<Coefficients>,
@@ -19,13 +19,14 @@ pub struct FiniteAmplitude {
 
 /// Third-order coefficients of a mode.
 ///
-/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa, as in the FMUs, 1 for a pendulum; `error` is
-///   their estimated error over 1 + |s| and 1 + |kappa|.
-/// - `planar`, `circular`: relative shift of omega^2 per squared slosh angle; a mode along one length of a
-///   box has no circular motion.
-/// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At an angle A the
-///   crest is wave A + wave_second A^2 high and the trough wave A - wave_second A^2 deep.
-/// - `bridged`: true if the coefficients are interpolated over the fill across a pole of the third order.
+/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa, as in the FMUs, 1 for a pendulum; `error` is their
+///   estimated error relative to 1 + |s| and 1 + |kappa|.
+/// - `planar`, `circular`: relative shift of omega^2 per squared slosh angle; a mode along one length of a box
+///   has no circular motion.
+/// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At a slosh angle A the crest
+///   is wave A + wave_second A^2 high and the trough wave A - wave_second A^2 deep.
+/// - `bridged`: true if the third-order theory has a pole near this fill, so that the coefficients are interpolated
+///   over the fill across it.
 /// - `energy`: coefficients that also give the wave's energy, for a tank that keeps its liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Coefficients {
@@ -35,27 +36,28 @@ pub struct Coefficients {
     pub planar: f64,
     pub circular: Option<f64>,
     pub wave_second: f64,
-    /// Slosh angle, rad, above which the equivalent mass does not represent the mode: the smaller
-    /// of the angle at which its frequency errs by 0.3 % and the angle at which a forced response
-    /// errs by 3 %.
+    /// Slosh angle, rad, up to which the equivalent mass represents the mode: the smaller of the angles at which the
+    /// error of its frequency reaches 0.3 % and at which the error of a forced response reaches 3 %.
     pub angle_limit: f64,
     pub angle_limit_from: LimitSource,
     pub frequency_limit: Option<f64>,
-    /// Slosh angle, rad, above which rotary motion is out of range, because a forced response errs by 3 % or its branch
-    /// folds by a secondary resonance; `None` if `angle_limit` is smaller or no rotary motion was compared.
+    /// Slosh angle, rad, above which rotary motion is out of range, because the error of a forced response reaches 3 %
+    /// or because a secondary resonance folds the branch of rotary motion. `None` if `angle_limit` is smaller, or if
+    /// rotary motion was not compared with potential flow.
     pub swirl_limit: Option<f64>,
-    /// Angle at which the second-order wave is half of the first-order wave, rad, at most 30 degrees. The
-    /// series is not valid above it, whereas below it the error is not known.
+    /// Slosh angle, rad, at which the second-order wave is half of the first-order wave, at most 30 degrees. Above this
+    /// angle the series is not valid; below it, the error of the series is not known.
     pub series_limit: f64,
     pub bridged: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Energy>,
 }
 
-/// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of the coefficients of the third
-/// order: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. `angle_limit` is the angle above which the mode is
-/// out of range, rad, `swirl_limit` the angle for rotary motion, if it is smaller, and `frequency_limit` the angle up to
-/// which the slosh mass was compared with potential flow: there its frequency, planar and rotary, and its energy in planar motion have at most these relative errors.
+/// Coefficients of a mode that also give the wave's energy (`formulas::energy_terms`), used instead of the third-order
+/// coefficients: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. The mode is out of range above the
+/// slosh angle `angle_limit`, rad, and in rotary motion already above `swirl_limit` if that is smaller. Up to the angle
+/// `frequency_limit` the slosh mass was compared with potential flow: its frequencies in planar and in rotary motion,
+/// and its energy in planar motion, have at most the relative errors given here.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Energy {
     pub nonlinear_inertia: f64,
@@ -87,7 +89,7 @@ impl Energy {
     }
 }
 
-/// Source of the coefficients that give the wave's energy, each by fully nonlinear potential flow.
+/// Method by which the coefficients that give the wave's energy were computed, each from fully nonlinear potential flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EnergySource {
@@ -110,10 +112,11 @@ impl EnergySource {
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
     PotentialFlow,
-    /// The difference of the frequency from free waves of fully nonlinear potential flow in this tank.
+    /// The frequency of the equivalent mass was compared with free waves of fully nonlinear potential flow in this tank.
     FreeWaves,
-    /// A share of the angle at which the second-order wave is half of the first-order wave: the smallest
-    /// share that upright cylinders and spheres have; at most the largest angle of an upright cylinder.
+    /// Nothing was compared. The limit is a share of the angle at which the second-order wave is half of the
+    /// first-order wave: the smallest share found in upright cylinders and spheres. It is at most the largest angle
+    /// found in upright cylinders.
     Estimate,
 }
 

@@ -48,8 +48,8 @@ impl From<&str> for Problems {
 
 /// Largest height or diameter of a tank, m. A larger tank was probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
-/// Largest distance between the end of a segment and the start of the next, over the tank's size,
-/// at which both are taken as one point.
+/// Largest gap between the end of a segment and the start of the next one, relative to the tank's size, at which both
+/// points count as equal.
 const JOINED: f64 = 1e-6;
 const LEVEL: f64 = 1e-9;
 
@@ -75,8 +75,8 @@ pub struct Wall {
     pub z_surface: f64,
 }
 
-/// Distance between the free surface and a horizontal part of the wall, over the tank's size,
-/// within which a fill is refused.
+/// Smallest distance between the free surface and a horizontal part of the wall, relative to the tank's size; a fill
+/// closer to the horizontal part is refused, because the modes are not defined there.
 const SHOULDER: f64 = 1e-6;
 const STEEP: f64 = 1e-3;
 
@@ -91,8 +91,8 @@ impl Contour {
     /// Creates a contour from its segments.
     ///
     /// # Errors
-    /// All defects: values that are not finite, radii below 0, segments without length, gaps,
-    /// self-crossing, clockwise order, a size above 100 m.
+    /// Lists all defects: values that are not finite, radii below 0, segments without length, gaps, self-crossing,
+    /// clockwise order, a size above 100 m.
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
         if segments.is_empty() {
@@ -188,7 +188,7 @@ impl Contour {
         outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)
     }
 
-    /// Returns the largest fill, m above the lowest point, which is the end of the outer wall.
+    /// Returns the largest fill, m above the lowest point: the height at which the outer wall ends.
     pub fn depth(&self) -> f64 {
         let end = self.segments[self.segments.len() - 1].end();
         let start = self.segments[0].start();
@@ -197,8 +197,8 @@ impl Contour {
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
-    /// Returns the volume of the liquid, m3, if the free surface is at `fill`, m above the lowest
-    /// point. If the liquid forms several pools, it is the volume of all together.
+    /// Returns the volume of the liquid, m3, if the free surface is at `fill`, m above the lowest point. If the liquid
+    /// forms several pools, the result is the sum of their volumes.
     fn volume_below(&self, fill: f64) -> f64 {
         let z = self.bottom + fill;
         let surface = |height: f64| if height < z { 0.0 } else { f64::INFINITY };
@@ -208,16 +208,16 @@ impl Contour {
 
     /// Returns the integral of `density` dz along the wetted wall, up the outer wall and down the inner one.
     ///
-    /// At the height z the liquid reaches inwards to the radius whose square is `surface(z)`, m2: infinity above a level
-    /// surface, 0 below it. `density` has the point (r, z) of the wall and that square. `kinks` are heights at which the
-    /// slope of `surface` jumps.
+    /// At the height z the liquid reaches inwards to the radius sqrt(`surface(z)`), m: `surface` returns infinity above
+    /// a level surface and 0 below it. `density` receives the point (r, z) of the wall and `surface(z)`, m2. `kinks`
+    /// are heights at which the slope of `surface` jumps.
     pub(crate) fn integrate_wetted<const N: usize>(
         &self,
         surface: impl Fn(f64) -> f64,
         kinks: &[f64],
         density: impl Fn(Point, f64) -> [f64; N],
     ) -> [f64; N] {
-        // exact for r^2 dz of lines and cubics; for an arc in 128 pieces the error is 1e-15
+        // exact for r^2 dz of lines and cubics; an arc is cut into 128 pieces, which leaves an error of 1e-15
         let rule = Gauss::new(5);
         let mut sum = [0.0; N];
         for (segment, [from, to]) in self.wetted_pieces(&surface, kinks) {
@@ -253,8 +253,8 @@ impl Contour {
         pools
     }
 
-    /// Returns the wet pieces of the wall in their order. Each is a short part of a segment, given
-    /// by the segment and the range of its parameter.
+    /// Returns the wet pieces of the wall in the order of the contour. Each piece is a part of a segment, given by the
+    /// segment and the range of its parameter.
     fn wetted_pieces(
         &self,
         surface: impl Fn(f64) -> f64,
@@ -307,8 +307,8 @@ impl Contour {
         bisect(0.0, depth, |fill| self.volume_below(fill) < volume)
     }
 
-    /// Returns the contour as a wall that is wet everywhere, if the tank can be full, which means
-    /// that the contour ends at the axis or at its start.
+    /// Returns the contour as a wall that is wet everywhere. `None` if the tank cannot be full, because the contour
+    /// ends neither at the axis nor at its start.
     pub(crate) fn closed(&self) -> Option<Wall> {
         let (start, end) = (self.segments[0].start(), self.segments[self.segments.len() - 1].end());
         let on_axis = start[0] <= LEVEL * self.size && end[0] <= LEVEL * self.size;
@@ -400,7 +400,7 @@ impl Contour {
 
     fn contact_lines(&self, z: f64, fill: f64) -> Result<(Option<Crossing>, Crossing), Problems> {
         let crossings = self.crossings(z);
-        // Above the brim of an inner wall only a shoulder matters.
+        // The end of an inner wall limits nothing: only a horizontal part of the wall there makes a fill invalid.
         let start = self.segments[0].start();
         let level = LEVEL * self.size;
         if start[1] < z - level && start[0] > level {
@@ -522,16 +522,14 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Returns the position between `first` and `second`, by bisection, at which the condition `holds`
-/// changes from its value at `first` to the opposite.
+/// Returns, by bisection, the position between `first` and `second` at which the value of `holds` changes.
 pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let here = holds(first);
     narrowed([first, second], |at| holds(at) == here)[0]
 }
 
-/// Bisects between two positions until both are as close as possible to the position at which
-/// `is_near` changes, and returns them. `is_near` is true at the first position and false at the
-/// second.
+/// Bisects between the positions `near` and `far`, until both are as close as possible to the position at which
+/// `is_near` changes from true (at `near`) to false (at `far`), and returns both.
 fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..80 {
         let middle = 0.5 * (near + far);
@@ -540,8 +538,8 @@ fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f6
     [near, far]
 }
 
-/// Narrows the interval from `a` to `b` by golden-section search to the part around its best
-/// position, as `better` compares two positions, and returns the ends of this part.
+/// Narrows the interval from `a` to `b` by golden-section search to a short interval around its best position, and
+/// returns the ends. `better` compares two positions.
 pub(crate) fn golden(
     [mut a, mut b]: [f64; 2],
     steps: usize,
@@ -559,8 +557,8 @@ pub(crate) fn golden(
     [a, b]
 }
 
-/// Returns the minimum of `sign` z on a segment and its position as a fraction of the parameter, by golden section
-/// around the lowest sample.
+/// Returns the minimum of `sign` z on a segment, and the fraction of the segment's parameter at which it lies, by
+/// golden-section search around the lowest sample.
 fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
     let height = |s: f64| sign * segment.point_at(s.clamp(0.0, 1.0))[1];
@@ -596,14 +594,14 @@ impl Outline {
         r.1.max(z.1 - z.0)
     }
 
-    /// Returns the area to the left of the contour, which is closed along the axis or straight from end to
-    /// start; it is negative for clockwise order.
+    /// Returns the area to the left of the contour, which is closed along the axis or by a straight line from its end
+    /// to its start. The area is negative for clockwise order.
     fn area(&self) -> f64 {
         let all: Vec<Point> = self.points.iter().flatten().copied().collect();
         let (first, last) = (all[0], all[all.len() - 1]);
         let mut sum: f64 = all.windows(2).map(|p| cross(p[0], p[1])).sum();
         if first[0] <= 1e-9 * self.size() {
-            // from the end of the outer wall to the axis and down
+            // close the contour: from the end of the outer wall to the axis, and down along it
             let corner = [0.0, last[1]];
             sum += cross(last, corner) + cross(corner, first);
         } else {
@@ -625,7 +623,7 @@ impl Outline {
                     || r[0].max(s[0]) < p[0].min(q[0])
                     || p[1].max(q[1]) < r[1].min(s[1])
                     || r[1].max(s[1]) < p[1].min(q[1]);
-                // a closed contour meets itself at its ends
+                // the first and the last segment of a closed contour meet
                 if apart || (a == 0 && b + 1 == lines.len() && norm(sub(p, s)) < 1e-6) {
                     continue;
                 }
@@ -636,7 +634,7 @@ impl Outline {
                     return Some((i, j, [p[0] + u * d[0], p[1] + u * d[1]]));
                 }
             }
-            // a joint that folds back on itself
+            // The next line may fold back on this one at their joint.
             if let Some(&(j, _, s)) = lines.get(a + 1) {
                 let (d, e) = (sub(q, p), sub(s, q));
                 if cross(d, e).abs() < 1e-9 * norm(d) * norm(e) && dot(d, e) < 0.0 {
@@ -701,7 +699,7 @@ mod tests {
         for (from, to) in [(-100.0, 63.0), (-123.4, 120.0), (-90.0, 90.0)] {
             let arc = Segment::arc([0.4, 0.2], 0.1, from, to);
             let (place, low) = extreme(&arc, 1.0);
-            // The square of 60 golden-section steps, which end at the root of rounding.
+            // Golden-section search ends at the root of the rounding error, so that the value has its square as error.
             assert!((low - 0.1).abs() < 1e-16 * 8.0, "{from} {low}");
             assert!((place - (-90.0 - from) / (to - from)).abs() < 1e-7, "{from} {place}");
             let top = 0.2 + 0.1 * f64::min(to, 90.0).to_radians().sin();
@@ -709,9 +707,8 @@ mod tests {
         }
     }
 
-    /// A free surface without width is refused: between two walls that lean towards each other, a
-    /// micrometre apart at the brim, and in the tip of a cone. In a tank of 1.5 m a free surface
-    /// has a width from 1.5 micrometres on.
+    /// In a tank of 1.5 m the narrowest allowed free surface is 1.5 micrometres wide. Narrower are the surface between
+    /// two walls that lean towards each other, a micrometre apart at the brim, and the surface in the tip of a cone.
     #[test]
     fn a_free_surface_without_width_is_refused_with_its_width() {
         let gap = |width: f64| {
@@ -732,8 +729,8 @@ mod tests {
         assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
     }
 
-    /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, for a model's tank
-    /// and for a large one. It then begins at its top. The axis counts as reached to 1e-9.
+    /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, whether the tank is that of a model or large.
+    /// A closed contour begins at its highest point. A point within 1e-9 of the size from the axis counts as on the axis.
     #[test]
     fn a_tank_is_closed_to_a_share_of_its_size() {
         for size in [1.0 / 64.0, 1.0, 16.0] {

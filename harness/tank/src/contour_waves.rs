@@ -1,5 +1,5 @@
-//! Amplitude dependence of the first mode of a body of revolution of any contour: potential flow to
-//! third order, by a variational method.
+//! Dependence of the first mode's frequency on its amplitude, for a body of revolution of any contour: potential flow
+//! to third order, by a variational method.
 //!
 //! The surface is z = z_F + zeta(rho, theta, t) at r = r(rho, z). Lines of constant rho begin at the radius rho
 //! of the surface at rest and run inside the tank. The outermost one is the wall, r(R, z) = R(z). With
@@ -11,24 +11,23 @@
 //! int_Q F dV = int_Q0 F dV + int [F w zeta + (F w)_z zeta^2/2 + (F w)_zz zeta^3/6 + ...] rho drho dtheta
 //! ```
 //!
-//! with derivatives along the lines at the surface at rest: only slope and curvature of the wall at the
-//! contact line enter. Each zeta is allowed, because the lines do not leave the tank. Miles (1976) and
-//! Lukovsky use this principle for vertical walls and for cones. To first order zeta = a f E,
-//! phi = -omega a U S, with
+//! where the derivatives are taken along the lines, at the surface at rest, so that only slope and curvature of the
+//! wall at the contact line enter. Every elevation zeta is allowed, because the lines do not leave the tank. Miles
+//! (1976) and Lukovsky use this principle for vertical walls and for cones. To first order zeta = a f E and phi =
+//! -omega a U S, with
 //!
 //! ```text
 //! planar     E = cos theta cos wt,    S = cos theta sin wt
 //! circular   E = cos(wt - theta),     S = sin(wt - theta)
 //! ```
 //!
-//! To second order zeta gets p P + r Z and phi gets d F. P is constant in time, Z and F have the frequency
-//! 2 omega; their azimuthal numbers are 0 and 2. L averaged over a period is stationary in p, r and d (with the volume as
-//! a constraint), and L_2 a^2 + L_4 a^4 in a, as in `third_order.rs`. The order-3 fields drop out,
-//! because the first order is stationary.
+//! The second order adds p P + r Z to zeta and d F to phi. P is constant in time, Z and F have the frequency 2 omega;
+//! their azimuthal numbers are 0 and 2. L averaged over a period is stationary with respect to p, r and d, with
+//! constant volume as a constraint. The remaining L_2 a^2 + L_4 a^4 is stationary with respect to a, as in
+//! `third_order.rs`. Fields of the third order do not contribute, because L is stationary at the first order.
 //!
-//! The u_j are the solid harmonics r^m, z r^m, ... about a point on the axis, zeta are polynomials.
-//! Both are complete in a liquid without holes. The result does not depend on the choice of the lines,
-//! which tests use.
+//! The u_j are the solid harmonics r^m, z r^m, ... about a point on the axis; zeta is a sum of polynomials in rho. Both
+//! are complete in a liquid without holes. The result does not depend on the choice of the lines, and tests check this.
 
 use core::f64::consts::TAU;
 
@@ -38,18 +37,18 @@ use crate::contour::{Wall, bisect};
 use crate::gauss::Gauss;
 use crate::third_order::circle_basis;
 
-/// Depth below the surface, over the largest radius, beyond which the liquid is at rest: a cylinder's first
-/// mode has 2e-5 of its motion there.
+/// Depth below the surface, relative to the largest radius, below which the liquid is taken as at rest: the first mode
+/// of a cylinder has 2e-5 of its motion at this depth.
 const DEEP: f64 = 3.0;
 
-/// Smallest ratio of an eigenvalue of the kinetic energy's matrix to the largest one at which the
-/// combination of harmonics is used. At smaller ratios it consists of rounding errors.
+/// Smallest eigenvalue of the matrix of kinetic energy, relative to its largest one, at which the eigenvector (a
+/// combination of harmonics) is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
 const NOISE: f64 = 1e-13;
 
-/// Periodic waves of the first mode, with lengths over the radius of the surface: lambda_1 = omega_1^2/g, the
-/// relative shifts of omega^2 per squared slosh angle in planar and circular motion, the second-order
-/// elevation at the wall of planar motion per squared slosh angle when it is largest there, and the modes
-/// that the square of the first mode excites, each with azimuthal number, number from 1, and lambda.
+/// Periodic waves of the first mode, with lengths divided by the radius of the surface. The fields are lambda_1 =
+/// omega_1^2/g; the relative shifts of omega^2 per squared slosh angle in planar and in circular motion; the
+/// second-order elevation at the wall per squared slosh angle, in planar motion at its largest elevation; and the modes
+/// that the square of the first mode excites, each with its azimuthal number, its number from 1, and its lambda.
 #[derive(Clone, Debug)]
 pub(crate) struct Waves {
     pub lambda: f64,
@@ -120,9 +119,9 @@ struct Boundary {
     weights: Vec<f64>,
 }
 
-/// The liquid at rest, over the radius of the surface, z from the surface. The harmonics are centred half way
-/// to the bottom, and `wall` holds the slope and the curvature of the wall at the contact line, dR/dz and
-/// d^2R/dz^2.
+/// The liquid at rest, with lengths divided by the radius of the surface, and z counted from the surface. The
+/// harmonics are centred half way to the bottom. `wall` holds the slope dR/dz and the curvature d^2R/dz^2 of the wall
+/// at the contact line.
 pub(crate) struct Liquid {
     boundary: Boundary,
     pub centre: f64,
@@ -203,7 +202,7 @@ impl Liquid {
         self.weights.iter().enumerate().map(|(i, w)| w * f(i)).sum()
     }
 
-    /// Returns harmonics whose kinetic energies are orthonormal, by the boundary integral of u du/dn.
+    /// Returns combinations of harmonics whose kinetic energies are orthonormal, by the boundary integral of u du/dn.
     pub fn harmonics(&self, m: usize, degree: usize) -> Harmonics {
         let Boundary { points, normals, weights } = &self.boundary;
         let fields = Fields::new(m, degree, self.size, points);
@@ -230,7 +229,7 @@ impl Liquid {
         Harmonics { e, surface }
     }
 
-    /// Returns orthonormal polynomials at the surface's points, and at the wall in a last row.
+    /// Returns the values of orthonormal polynomials at the points of the surface and, in the last row, at the wall.
     pub fn elevations(&self, m: usize, count: usize) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.rho.len() + 1, count);
         for (i, rho) in self.rho.iter().chain(&[1.0]).enumerate() {
@@ -251,17 +250,17 @@ impl Liquid {
 
 type Wave = fn(f64, f64) -> f64;
 
-/// Shapes of a motion over azimuth and phase, for one azimuthal number `m`; `None` for a field that the
-/// motion does not excite. `double` holds the elevation at 2 omega, the potential, and the potential's
-/// derivative by theta.
+/// Second-order shapes of a motion as functions of azimuth and phase, for one azimuthal number `m`; `None` for a shape
+/// that the motion does not excite. `double` holds three functions at the frequency 2 omega: the elevation, the
+/// potential, and the potential's derivative with respect to theta.
 struct Shape {
     m: usize,
     mean: Option<Wave>,
     double: Option<[Wave; 3]>,
 }
 
-/// Elevation E, potential shape S and the derivative of S by the azimuth theta of a motion, and the shapes of second
-/// order that it excites.
+/// Elevation E of a motion, its potential S and the derivative of S with respect to the azimuth theta, and the shapes
+/// of second order that the motion excites.
 struct Motion {
     first: [Wave; 3],
     second: Vec<Shape>,
@@ -305,15 +304,15 @@ fn motions() -> [Motion; 2] {
     [planar, circular]
 }
 
-/// Returns the mean over azimuth and phase, exact for trigonometric polynomials of degree 11.
+/// Returns the mean of `f` over azimuth and phase, exact for trigonometric polynomials of degree 11.
 fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     let angle = |i: i32| TAU * f64::from(i) / 12.0;
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
 }
 
-/// The first mode at the surface's points, and the quantities of it that the higher orders need: its
-/// elevation f with int f^2 rho drho = 1; (U w)_z and (U w)_zz along the lines; U_r, U_z and U/r; ((U_r^2 +
-/// U_z^2) w)_z and (U^2/r^2 w)_z along the lines; w_z and w_zz; and the slope dr/dz of the lines.
+/// The first mode at the points of the surface, and its quantities that the higher orders need: its elevation f with
+/// int f^2 rho drho = 1; (U w)_z and (U w)_zz along the lines; U_r, U_z and U/r; ((U_r^2 + U_z^2) w)_z and (U^2/r^2
+/// w)_z along the lines; w_z and w_zz; and the slope dr/dz of the lines.
 struct First {
     lambda: f64,
     f: Vec<f64>,
@@ -324,8 +323,8 @@ struct First {
     slope: Vec<f64>,
 }
 
-/// A field of the second order in the amplitude: the coefficients p and r of its elevation and d of
-/// its potential, and its part of L_4.
+/// A field of the second order in the amplitude: the coefficients p and r of its elevation and d of its potential, and
+/// its contribution `l_4` to L_4.
 struct Second {
     l_4: f64,
     p: DVector<f64>,
@@ -339,16 +338,16 @@ impl Second {
     }
 }
 
-/// Combinations e of harmonics, one a column, with orthonormal kinetic energies, and their values at the
-/// surface.
+/// Combinations of harmonics with orthonormal kinetic energies, whose coefficients are the columns of `e`, and the
+/// values of the combinations at the surface.
 pub(crate) struct Harmonics {
     pub e: DMatrix<f64>,
     pub surface: Fields,
 }
 
-/// Computes the waves with solid harmonics up to `degree`. The slope of the lines grows with the power
-/// `lines` of the radius, an odd number. `detuning` is added to 1 as a factor of 2 omega in the response of
-/// the second order, see `third_order.rs`. Returns `None` for a liquid with a hole.
+/// Computes the waves with solid harmonics up to `degree`. The slope of the lines is proportional to the radius to the
+/// power `lines`, an odd number. The response of the second order is computed at the frequency 2 omega (1 +
+/// `detuning`), see `third_order.rs`. Returns `None` for a liquid with a hole.
 pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Option<Waves> {
     let liquid = Liquid::new(wall, degree)?;
     let count = degree / 2;
@@ -364,7 +363,7 @@ pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Op
     let mut waves = Waves { lambda, shifts: [0.0; 2], second_wave: 0.0, excited: Vec::new() };
     let fields = [0, 2].map(|m| (liquid.harmonics(m, degree), liquid.elevations(m, count)));
     for (k, (u, f)) in fields.iter().enumerate() {
-        // The constant elevation of m = 0 changes the volume and is no mode.
+        // The constant elevation of m = 0 would change the volume, so that it is no mode.
         let coupling = liquid.coupling(f, &u.surface.u).remove_rows(0, 1 - k);
         let mut all =
             (&coupling * coupling.transpose()).symmetric_eigenvalues().as_slice().to_vec();
@@ -458,7 +457,7 @@ impl First {
         let [e, s, s_theta] = motion.first;
         let [u_r, u_z, over] = &self.gradient;
         let count = f.ncols();
-        // what an elevation of a shape adds to L_4, per coefficient
+        // contribution of an elevation with the shape z to L_4, per coefficient of the elevation
         let source = |z: Wave| {
             let square = average(|h, t| e(h, t).powi(2) * z(h, t));
             let along = average(|h, t| s(h, t).powi(2) * z(h, t));
@@ -474,7 +473,7 @@ impl First {
                 })
             })
         };
-        // change of volume by the first order's square, to be made up by the second
+        // The first order changes the volume by its square; the second order has to compensate this change.
         let squeezed = liquid.integral(|q| self.w[0][q] * self.f[q] * self.f[q]);
         let level = liquid.integral(|q| f[(q, 0)]);
         let zero = DVector::zeros(count);
@@ -493,7 +492,7 @@ impl First {
         if let Some([z, potential, potential_theta]) = shape.double {
             let omega = self.lambda.sqrt();
             let driven = omega * (1.0 + detuning);
-            // The constant of m = 0 is the volume's multiplier.
+            // The constant of m = 0 is the Lagrange multiplier of the volume.
             let constant = usize::from(shape.m == 0);
             let harmonics = fields.u.ncols();
             let size = count + harmonics + constant;
@@ -554,8 +553,8 @@ mod tests {
         wall(vec![Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)], fill)
     }
 
-    /// The tolerance of 1e-5 covers what the harmonics leave out at degree 24, and the depth beyond which the
-    /// liquid is at rest.
+    /// The tolerance of 1e-5 covers the harmonics above degree 24, which are left out, and the depth below which the
+    /// liquid is taken as at rest.
     #[test]
     fn the_contour_method_equals_the_method_for_vertical_walls_in_cylinders() {
         let overlaps = crate::third_order::Overlaps::round(0.0, 0.5, 20);
@@ -597,9 +596,9 @@ mod tests {
         }
     }
 
-    /// Luke's functional of the first and the second order is evaluated without any expansion: the integrals
-    /// over the liquid run along the lines up to the surface, with the sphere's true wall. Its fourth order
-    /// in the amplitude is L_4.
+    /// Luke's functional of the first and the second order is evaluated without any expansion: the integrals over
+    /// the liquid run along the lines up to the surface, with the true wall of the sphere. The coefficient of a^4 in
+    /// the functional is L_4.
     #[test]
     fn fourth_order_terms_equal_those_of_the_functional() {
         let (fill, degree, count) = (0.7, 14, 7);
@@ -633,7 +632,7 @@ mod tests {
                 let z = fill - 1.0 + radius * z;
                 (1.0 - z * z).sqrt() / radius
             };
-            // potentials and their derivatives by r and z over the radius, each for its azimuthal number
+            // potentials and their derivatives with respect to r and z at a point, one for each azimuthal number
             let at = |rho: f64, z: f64| -> Vec<[f64; 3]> {
                 let point = [[rho * wall_at(z), z - liquid.centre]];
                 let field = |m: usize, c: DVector<f64>| {
@@ -655,7 +654,7 @@ mod tests {
                         let (h, t) =
                             (TAU * f64::from(k / 12) / 12.0, TAU * f64::from(k % 12) / 12.0);
                         let mut zeta = a * first.f[q] * e(h, t);
-                        // E's derivative by the phase is -S
+                        // The derivative of E with respect to the phase is -S.
                         let mut rate = -omega * a * first.f[q] * s(h, t);
                         for (shape, _, f, second) in &second {
                             let row = f.row(q);
@@ -668,8 +667,8 @@ mod tests {
                                 rate -= 2.0 * omega * a * a * r * potential(h, t);
                             }
                         }
-                        // The multiplier of the volume at 2 omega does not matter: the volume is
-                        // constant to the third order, and its multiplier is of the second.
+                        // The multiplier of the volume at 2 omega is left out: it is of the second order, and the
+                        // volume is constant to the third order, so that their product does not contribute.
                         let phi = |z: f64| {
                             let mut phi = [0.0; 4];
                             for (i, [u, r, z]) in at(rho, z).into_iter().enumerate() {
@@ -713,7 +712,7 @@ mod tests {
                 }
                 sum
             };
-            // The sixth order drops out.
+            // Two amplitudes eliminate the sixth order.
             let [large, small] = [0.04, 0.02].map(|a| functional(a) / f64::powi(a, 4));
             let l_4 = (4.0 * small - large) / 3.0;
             let square = average(|h, t| e(h, t).powi(2));

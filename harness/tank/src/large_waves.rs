@@ -10,8 +10,9 @@
 //! circular   zeta = sum Z f(rho) cos(m (tau - theta)),     phi = sum C u(r, z) sin(m (tau - theta))
 //! ```
 //!
-//! where < > is the mean over theta and tau, and phi and w are taken at the surface. L is stationary in Z and C, with the
-//! volume as a constraint. Newton's method finds the wave and its frequency for a given part of the first mode.
+//! where < > is the mean over theta and tau, and phi and w are taken at the surface. L is stationary with respect to Z
+//! and C, with constant volume as a constraint. Newton's method finds the wave and its frequency for a given amplitude
+//! of the first mode.
 
 use core::f64::consts::PI;
 use std::thread;
@@ -28,9 +29,10 @@ use crate::gauss::Gauss;
 #[cfg(feature = "studies")]
 pub mod forced;
 
-/// A periodic wave: `angle` is the slosh angle, rad, whose sine is m_liq x_cm/(m_1 l) with the largest distance
-/// x_cm of the liquid's centre of mass from the axis; `frequency` is relative to small waves; `rise` is the
-/// height of the centre of mass at the phase 0 above its height at rest, m_liq z_cm/(m_1 l). Planar motion rests then.
+/// A periodic wave. `angle` is the slosh angle, rad, whose sine is m_liq x_cm/(m_1 l), where x_cm is the largest
+/// distance of the liquid's centre of mass from the axis. `frequency` is relative to the frequency of small waves.
+/// `rise` is m_liq z_cm/(m_1 l), where z_cm is the height of the centre of mass at the phase 0 above its height at
+/// rest. In planar motion the liquid is momentarily at rest at the phase 0.
 #[derive(Clone, Copy, Debug)]
 struct LargeWave {
     angle: f64,
@@ -46,8 +48,8 @@ enum Motion {
     Forced(forced::Function),
 }
 
-/// Numbers of the approximation: degree of the solid harmonics, number of polynomials of the elevation for each
-/// azimuthal number, and largest azimuthal number and multiple of the frequency.
+/// Size of the truncated expansion: degree of the solid harmonics, number of polynomials of the elevation for each
+/// azimuthal number, and the largest azimuthal number, which is also the largest multiple of the frequency.
 #[derive(Clone, Copy, Debug)]
 struct Resolution {
     degree: usize,
@@ -58,16 +60,16 @@ struct Resolution {
 /// Number of Gauss points between the surface at rest and the wave.
 const DEPTHS: usize = 4;
 const STEPS: usize = 12;
-/// Largest change of the unknowns, relative to the amplitude, with which a wave has converged.
+/// Largest change of the unknowns in a Newton step, relative to the amplitude, at which a wave counts as converged.
 const CONVERGED: f64 = 1e-9;
-/// Part of the height of the side, above and below the contact line, that a wave may take.
+/// Largest elevation of a wave, above and below the contact line, as a fraction of the height of the [`Side`] there.
 const ROOM: f64 = 0.8;
 /// Largest sine of the angle between two segments of a side.
 const SMOOTH: f64 = 1e-3;
 
-/// The wall near the surface: its radius, divided by the radius of the surface at rest, as a function of the height
-/// above the surface. The function is defined from `low` to `high`, the part around the contact line in which the
-/// wall is smooth and rises.
+/// The smooth part of the wall around the contact line: the wall's radius, divided by the radius of the surface at
+/// rest, as a function of the height above the surface. The function is defined from `low` to `high`, between which the
+/// wall has no corner and rises.
 pub(crate) struct Side {
     pieces: Vec<Piece>,
     radius: f64,
@@ -84,8 +86,9 @@ struct Piece {
 }
 
 impl Piece {
-    /// Returns the part of a segment from the parameter `start` on towards `end` in which the height changes in the
-    /// direction `sign`; its ends are in the order of their heights. `None` if the height does not change.
+    /// Returns the part of a segment that begins at the parameter `start`, runs towards `end`, and whose height
+    /// changes in the direction `sign` throughout. The ends of the part are in the order of their heights. `None` if
+    /// the height does not change.
     fn new(curve: Curve, start: f64, end: f64, sign: f64) -> Option<Piece> {
         let count = 64;
         let place = |i: usize| start + (end - start) * i as f64 / count as f64;
@@ -95,7 +98,7 @@ impl Piece {
         Some(Piece { curve, t, z: t.map(|t| curve.point_at(t)[1]) })
     }
 
-    /// Returns the curve's parameter at the height `z`, m, by Newton's method between bounds.
+    /// Returns the curve's parameter at the height `z`, m, by Newton's method with bisection bounds.
     fn parameter(&self, z: f64) -> f64 {
         let [mut low, mut high] = self.t;
         let mut t = low + (high - low) * (z - self.z[0]) / (self.z[1] - self.z[0]);
@@ -118,8 +121,8 @@ impl Piece {
     }
 }
 
-/// Returns the parts of consecutive segments from the parameter `start` of the first one on in which the height changes in
-/// the direction `sign`, up to the first corner.
+/// Returns the parts of consecutive segments, from the parameter `start` of the first segment up to the first corner,
+/// along which the height changes in the direction `sign`.
 fn smooth_pieces<'s>(
     segments: impl Iterator<Item = &'s Segment>,
     start: f64,
@@ -154,7 +157,7 @@ impl Side {
             let (a, b) = (segment.from.min(segment.to), segment.from.max(segment.to));
             (a..=b).contains(&t)
         };
-        // At a joint the segment above the contact line counts.
+        // If the contact line is at a joint, the segment above it counts.
         let first = segments
             .iter()
             .rposition(|part| part.curve == contact.curve && is_within(contact.to, part))?;
@@ -167,8 +170,8 @@ impl Side {
         (low < 0.0 && high > 0.0).then_some(Side { pieces, radius, surface, low, high })
     }
 
-    /// Returns the radius of the wall at the height `z` above the surface at rest and its first two derivatives, or `None`
-    /// beyond the ends of the side.
+    /// Returns the radius of the wall at the height `z` above the surface at rest, and the first two derivatives of the
+    /// radius with respect to `z`. `None` beyond the ends of the side.
     fn at(&self, z: f64) -> Option<[f64; 3]> {
         if !(self.low..=self.high).contains(&z) {
             return None;
@@ -188,8 +191,8 @@ impl Side {
     }
 }
 
-/// A product of functions of theta and tau: of an elevation and its derivative by tau, and of a potential and its
-/// derivative by theta.
+/// One term of the expansion, as functions of theta and tau: its elevation, the elevation's derivative with respect to
+/// tau, its potential, and the potential's derivative with respect to theta.
 #[derive(Clone, Copy)]
 struct Term {
     m: usize,
@@ -234,7 +237,7 @@ impl Term {
         }
     }
 
-    /// Returns the mean square of the potential's function.
+    /// Returns the mean square of the term's potential over theta and tau.
     fn norm(self) -> f64 {
         match self.motion {
             Motion::Planar if self.m > 0 => 0.25,
@@ -274,10 +277,10 @@ impl Points {
     }
 }
 
-/// Values of the potential's functions at points, one function a column: u, u_r, u_z and u_theta/r.
+/// Values of the potential's base functions at points, one function a column: u, u_r, u_z and u_theta/r.
 struct Potentials {
     values: [DMatrix<f64>; 4],
-    /// Second derivatives of the sum of all functions and its derivatives by theta, at each point.
+    /// At each point, derivatives of the sum of all base functions: zz, rz, rr, and theta, z theta, r theta.
     second: Vec<[f64; 6]>,
 }
 
@@ -286,12 +289,13 @@ struct Solver<'a> {
     side: &'a Side,
     terms: Vec<Term>,
     resolution: Resolution,
-    /// Combinations of harmonics with orthonormal energies, for each azimuthal number.
+    /// Combinations of harmonics with orthonormal kinetic energies, for each azimuthal number.
     combinations: Vec<DMatrix<f64>>,
     points: Points,
     elevation: DMatrix<f64>,
     rate: DMatrix<f64>,
-    /// First mode: elevation's coefficients, potential's coefficients, lambda, and int f rho^2 drho.
+    /// First mode: coefficients of its elevation (`shape`) and of its potential, its lambda, and int f rho^2 drho
+    /// (`amplitude`).
     shape: DVector<f64>,
     potential: DVector<f64>,
     lambda: f64,
@@ -300,7 +304,7 @@ struct Solver<'a> {
 }
 
 impl<'a> Solver<'a> {
-    /// Prepares waves in the liquid above `wall`. Returns `None` for a liquid with a hole.
+    /// Prepares the computation of waves in the liquid above `wall`. Returns `None` for a liquid with a hole.
     fn new(
         wall: &Wall,
         side: &'a Side,
@@ -328,7 +332,7 @@ impl<'a> Solver<'a> {
         let count = 2 * order + 2;
         let half = |n: usize| PI * (n as f64 + 0.5) / count as f64;
         let grid: Vec<[f64; 2]> = match motion {
-            // The wave at (pi - theta, pi - tau) is the same.
+            // The wave at (pi - theta, pi - tau) equals the wave at (theta, tau), so that half of the azimuths are enough.
             Motion::Planar => {
                 (0..count / 2).flat_map(|i| (0..count).map(move |j| [half(i), half(j)])).collect()
             }
@@ -374,7 +378,8 @@ impl<'a> Solver<'a> {
         [value, rate]
     }
 
-    /// Returns the number of the potential's coefficients of a term. The constant of m = 0 keeps the volume.
+    /// Returns the number of coefficients that the potential of a term has. For m = 0 they include a constant,
+    /// which keeps the volume.
     fn potentials_of(&self, term: Term) -> usize {
         match term.has_potential() {
             true => self.combinations[term.m].ncols() + usize::from(term.m == 0),
@@ -461,7 +466,8 @@ impl<'a> Solver<'a> {
         z.iter().map(|z| self.side.at(*z)).collect()
     }
 
-    /// Returns gradient and second derivatives of L and of the two constraints at `x`, for a part `part` of the first mode.
+    /// Returns the gradient of L, the values of the two constraints, and the derivatives of all of them at `x`. `part`
+    /// is the coefficient that the first mode must have.
     fn equations(&self, x: &DVector<f64>, part: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let [nz, nc] = self.sizes();
         let size = nz + nc + 2;
@@ -475,7 +481,7 @@ impl<'a> Solver<'a> {
         let [u, u_r, u_z, u_h] = &at.values;
         let [phi, phi_r, phi_z, phi_h] = at.values.each_ref().map(|u| u * &c);
 
-        // along the lines
+        // derivatives along the lines
         let mut along = DMatrix::zeros(rows, nc);
         let mut kinetic = DMatrix::zeros(rows, nc);
         // coefficients of the diagonal blocks
@@ -547,7 +553,8 @@ impl<'a> Solver<'a> {
         Some((gradient, matrix))
     }
 
-    /// Returns the kinetic energy's matrix, and the volume between the surface at rest and the wave.
+    /// Returns the matrix of the kinetic energy for the surface elevation `zeta`, and the volume between the surface at
+    /// rest and the wave.
     fn energy_above(&self, zeta: &DVector<f64>) -> Option<(DMatrix<f64>, f64)> {
         let [_, nc] = self.sizes();
         let mut energy = DMatrix::zeros(nc, nc);
@@ -575,7 +582,7 @@ impl<'a> Solver<'a> {
         Some((energy, volume))
     }
 
-    /// Returns the vector whose product with the elevation's coefficients is the part of the first mode.
+    /// Returns the vector whose scalar product with the coefficients of the elevation is the coefficient of the first mode.
     fn first_mode(&self) -> DVector<f64> {
         let [nz, _] = self.sizes();
         let count = self.resolution.polynomials;
@@ -617,13 +624,14 @@ impl<'a> Solver<'a> {
         None
     }
 
-    /// Returns the slosh angle's sine and the rise of the centre of mass at the phase 0.
+    /// Returns the sine of the slosh angle, and the rise of the centre of mass as [`LargeWave`] defines it, both
+    /// at the phase 0.
     fn measure(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
         let scale = 2.0 / (self.amplitude * self.amplitude);
         Some(self.moments(x)?.map(|moment| scale * moment))
     }
 
-    /// Returns the first moments of the liquid between the surface at rest and the wave at the phase 0: sideways and upwards.
+    /// Returns the first moments, sideways and upwards, of the liquid between the surface at rest and the wave at the phase 0.
     fn moments(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
         let [nz, _] = self.sizes();
         let rule = Gauss::new(self.resolution.polynomials + 6);
@@ -646,7 +654,8 @@ impl<'a> Solver<'a> {
         Some([sideways, up])
     }
 
-    /// Computes waves whose first mode has these slosh angles, rad, ascending; `None` where Newton's method does not converge.
+    /// Computes waves whose first mode has the slosh angles `angles`, rad, ascending; `None` where Newton's
+    /// method does not converge.
     fn waves(&self, angles: &[f64]) -> Vec<Option<LargeWave>> {
         let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
         let mut wave = |angle: &f64| {
@@ -671,14 +680,15 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Degrees of the harmonics of the truncations whose median is taken. In each of them a few waves are wrong, because a
-/// multiple of their frequency happens to be that of a high mode of the truncated liquid.
+/// Degrees of the harmonics in the truncated expansions. The median over these truncations is used, because in each of
+/// them a few waves are wrong: a multiple of their frequency happens to equal that of a high mode of the truncated liquid.
 const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
-/// Largest azimuthal number and multiple of the frequency.
+/// Largest azimuthal number, which is also the largest multiple of the frequency.
 const ORDER: usize = 4;
 /// Slosh angles at which waves are computed, degrees.
 const ANGLES: [f64; 9] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
-/// Largest median deviation of a truncation's frequency from the median.
+/// Largest scatter of the frequencies at one slosh angle: median of the deviations of the truncations from their
+/// median, relative.
 const SCATTER: f64 = 2e-4;
 
 fn median(values: &mut [f64]) -> f64 {
@@ -690,8 +700,8 @@ fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// Returns periodic waves of the liquid above `wall`: medians of several truncations, up to the angle at which these
-/// scatter. The list is empty for a liquid with a hole.
+/// Returns periodic waves of the liquid above `wall`, each the median of several truncations, up to the slosh angle at
+/// which the truncations scatter by more than [`SCATTER`]. The list is empty for a liquid with a hole.
 fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     let angles = ANGLES.map(f64::to_radians);
     let truncation = &|degree: usize| {
@@ -714,7 +724,8 @@ fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
         if 2 * here.len() < DEGREES.len() {
             continue;
         }
-        // Shift of omega^2 and excess of the rise, over the square of the angle's sine, hardly depend on the angle.
+        // The shift of omega^2 and the excess of the rise, both divided by the squared sine of the angle, hardly
+        // depend on the angle.
         let of = |f: &dyn Fn(&LargeWave) -> f64| here.iter().map(f).collect::<Vec<f64>>();
         let square = |wave: &LargeWave| wave.angle.sin().powi(2);
         let shift = |wave: &LargeWave| (wave.frequency.powi(2) - 1.0) / square(wave);
@@ -734,13 +745,14 @@ fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     waves
 }
 
-/// Largest relative distance of the frequency, and of the rise, of one wave from the straight line through the other
-/// waves.
+/// Largest relative distance of the frequency (first) and of the rise (second) of one wave from the straight line
+/// through the other waves.
 const OUTLIER: [f64; 2] = [5e-4, 3e-3];
 
-/// Removes waves whose frequency or rise does not go with the other waves, because the truncation is at a resonance there.
-/// Each wave has the number of its angle. Over u, the square of the angle's sine, the shift of omega^2 and the excess of the
-/// rise, both over u, are almost straight lines, whose slopes are the medians over all pairs of waves with different angles.
+/// Removes waves whose frequency or rise lies off the straight line through the other waves, because the truncation has
+/// a resonance there. Each wave comes with the index of its slosh angle. With u, the square of the angle's sine, the
+/// shift of omega^2 over u and the excess of the rise over u are almost linear in u. The slope of each line is the
+/// median over all pairs of waves with different angles.
 fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave)> {
     for (i, allowed) in OUTLIER.into_iter().enumerate() {
         let point = |wave: &LargeWave| {
@@ -769,17 +781,18 @@ fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave
     waves
 }
 
-/// Coefficients of the slosh mass with the energy and the frequencies of waves, see `formulas::energy_terms`, with the largest
-/// errors of its frequency in planar and in circular motion and of its energy, relative, up to the angle `compared`, rad.
+/// Coefficients that give the slosh mass the energy and the frequencies of large waves, see `formulas::energy_terms`.
+/// `errors` are the largest relative errors of the frequency in planar motion, of the frequency in circular motion, and
+/// of the energy, up to the slosh angle `compared`, rad.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fit {
     pub terms: EnergyTerms,
     pub errors: [f64; 3],
-    /// Relative shifts of omega^2 per squared slosh angle of the smallest waves, planar and circular.
+    /// Relative shifts of omega^2 per squared slosh angle in the limit of small waves, planar and circular.
     pub shifts: [f64; 2],
 }
 
-/// Returns the intercept and the slope of the straight line through the points (u, y) with the weights u^2.
+/// Returns the intercept and the slope of the straight line that is fitted to the points (u, y) with the weights u^2.
 fn line(points: &[[f64; 2]]) -> [f64; 2] {
     let mut sums = [0.0; 5];
     for [u, y] in points {
@@ -793,8 +806,8 @@ fn line(points: &[[f64; 2]]) -> [f64; 2] {
     [(wy * wuu - wuy * wu) / determinant, (w * wuy - wu * wy) / determinant]
 }
 
-/// Returns the frequency of the slosh mass in planar motion with the amplitude `angle`, relative to the frequency of
-/// small motion. The period is an integral over the displacement q = a sin t, evaluated by quadrature.
+/// Returns the frequency of the slosh mass in planar motion with the amplitude `angle`, divided by the frequency of
+/// small motion. The period is the integral over the displacement q = a sin t, evaluated by quadrature.
 fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let ([s, kappa], [s_2, kappa_2]) = (terms.pair, terms.next);
     let (a, count) = (angle.sin(), 32);
@@ -805,7 +818,7 @@ fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
             let slope =
                 q * (1.0 / (1.0 - u).sqrt() + (kappa - 1.0) * u / 2.0 + 0.375 * kappa_2 * u * u);
             let inertia = 1.0 + slope * slope + (s - 1.0) * u + s_2 * u * u;
-            // height(a) - height(q) over a^2 - q^2
+            // (height(a) - height(q))/(a^2 - q^2)
             let rise = 1.0 / ((1.0 - u).sqrt() + (1.0 - a * a).sqrt())
                 + (kappa - 1.0) * (a * a + u) / 8.0
                 + kappa_2 * (a.powi(4) + a * a * u + u * u) / 16.0;
@@ -815,21 +828,22 @@ fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     1.0 / quarter
 }
 
-/// Returns the force towards the axis over the displacement, for m = g = l = 1.
+/// Returns the restoring force divided by the displacement, for m = g = l = 1; `u` is the squared displacement.
 fn pull(terms: &EnergyTerms, u: f64) -> f64 {
     1.0 / (1.0 - u).sqrt() + (terms.pair[1] - 1.0) * u / 2.0 + 0.375 * terms.next[1] * u * u
 }
 
-/// Returns the frequency of the slosh mass in circular motion with the amplitude `angle`, relative to the frequency of small
-/// motion.
+/// Returns the frequency of the slosh mass in circular motion with the amplitude `angle`, divided by the
+/// frequency of small motion.
 fn circular_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let (u, [t, t_2]) = (angle.sin().powi(2), terms.rotary);
     (pull(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()
 }
 
-/// Returns the limit of a slosh mass of the third order, `pair` = (s, kappa), in a tank whose large waves have the
-/// coefficients `terms`: the angles at which its frequency in planar or in circular motion differs from theirs, at most the
-/// angle up to which `terms` hold.
+/// Returns the angle limit of a third-order slosh mass with the coefficients `pair` = (s, kappa), in a tank whose
+/// large waves have the coefficients `terms`. Beyond this slosh angle the frequency of the third-order mass, in
+/// planar or in circular motion, differs too much from the frequency of the large waves. It is at most the angle up
+/// to which `terms` hold.
 pub(crate) fn third_order_limit(terms: &EnergyTerms, pair: [f64; 2]) -> AngleLimit {
     let third = EnergyTerms { pair, next: [0.0; 2], rotary: [0.0; 2], ..*terms };
     let off = |angle: f64| {
@@ -852,11 +866,11 @@ pub(crate) fn third_order_limit(terms: &EnergyTerms, pair: [f64; 2]) -> AngleLim
 /// Number of angles at which [`third_order_limit`] compares frequencies.
 const LIMIT_STEPS: u32 = 200;
 
-/// Smallest angle up to which waves are needed for a fit, rad.
+/// Smallest slosh angle, rad, up to which waves must be known for a fit.
 pub(crate) const LEAST: f64 = 6.0 * PI / 180.0;
 
-/// Computes periodic waves of the liquid above `wall` and fits the coefficients to them. Returns `None` for a liquid with a
-/// hole, and if there are no waves up to the angle [`LEAST`].
+/// Computes periodic waves of the liquid above `wall`, and fits the coefficients of the slosh mass to them. Returns
+/// `None` for a liquid with a hole, or if the waves end below the slosh angle [`LEAST`].
 pub(crate) fn fit(wall: &Wall, side: &Side) -> Option<Fit> {
     let [planar, circular] =
         [Motion::Planar, Motion::Circular].map(|motion| backbone(wall, side, motion));
@@ -867,7 +881,7 @@ fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
     if planar.len().min(circular.len()) < 3 {
         return None;
     }
-    // Both motions up to the same angle.
+    // Both motions are used up to the same angle.
     let largest = planar[planar.len() - 1].angle.min(circular[circular.len() - 1].angle);
     let upto = |waves: &[LargeWave]| -> Vec<LargeWave> {
         waves.iter().filter(|wave| wave.angle < 1.05 * largest).copied().collect()
@@ -877,7 +891,7 @@ fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
         return None;
     }
     let square = |wave: &LargeWave| wave.angle.sin().powi(2);
-    // The liquid rests at the largest angle of planar motion, where its energy is that of its height.
+    // At the largest angle of planar motion the liquid is at rest, so that its energy is the potential energy of its height.
     let heights: Vec<[f64; 2]> = planar
         .iter()
         .map(|wave| {
@@ -901,7 +915,7 @@ fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
         .collect();
     let [t, t_2] = line(&turns);
     terms.rotary = [t / 2.0, t_2 / 3.0];
-    // The frequency is almost linear in s u and s_2 u^2, whose factors in omega are -1/4 and -3/16.
+    // The frequency is almost linear in s u and s_2 u^2, with the coefficients -1/4 and -3/16.
     for _ in 0..8 {
         let off: Vec<[f64; 2]> = planar
             .iter()
@@ -961,8 +975,8 @@ mod tests {
         [Motion::Planar, Motion::Circular].map(|motion| backbone(&wall, &side, motion))
     }
 
-    /// The frequencies in tests/backbones.csv were computed by other programs (a variational method with other functions,
-    /// and one that marches in time).
+    /// The frequencies in tests/backbones.csv were computed by two other programs: one uses a variational method with
+    /// other base functions, and one marches in time.
     #[test]
     fn waves_in_cylinders_have_the_known_frequencies() {
         let known: Vec<[Option<f64>; 4]> = include_str!("../tests/backbones.csv")
@@ -986,7 +1000,8 @@ mod tests {
                     let Some(pair) = points.windows(2).find(|pair| pair[1][0] >= degrees) else {
                         continue;
                     };
-                    // The shift of the frequency is nearly proportional to the square of the angle.
+                    // Interpolates between two waves: the shift of the frequency is nearly proportional to the
+                    // square of the angle.
                     let [[a, f_a], [b, f_b]] = [pair[0], pair[1]];
                     let share = (degrees.powi(2) - a * a) / (b * b - a * a);
                     let exact = f_a + (f_b - f_a) * share;
@@ -999,8 +1014,8 @@ mod tests {
         assert!(compared > 20, "{compared}");
     }
 
-    /// Returns the mean energy of the wave and its energy at the phase 0, where the whole energy is potential, both
-    /// relative to 2 pi rho g R^4.
+    /// Returns the mean energy of the wave, and its energy at the phase 0, where all of the energy is potential. Both
+    /// are relative to 2 pi rho g R^4.
     fn energies(solver: &Solver, x: &DVector<f64>) -> [f64; 2] {
         let [nz, nc] = solver.sizes();
         let zeta = &solver.elevation * x.rows(0, nz);
@@ -1017,9 +1032,9 @@ mod tests {
         [energy, solver.moments(x).unwrap()[1]]
     }
 
-    /// Along a family of periodic motions dE = omega dJ holds, with the energy E and the action J, which is the mean of twice
-    /// the kinetic energy over omega. At the phase 0 the liquid rests, so that its height holds the whole energy. At these
-    /// angles this truncation has no resonance.
+    /// Along a family of periodic motions dE = omega dJ holds, with the energy E and the action J, which is the mean of
+    /// twice the kinetic energy divided by omega. At the phase 0 the liquid is at rest, so that its height gives the
+    /// whole energy. The truncation used here has no resonance at these angles.
     #[test]
     fn energy_and_action_of_planar_waves_belong_to_their_frequency() {
         for (contour, fill) in [(cylinder(), 0.6), (sphere(), 0.6), (sphere(), 0.35)] {
@@ -1051,7 +1066,8 @@ mod tests {
         }
     }
 
-    /// Medians of the truncations are compared with a finer truncation, whose largest multiple of the frequency is 5.
+    /// The medians over several truncations are compared with one finer truncation, whose largest multiple of
+    /// the frequency is 5.
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn waves_in_a_sphere_do_not_depend_on_the_resolution() {
@@ -1076,7 +1092,7 @@ mod tests {
                 let (near, found) = (shift(near.unwrap()), shift(wave));
                 close += usize::from((0..2).all(|i| (near[i] - found[i]).abs() < 0.02));
             }
-            // One wave of the single truncation may be at one of its resonances.
+            // At most one wave of the finer truncation may be off, because this truncation has a resonance there.
             assert!(close >= 4 && fine.len() == 5, "{motion:?} {close} {fine:?} {coarse:?}");
         }
     }
@@ -1099,7 +1115,7 @@ mod tests {
         );
     }
 
-    /// A wall with a corner ends there, and a drawing in several segments gives the same waves.
+    /// At a corner of the wall the side ends. A wall drawn in several smooth segments gives the same waves as one segment.
     #[test]
     fn a_side_ends_at_corners_and_goes_on_over_smooth_joints() {
         let joined = Contour::new(vec![

@@ -4,14 +4,15 @@
 //! result has slosh masses, pendulum lengths, heights, wall waves and the rigid liquid, with their
 //! errors. The crate's `README.md` has theory, file format and measured accuracy.
 //!
-//! * [`curve`], [`contour`], [`tank`]: geometry and the file
-//! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
-//! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
-//! * [`sweep`]: tables over the fill and their [`interpolation`]
-//! * [`fill_table`]: such tables for FMUs whose tanks drain
-//! * [`table()`], [`picture`]: to read and to look at; [`parameters`]: files for the FMUs
-//! * [`damping`], [`low_gravity`], [`third_order`], [`finite_amplitude`], [`spin`]: effects beyond the modal parameters;
-//!   `contour_waves`, `large_waves`, `sphere_waves`: waves of finite amplitude; `shape`: recognises measured shapes
+//! * [`curve`], [`contour`], [`tank`]: the geometry of a tank, and its TOML file
+//! * `ring`, `gauss`, `panel`, `potential_flow`: solve the boundary integral equation of the liquid
+//! * [`modal`]: expresses the modes as pendulums; [`closed_form`]: modes of cylinder, annulus and box by formulas
+//! * [`sweep`]: tables over the fill, and their [`interpolation`]
+//! * [`fill_table`]: tables over the fill for FMUs whose tanks drain
+//! * [`table()`]: a result as text; [`picture`]: drawings; [`parameters`]: files of parameters for the FMUs
+//! * [`damping`], [`low_gravity`], [`third_order`], [`finite_amplitude`], [`spin`]: effects beyond the modal parameters
+//! * `contour_waves`, `large_waves`, `sphere_waves`: waves of finite amplitude
+//! * `shape`: recognises the shapes of tank whose damping has been measured
 
 pub mod closed_form;
 pub mod coefficients;

@@ -1,16 +1,15 @@
-//! Steady forced waves of large amplitude, for studies: the liquid in a tank that moves sideways with the frequency omega.
+//! Steady waves of large amplitude that are forced by a tank which moves sideways with the frequency omega; used by studies.
 //!
-//! Elevation and potential have the same functions of azimuth and phase, cosines and sines. The tank's acceleration a and a
-//! damping ratio zeta of every mode of small waves, omega_n and phi = sum c_n u_n, act on the surface as a pressure over
-//! density
-//!
+//! The functions of azimuth and phase in the elevation and in the potential are both cosines and sines. The tank's
+//! acceleration a, and damping with the ratio zeta of every mode of small waves (frequency omega_n, potential phi = sum
+//! c_n u_n), act on the surface as a pressure divided by density
 //! ```text
 //! a.x + 2 zeta sum omega_n c_n u_n
 //! ```
 //!
-//! which adds to the equation of the elevation in `large_waves.rs`. A small wave then obeys eta'' + 2 zeta omega_n eta' + omega_n^2
-//! eta = -force, as a slosh mass. Newton's method finds the acceleration for a given first mode of the wave, so that no branch
-//! is lost where several waves belong to one acceleration.
+//! which is added to the equation of the elevation in `large_waves.rs`. A small wave then obeys eta'' + 2 zeta omega_n
+//! eta' + omega_n^2 eta = -force, as a slosh mass does. Newton's method finds the acceleration for a given first mode
+//! of the wave, because several waves can belong to one acceleration, but only one acceleration to a wave.
 
 use core::f64::consts::{PI, TAU};
 
@@ -21,7 +20,8 @@ use crate::contour::Wall;
 use crate::gauss::Gauss;
 use crate::tank::{Geometry, Tank};
 
-/// Motions of the liquid: in a plane, in space, and steadily on a circle (where azimuth and phase occur as tau - theta).
+/// Allowed motions of the liquid: in a plane (`Plane`), in space (`All`), and steadily on a circle, where azimuth and
+/// phase occur only as tau - theta (`Circle`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     Plane,
@@ -29,14 +29,14 @@ pub enum Space {
     Circle,
 }
 
-/// A function of azimuth and phase: a cosine or (`sine`) a sine of m theta and of k tau.
+/// A product of a function of m theta and a function of k tau, each a sine where `sine` is true, otherwise a cosine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Function {
     space: Space,
     sine: [bool; 2],
 }
 
-/// Returns cos x and its derivative by x, or the same for the sine.
+/// Returns cos x, or sin x if `sine` is true, and its derivative.
 fn wave(x: f64, sine: bool) -> [f64; 2] {
     let (sin, cos) = x.sin_cos();
     if sine { [sin, cos] } else { [cos, -sin] }
@@ -92,7 +92,8 @@ impl Function {
         }
     }
 
-    /// Returns azimuths and phases that stand for all, by the symmetry (theta + pi, tau + pi) and, in a plane, -theta.
+    /// Returns pairs (azimuth, phase) at which the wave determines it everywhere, by the symmetry (theta + pi, tau +
+    /// pi) and, in plane motion, by the symmetry -theta.
     pub(super) fn grid(self, count: usize) -> Vec<[f64; 2]> {
         let half = |n: usize| PI * (n as f64 + 0.5) / count as f64;
         let [thetas, taus] = match self.space {
@@ -104,20 +105,20 @@ impl Function {
     }
 }
 
-/// A steady forced wave. Each array holds values over a period at [`PHASES`] phases.
+/// A steady forced wave. Each vector holds the values of one period at [`PHASES`] phases.
 #[derive(Clone, Debug)]
 pub struct ForcedWave {
-    /// Slosh displacement q along x and y, whose size is the sine of the slosh angle.
+    /// Slosh displacement q along x and y; its length is the sine of the slosh angle.
     pub q: [Vec<f64>; 2],
-    /// Acceleration of the tank over g along x and y: factors of cos(tau) and sin(tau).
+    /// Acceleration of the tank along x and y in units of g: for each axis the coefficients of cos(tau) and sin(tau).
     pub push: [[f64; 2]; 2],
-    /// Frequency over that of small waves.
+    /// Frequency divided by the frequency of small waves.
     pub ratio: f64,
 }
 
 pub const PHASES: usize = 64;
 
-/// Returns the first harmonic of values over a period: factors of cos(tau) and sin(tau).
+/// Returns the first harmonic of the values of one period: the coefficients of cos(tau) and sin(tau).
 pub fn first_harmonic(values: &[f64]) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for (i, value) in values.iter().enumerate() {
@@ -128,8 +129,8 @@ pub fn first_harmonic(values: &[f64]) -> [f64; 2] {
 }
 
 impl ForcedWave {
-    /// Returns the force on the tank along x and y over the weight of the slosh mass, at all phases. `share` is the slosh mass
-    /// over the mass of liquid.
+    /// Returns the force on the tank along x and y at all phases, divided by the weight of the slosh mass. `share` is
+    /// the slosh mass divided by the mass of the liquid.
     pub fn force(&self, share: f64) -> [Vec<f64>; 2] {
         [0, 1].map(|axis| {
             let values = &self.q[axis];
@@ -144,7 +145,7 @@ impl ForcedWave {
     }
 }
 
-/// Returns the second derivative by the phase of a function given over a period, from its harmonics.
+/// Returns the second derivative with respect to the phase at `tau`, from the harmonics of the `values` of one period.
 fn second_derivative(values: &[f64], tau: f64) -> f64 {
     let count = values.len();
     (1..count / 4)
@@ -158,25 +159,25 @@ fn second_derivative(values: &[f64], tau: f64) -> f64 {
         .sum()
 }
 
-/// Liquid in a tank for forced waves.
+/// Solver for forced waves in a tank.
 pub struct Forced<'a> {
     solver: Solver<'a>,
-    /// 2 zeta sum omega_n u_n u_n^T in the potential's coefficients.
+    /// 2 zeta sum omega_n u_n u_n^T, as a matrix for the coefficients of the potential.
     drag: DMatrix<f64>,
     omega: f64,
     ratio: f64,
-    /// Numbers of the terms of the first mode: cos(tau) and sin(tau) along x, and then along y.
+    /// Indices of the terms of the first mode: cos(tau) and sin(tau) along x, and then along y.
     first: Vec<usize>,
 }
 
-/// Wall of the liquid in a tank, and its side near the surface.
+/// Wetted wall of a tank, and the smooth part of the wall near the surface.
 pub struct Walls {
     wall: Wall,
     side: Side,
 }
 
 impl Walls {
-    /// Returns `None` for a box, and for a surface at a corner.
+    /// Returns `None` for a box, and for a surface at a corner of the wall.
     pub fn new(tank: &Tank, fill: f64) -> Option<Walls> {
         let Geometry::Revolution { contour, .. } = &tank.geometry else { return None };
         let wall = contour.cut(fill).ok()?;
@@ -186,8 +187,8 @@ impl Walls {
 }
 
 impl<'a> Forced<'a> {
-    /// Prepares waves with the frequency `ratio` over that of small waves and a damping ratio `zeta` of all modes.
-    /// `degree` and `order` set the resolution. Returns `None` for a liquid with a hole.
+    /// Prepares the computation of waves whose frequency is `ratio` times that of small waves; `zeta` is the damping
+    /// ratio of all modes. `degree` and `order` set the resolution. Returns `None` for a liquid with a hole.
     pub fn new(
         walls: &'a Walls,
         space: Space,
@@ -213,13 +214,15 @@ impl<'a> Forced<'a> {
         Some(Forced { solver, drag, omega, ratio, first })
     }
 
-    /// Returns the numbers of the unknowns: elevation, potential, pressure, accelerations.
+    /// Returns the numbers of unknowns of the elevation, of the potential and of the accelerations. One more
+    /// unknown is a pressure.
     fn sizes(&self) -> [usize; 3] {
         let [nz, nc] = self.solver.sizes();
         [nz, nc, self.first.len()]
     }
 
-    /// Returns the coefficients of the elevation whose product with a wave's coefficients is a term of the first mode.
+    /// Returns the vector whose scalar product with the coefficients of the elevation is the n-th coefficient
+    /// of the first mode.
     fn part(&self, n: usize) -> DVector<f64> {
         let [nz, ..] = self.sizes();
         let count = self.solver.resolution.polynomials;
@@ -308,8 +311,8 @@ impl<'a> Forced<'a> {
         None
     }
 
-    /// Computes waves with first modes of growing size, each `sizes` times `shape`: factors of cos(tau) and sin(tau) along x and then
-    /// along y. The list ends where Newton's method does not converge.
+    /// Computes one wave for each of the ascending `sizes`. The first mode of the wave is the size times `shape`: coefficients
+    /// of cos(tau) and sin(tau) along x, and then along y. The list ends where Newton's method does not converge.
     pub fn waves(&self, shape: &[f64], sizes: &[f64]) -> Vec<(DVector<f64>, ForcedWave)> {
         let [nz, nc, pushes] = self.sizes();
         let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
@@ -330,7 +333,8 @@ impl<'a> Forced<'a> {
         waves
     }
 
-    /// Computes the wave whose first mode along x is `size` cos(tau), forced along x only, from a wave close to it.
+    /// Computes the wave whose first mode along x is `size` cos(tau), in a tank that moves along x only. `x` holds the
+    /// unknowns of a wave close to it, from which Newton's method starts.
     pub fn along_x(&self, x: &DVector<f64>, size: f64) -> Option<(DVector<f64>, ForcedWave)> {
         let held =
             [Held::Wave(0, size), Held::Wave(1, 0.0), Held::Push(2, 0.0), Held::Push(3, 0.0)];
@@ -385,21 +389,21 @@ enum Held {
     Push(usize, f64),
 }
 
-/// Returns sum omega_n u_n u_n^T of the modes of an azimuthal number in the combinations of harmonics, over the root of the
-/// specific force.
+/// Returns sum omega_n u_n u_n^T over the modes of an azimuthal number, as a matrix for the combinations of harmonics,
+/// divided by the square root of the specific force.
 fn drag_of_modes(solver: &Solver, m: usize) -> DMatrix<f64> {
     let Resolution { degree, polynomials, .. } = solver.resolution;
     let (f, harmonics) =
         (solver.liquid.elevations(m, polynomials), solver.liquid.harmonics(m, degree));
     let coupling = solver.liquid.coupling(&f, &harmonics.surface.u);
-    // The constant elevation changes the volume.
+    // The constant elevation would change the volume, so that it is no mode.
     let level = usize::from(m == 0);
     let coupling = coupling.rows(level, polynomials - level).into_owned();
     let eigen = (&coupling * coupling.transpose()).symmetric_eigen();
     let mut drag = DMatrix::zeros(coupling.ncols(), coupling.ncols());
     for (n, value) in eigen.eigenvalues.iter().enumerate() {
         if *value > 1e-9 {
-            // kinetic energies: u_n^T u_n = 1
+            // normalised to the kinetic energy u_n^T u_n = 1
             let u = coupling.tr_mul(&eigen.eigenvectors.column(n)) / value.sqrt();
             drag += &u * u.transpose() / value.sqrt();
         }
