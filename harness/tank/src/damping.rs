@@ -1,8 +1,7 @@
-//! Damping: one law for every tank and mode ([`tank_damping`], by `formulas::damping`).
+//! Damping: one function for every tank and mode ([`tank_damping`], with the correlations of `formulas::damping`).
 //!
-//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
-//! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any of these
-//! correlations.
+//! In this module Re = nu/sqrt(g R^3) (an inverse Reynolds number), x = h/R is the fill, and zeta is the logarithmic
+//! decrement divided by 2 pi. Measured damping scatters by about 30 % around any of these correlations.
 
 use formulas::damping as formula;
 
@@ -14,9 +13,9 @@ use crate::tank::{Geometry, Shape, Tank};
 
 const ENDS: &str = "use the low end for stability margins, check both ends for settling times";
 
-/// Computes the damping of a tank solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at the
-/// specific force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a
-/// box; empty for none. `sigma`, N/m, if known, is used for low Bond numbers.
+/// Computes the damping of a tank whose modes were solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at
+/// the specific force `gravity`, m/s². `springs` are the centring stiffnesses of the modes, N/m, for each axis of a
+/// box; empty for none. `sigma`, N/m, if known, widens the interval at low Bond numbers.
 ///
 /// If the wetted wall is a sphere, an upright cylinder, a cone or a torus to 1e-6 of its size, the damping is
 /// computed by the correlation measured for this shape. If only a part of the wall has such a shape, the factor by
@@ -34,7 +33,7 @@ pub fn tank_damping(
     sigma: Option<f64>,
 ) -> Result<Damping, Problems> {
     let recognised = data.wall.as_ref().and_then(|wall| shape::recognise(wall, data.fill));
-    // A shape must have the same modes as its dimensions give.
+    // For a drawn wall that has a measured shape, the modes are those of a tank that is given by the shape's dimensions.
     let is_given = |found: &Recognised| {
         let Geometry::Revolution { shape: Some(given), .. } = &tank.geometry else { return false };
         core::mem::discriminant(given) == core::mem::discriminant(&found.shape)
@@ -53,7 +52,7 @@ pub fn tank_damping(
     };
     let along_x = seen(modes, springs[0]);
     let Some(first) = along_x.first().copied() else {
-        return Err("There are no modes to be damped.".to_string().into());
+        return Err("The tank has no modes whose damping could be computed.".to_string().into());
     };
     if first.omega <= 0.0 {
         return Err("A damping ratio depends on the acceleration along the tank's axis, and is not defined at 0 m/s² without surface \
@@ -61,7 +60,7 @@ pub fn tank_damping(
             .into());
     }
     let effective = first.omega * first.omega / first.lambda;
-    // Of a cone too wide for its correlation the factor has no meaning.
+    // A cone too wide for its correlation is left out, because its factor has no meaning.
     let counts = |part: &shape::Part| match part.found.measured() {
         cone @ formula::Shape::Cone { .. } => {
             cone.correlation(nu, effective).is_some_and(|found| found.weight > 0.0)
@@ -84,13 +83,13 @@ pub fn tank_damping(
     let [parts, close] = [&found, &near].map(|of| of.iter().map(|n| n.part).collect::<Vec<_>>());
     let estimate = formula::estimate(&parts, &close);
     let correlation = measured.correlation(nu, effective).map(|correlation| correlation.zeta);
-    // The correlation itself, not its quotient by the layer times the layer.
+    // The correlation is used directly, because (correlation/layer) * layer would round.
     let exact = correlation.filter(|_| found.iter().all(Nearest::is_measured));
     let mut warnings: Vec<String> =
         outside(measured, nu, effective).into_iter().map(|why| format!("damping: {why}")).collect();
     let layer = (2.0 * nu / first.omega).sqrt();
     if layer >= 0.1 / first.lambda {
-        warnings.push(format!("damping: the layer of {layer:.3e} m is not thin against the wave"));
+        warnings.push(format!("damping: the laminar layer at the wall, {layer:.3e} m, is not thin compared with the wave"));
     }
     let mut all = |modes: &[formula::Mode]| -> Vec<ModeDamping> {
         let of_mode = |(n, mode): (usize, &formula::Mode)| {
@@ -142,8 +141,8 @@ pub fn tank_damping(
     })
 }
 
-/// A measured shape that the wetted wall is, wholly or in part, at the nearest depth that was measured.
-/// `at_depth` is false if the tank has another depth.
+/// The measured shape of the wetted wall, or of a part of it. If the depth of the tank was not measured, the shape has
+/// the nearest measured depth, and `at_depth` is false.
 struct Nearest {
     shape: formula::Shape,
     at_depth: bool,
@@ -159,8 +158,8 @@ impl Nearest {
         Nearest::new(shape, 1.0, nu, g, first.laminar(nu))
     }
 
-    /// Solves for the laminar layer at the wall of a measured shape, which has this `share` of the
-    /// tank's wall. `nu` is the kinematic viscosity, m2/s, and `g` the specific force, m/s2.
+    /// Compares the correlation of a measured shape with the laminar layer at its wall. `share` is the shape's share of
+    /// the tank's wetted wall, `nu` the kinematic viscosity, m2/s, and `g` the specific force, m/s2.
     fn solve(found: Recognised, share: f64, nu: f64, g: f64) -> Option<Nearest> {
         let shape = found.measured().at_measured_depth();
         let fill = match shape {
@@ -191,8 +190,8 @@ impl Nearest {
         DampingPart { shape: shape_name(self.shape), share, factor }
     }
 
-    /// Returns a sentence about the damping of a wall that is this shape, with the ratios by its correlation
-    /// and by 1.45 layers.
+    /// Returns a sentence about the basis of the damping ratio of a wall that has this shape. `correlation` is the
+    /// damping ratio by the shape's correlation, `layers` the damping ratio by 1.45 laminar layers.
     fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
         let (name, unmeasured) = (shape_name(self.shape), formula::UNMEASURED);
         let formula::Part { weight, .. } = self.part;
@@ -267,14 +266,14 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
         ""
     };
     format!(
-        "{factor:.2} laminar layers: {}; other walls have {unmeasured}, as measured cylinders{disagree}",
+        "{factor:.2} laminar layers: {}; the rest of the wall has {unmeasured}, as measured cylinders have{disagree}",
         shapes.join("; ")
     )
 }
 
 fn solve_shape(found: Recognised, modes: usize) -> Option<ModalData> {
     let whole = match found.shape {
-        // The cone is open above the fill.
+        // The cone must be open above the fill.
         Shape::Cone { half_angle, height } => Shape::Cone { half_angle, height: 1.5 * height },
         Shape::Cylinder { radius, height } => Shape::Cylinder { radius, height: 1.5 * height },
         shape => shape,

@@ -1,8 +1,8 @@
 //! Third-order coefficients over the fill of a tank that drains: columns for the FMUs' fill tables.
 //!
-//! At some fills s and kappa are not known: near poles, in a nearly full tank, in shallow liquid. A table needs a value at
-//! every point. There it gets bounded values: the FMUs' interpolation between the known fills, and beyond them the nearest
-//! known value.
+//! At some fills s and kappa are not known: near poles, in a nearly full tank, in shallow liquid. A table needs a value
+//! at every point. At these fills it gets bounded values: between known fills those of the FMUs' interpolation,
+//! elsewhere the nearest known value.
 
 use crate::coefficients::Coefficients;
 use crate::interpolation::Monotone;
@@ -10,8 +10,8 @@ use crate::modal::ModalData;
 use crate::parameters::ParameterSet;
 use crate::table::{short, significant};
 
-/// Largest interpolation error of s over 1 + |s|, or of kappa over 1 + |kappa|, between two points
-/// of a fill table that gives no warning.
+/// Largest interpolation error between two points of a fill table, of s relative to 1 + |s| or of kappa relative to 1 +
+/// |kappa|. A larger error gives a warning.
 const LARGEST: f64 = 0.05;
 
 /// A fill, m above the lowest point, with its mass of liquid, kg, and the parameters of the tank there.
@@ -71,8 +71,8 @@ pub(crate) struct TooFewFills {
     why: String,
 }
 
-/// Returns the columns of mode `n`, which counts from 1, at ascending fills, and `Err` if they are known at
-/// fewer than two fills. `between` are further fills, which show the errors between the points.
+/// Returns the columns of mode `n`, counted from 1, for a table with the ascending fills `points`, or an error if the
+/// coefficients are known at fewer than two fills. At the fills `between` the interpolation error of the table is measured.
 pub(crate) fn columns(
     n: usize,
     points: &[AtFill],
@@ -147,7 +147,7 @@ pub(crate) fn columns(
             short(fill)
         );
         if worst > LARGEST {
-            warnings.push(format!("{PREFIX}{text}: {} points are few there", points.len()));
+            warnings.push(format!("{PREFIX}{text}: {} points are too few there", points.len()));
         }
         notes.push(text);
     }

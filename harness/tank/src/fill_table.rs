@@ -1,8 +1,8 @@
-//! Tables over the fill for the six-axis FMUs, with fills placed so that few are enough.
+//! Tables over the fill for the FMUs Spacecraft and SloshTank, with fills chosen so that few points are enough.
 //!
-//! Between its points an FMU interpolates 1/l, the height of the slosh mass at rest and m/m_liq over the mass of liquid
-//! (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`] solves at many fills and chooses
-//! points among them that minimise the largest error between the points.
+//! Between the points of a table an FMU interpolates 1/l, the height of the slosh mass at rest, and m/m_liq, all as
+//! functions of the mass of liquid (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`]
+//! solves for the modes at many fills, and chooses from them the points that minimise the largest interpolation error.
 
 use core::f64::consts::PI;
 
@@ -29,24 +29,24 @@ const CANDIDATES: usize = 97;
 /// mass, or of the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
-/// Fills of a table between two ends, m above the lowest point: the rows of the table and its errors between
-/// them.
+/// The rows of a fill table, and its interpolation errors between the rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     pub sweep: Sweep,
     pub between: Between,
 }
 
-/// Solutions `rows` near the middle between each two points of a table, and the largest `error` that the
-/// first mode has between points: frequency and mass relative, hinge over the largest radius of the surface.
+/// Solutions `rows` near the middle of every two neighbouring points of a table, and the largest interpolation `error`
+/// of the first mode: relative error of the frequency, relative error of the mass, and error of the hinge over the
+/// largest radius of the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Between {
     pub error: [f64; 3],
     pub rows: Vec<ModalData>,
 }
 
-/// Curves of a mode over the fills from which the points of a table are chosen: mass of the liquid,
-/// kg; omega^2/g, 1/m; height of the slosh mass at rest, m; share of the slosh mass in the liquid.
+/// Quantities of the modes at many fills, from which the points of a table are chosen: mass of the liquid, kg; and for
+/// each mode omega^2/g, 1/m, height of the slosh mass at rest, m, and slosh mass over the mass of the liquid.
 struct Curves {
     liquid: Vec<f64>,
     modes: Vec<[Vec<f64>; 3]>,
@@ -117,10 +117,9 @@ fn count_carrying_modes(rows: &[ModalData]) -> usize {
 /// Chooses [`POINTS`] fills from `low` to `high`, m above the lowest point, including both ends.
 ///
 /// # Errors
-/// Ends without a free surface, and the errors of [`Tank::solve`].
+/// The errors of [`Tank::solve`]; also if there is no free surface at an end.
 pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, Problems> {
-    // denser near the ends, where the surface of a closed tank gets narrow and the modes change
-    // most
+    // Fills are denser near the ends, where the surface of a closed tank gets narrow and the modes change most.
     let share = |i: usize| 0.5 - 0.5 * (PI * i as f64 / (CANDIDATES - 1) as f64).cos();
     let fills: Vec<f64> = (0..CANDIDATES)
         .map(|i| match i {
@@ -175,8 +174,8 @@ fn check_surfaces(rows: &[ModalData]) -> Result<(), Problems> {
     Ok(())
 }
 
-/// Returns the parameters of a tank that can drain: the parameters at its largest fill, where it starts, and its fill
-/// table.
+/// Returns the parameters of a tank that can drain: its parameters at the largest of the fills `rows`, where it starts,
+/// and its fill table.
 ///
 /// # Errors
 /// The errors of [`ParameterSet::new`]; also if the target is HubSlosh, whose tank does not drain, or if there are
@@ -236,14 +235,14 @@ pub fn parameters(
     let mut set = sets.pop().unwrap_or_else(|| unreachable!("there are at least two rows"));
     if low != high {
         let text = format!(
-            "stiffnesses stay those of the largest fill while the tank drains: k[1] is {} N/m there, {} N/m at the least fill",
+            "while the tank drains, the stiffnesses keep their values of the largest fill: k[1] is {} N/m there, {} N/m at the smallest fill",
             significant(high),
             significant(low)
         );
         set.notes.push(text.clone());
         set.warnings.push(text);
     }
-    // The columns replace the coefficients of the largest fill.
+    // The columns of the table replace the coefficients of the largest fill.
     set.third_order.clear();
     set.notes
         .retain(|note| !note.starts_with(fill_amplitude::PREFIX) && !note.starts_with(INERTIA));
@@ -259,18 +258,18 @@ pub fn parameters(
         }
     }
     if liquid.nu.is_some() {
-        let text = "fill.zeta has the damping ratios of every fill; the interval above is that of the largest";
+        let text = "fill.zeta has the damping ratios of every fill; the interval above belongs to the largest fill";
         set.notes.push(text.to_string());
     }
     set.notes.push(format!(
-        "table of {} fills, {} to {} m; liquid_0 is the largest, outlet the tank's lowest point",
+        "table of {} fills, {} to {} m; liquid_0 is the mass of liquid at the largest fill, outlet is the tank's lowest point",
         rows.len(),
         short(first.fill),
         short(last.fill)
     ));
     if let Some(Between { error: [frequency, mass, hinge], .. }) = between {
         set.notes.push(format!(
-            "between the points, of mode 1: frequency within {:.2} %, mass {:.2} %, hinge {:.2} % of the surface's \
+            "largest interpolation errors of mode 1: frequency {:.2} %, mass {:.2} %, hinge {:.2} % of the surface's \
              largest radius",
             100.0 * frequency,
             100.0 * mass,
@@ -278,13 +277,13 @@ pub fn parameters(
         ));
         if frequency.max(*mass).max(*hinge) > LIMIT {
             set.warnings.push(format!(
-                "{} points are few for this tank between these fills: more than {} % between them",
+                "{} points are too few for this tank between these fills: the interpolation error is above {} %",
                 rows.len(),
                 100.0 * LIMIT
             ));
         }
     }
-    // parameters that the table replaces
+    // names of the parameters that the table replaces
     let of_modes =
         [MASS, LENGTH, HINGE, NONLINEAR_INERTIA, NONLINEAR_STIFFNESS, ANGLE_LIMIT, SWIRL_LIMIT];
     let of_modes = of_modes.into_iter().chain(liquid.nu.map(|_| ZETA));
@@ -301,7 +300,7 @@ pub fn parameters(
         let (at, rest) = (i + 1, row.rest(modes));
         real(&fill::LIQUID.element([at]), row.m_liq);
         real(&fill::H_0.element([at]), rest.height);
-        // with the largest number of modes it may be below 0 by rounding
+        // With the largest number of modes rounding can make it negative.
         real(&fill::I_0.element([at]), rest.inertia.max(0.0));
         real(&fill::I_Z.element([at]), row.i_eff_axis.unwrap_or(0.0));
         for n in 0..modes {
@@ -340,7 +339,7 @@ fn third_order(
     between: Vec<AtFill>,
 ) -> Vec<(usize, Result<Columns, TooFewFills>)> {
     let numbers = points.iter().flat_map(|at| at.set.third_order.iter().map(|(n, _)| *n));
-    // Mode 1 also where it is known nowhere, for the reason.
+    // Mode 1 is listed even if it is known at no fill, so that its reason is reported.
     let most = numbers.max().unwrap_or(1);
     (1..=most).map(|n| (n, fill_amplitude::columns(n, &points, &between))).collect()
 }

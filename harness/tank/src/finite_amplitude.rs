@@ -1,4 +1,4 @@
-//! Finite amplitude of a tank's first mode: frequency, and the second-order wave, from its shape.
+//! Finite amplitude of a tank's first mode: dependence of the frequency on the amplitude, and the second-order wave.
 //!
 //! The equivalent mass with the slosh angle A = |q|/l is
 //!
@@ -7,8 +7,8 @@
 //! planar  delta omega^2/omega^2 = (3 kappa/8 - s/2) A^2,   circular  (kappa/2) A^2
 //! ```
 //!
-//! s and kappa give it the shifts of potential flow to third order: [`crate::third_order`] for vertical
-//! walls and a flat bottom, `contour_waves` for other bodies of revolution.
+//! s and kappa are chosen so that the mass has the frequency shifts of potential flow to third order:
+//! [`crate::third_order`] for vertical walls and a flat bottom, `contour_waves` for other bodies of revolution.
 
 use core::f64::consts::PI;
 
@@ -28,8 +28,8 @@ use crate::tank::{Geometry, Shape, Tank};
 use crate::third_order::{DETUNING, Overlaps};
 
 const WORST: f64 = 0.05;
-/// Largest distance between the tank's contour and a vertical wall with a flat bottom, over the
-/// tank's size, at which the method for such tanks is used.
+/// Largest distance of the tank's contour from vertical walls with a flat bottom, relative to the tank's size, at which
+/// the method for vertical walls is used.
 const SAME: f64 = 1e-6;
 const ROUNDING: f64 = 1e-7;
 const COUNTS: [usize; 2] = [10, 20];
@@ -37,34 +37,34 @@ const DEGREES: [usize; 2] = [18, 24];
 /// Relative difference of a box's two lengths below which the first modes along both directions
 /// exchange energy, so that the coefficients of one direction are not valid.
 const NEARLY_SQUARE: f64 = 0.1;
-/// Largest lambda over the wave number, tanh kh, of a ring of liquid between vertical walls.
+/// Largest tanh kh, the ratio of lambda to the wave number, of a ring of liquid between vertical walls.
 const DEEP: f64 = 0.999;
-/// Largest angle of the third order's validity, rad. At 26 degrees the circular wave of a cylinder with h/R
-/// 0.613 is 4 % from fully nonlinear flow.
+/// Largest slosh angle, rad, at which the third order counts as valid. At 26 degrees the frequency of the circular wave
+/// in a cylinder with h/R = 0.613 differs by 4 % from fully nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
-/// Angle at which a mode leaves its range over the angle at which the second-order wave is [`STEEPEST`] of
-/// the first-order wave, for tanks that nobody has compared with fully nonlinear flow: the smallest ratio in
-/// upright cylinders, and in a sphere filled to h/R = 1.5, where a forced response is wrong by 3 % at 2.6 degrees.
+/// Estimated angle limit of a mode, for tanks that nobody has compared with fully nonlinear flow, divided by the angle
+/// at which the second-order wave is [`STEEPEST`] of the first-order wave. It is the smallest ratio found in upright
+/// cylinders and in a sphere filled to h/R = 1.5, where the error of a forced response reaches 3 % at 2.6 degrees.
 const ESTIMATED_SHARE: f64 = 0.12;
-/// Largest second-order wave at the wall, over the first-order wave, for which the third order holds.
+/// Largest second-order wave at the wall, relative to the first-order wave, at which the third order counts as valid.
 const STEEPEST: f64 = 0.5;
 
-/// Largest relative error of the frequency of a slosh mass with the wave's energy.
+/// Largest relative error of the frequency of a slosh mass that also gives the wave's energy.
 const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
-/// Largest difference between the shift of omega^2 of the smallest waves and the shift by the third-order theory,
-/// each divided by the square of the slosh angle. At 10 degrees this difference changes the frequency by 0.03 %.
+/// Largest difference between the shift of omega^2 of the smallest computed waves and the shift by third-order theory,
+/// both per squared slosh angle. At 10 degrees this difference changes the frequency by 0.03 %.
 const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
 const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
 
-/// Angle below which the end of the third order's validity is a warning, rad. Files for the FMUs leave such
-/// coefficients out.
+/// Slosh angle, rad. If the third order is valid only up to a smaller angle, a warning says so, and files for the FMUs
+/// leave its coefficients out.
 pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 impl Coefficients {
-    /// Combines the results of two computations, the second one with more functions, whose
-    /// difference gives the error. `wave` is the elevation at the wall per slosh angle, m/rad.
+    /// Combines the results of two computations, of which the second uses more functions; their difference gives the
+    /// error. `wave` is the elevation at the wall per slosh angle, m/rad.
     fn new([rough, fine]: [Found; 2], wave: f64) -> Coefficients {
         let [s, kappa] = fine.equivalent;
         let differ = |i: usize| {
@@ -89,8 +89,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Near the poles of the
-    /// third-order theory both coefficients, and then also the second-order wave, are interpolated over the fill.
+    /// Returns these coefficients with the limits of an upright cylinder filled to h/R = `fill`. Near the poles of the
+    /// third-order theory, s, kappa and the second-order wave are interpolated over the fill.
     fn cylinder_coefficients(
         self,
         fill: f64,
@@ -127,7 +127,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns the coefficients of a sphere filled to h/R = `fill`, with its table of large waves and limits.
+    /// Returns these coefficients with the limits of a sphere filled to h/R = `fill`, and with its coefficients for
+    /// large waves.
     fn sphere_coefficients(self, fill: f64) -> Coefficients {
         let tables = (sphere_waves::energy_terms(fill), sphere_waves::forced_limits(fill));
         let (Some(terms), Some([third, planar, rotary])) = tables else { return self };
@@ -145,7 +146,8 @@ impl Coefficients {
         }
     }
 
-    /// Adds the coefficients with the energy of large waves in this tank. They also tell where the third order ends.
+    /// Adds coefficients that give the energy of large waves in this tank. These waves also limit the third-order
+    /// coefficients.
     fn with_large_waves(
         self,
         terms: &EnergyTerms,
@@ -154,7 +156,7 @@ impl Coefficients {
     ) -> Coefficients {
         let pair = [self.nonlinear_inertia, self.nonlinear_stiffness];
         let AngleLimit { frequency, forced } = large_waves::third_order_limit(terms, pair);
-        // Nobody has compared forced waves, so that the smaller angle counts.
+        // Forced waves were not computed for this tank, so that the smaller angle counts.
         let (angle_limit, angle_limit_from) = match forced < self.angle_limit {
             true => (forced, LimitSource::FreeWaves),
             false => (self.angle_limit, self.angle_limit_from),
@@ -169,8 +171,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns the slosh angle, rad, at which a pendulum in place of these coefficients is out of range: its shifts of
-    /// omega^2 differ from theirs, which are known up to the error of s and kappa.
+    /// Returns the slosh angle, rad, above which a pendulum in place of these coefficients is out of range, because its
+    /// shift of omega^2 differs too much from theirs. The error of s and kappa counts as part of the difference.
     fn pendulum_limit(&self) -> f64 {
         let [s, kappa] = [self.nonlinear_inertia, self.nonlinear_stiffness]
             .map(|x| self.error * (1.0 + x.abs()));
@@ -185,8 +187,8 @@ impl Coefficients {
 }
 
 impl Energy {
-    /// Combines the coefficients with their relative errors of frequency and energy and the angle, rad, above which the mode is
-    /// out of range.
+    /// Combines the coefficients with their relative errors of frequency and energy, and with the slosh angle, rad,
+    /// above which the mode is out of range.
     fn new(
         known: &EnergyTerms,
         [frequency_error, energy_error]: [f64; 2],
@@ -232,9 +234,9 @@ fn sphere_radius(contour: &Contour, wall: &Wall, depth: f64) -> Option<f64> {
     points.all(is_on).then_some(radius)
 }
 
-/// Computes the coefficients that give the wave's energy from fully nonlinear potential flow in this tank at this fill, if
-/// they are not known from the tables of upright cylinders and spheres, and adds them to `data`, which was solved with its
-/// coefficients of the third order. If that is not possible, a warning says why. The computation takes about 10 s.
+/// Computes coefficients that give the wave's energy, from fully nonlinear potential flow in this tank at this fill,
+/// and adds them to `data`, which already has the third-order coefficients. Does nothing if the tables of upright
+/// cylinders and spheres have given them. If the computation is not possible, a warning says why. It takes about 10 s.
 pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
     let Some(mut found) = data.finite_amplitude.clone() else { return };
     match &mut found.mode {
@@ -270,7 +272,7 @@ enum NoEnergy {
     )]
     OtherThirdOrder(f64),
     #[error(
-        "no slosh mass has the frequencies of the waves within {:.1} %: the best one errs by {:.1} %",
+        "no slosh mass has the frequencies of the waves within {:.1} %: the error of the best one is {:.1} %",
         100.0 * LARGEST_FREQUENCY_ERROR,
         100.0 * .0
     )]
@@ -290,7 +292,7 @@ fn large_waves(
     }
     let fit = large_waves::Side::new(contour, wall).and_then(|side| large_waves::fit(wall, &side));
     let fit = fit.ok_or(NoEnergy::NoWaves)?;
-    // The third order is known by another method.
+    // Another method computed the third-order shifts, with which the waves are compared.
     let exact = [third.planar, third.circular.unwrap_or(fit.shifts[1])];
     let off = (0..2).map(|i| (fit.shifts[i] - exact[i]).abs()).fold(0.0, f64::max);
     if off > LARGEST_SHIFT_ERROR {
@@ -324,12 +326,12 @@ impl Found {
     }
 }
 
-/// Coefficients of a mode; `Err` if their error is too large for a slosh mass. They then tell only how far a pendulum is from
-/// the liquid.
+/// Coefficients of a mode; `Err` if their error is too large for a slosh mass. Coefficients in `Err` serve only to
+/// compute how far a pendulum is from the liquid.
 type Judged = Result<Coefficients, Box<Coefficients>>;
 
-/// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend
-/// on the specific force; they hold without surface tension.
+/// Returns the amplitude dependence of the first mode of a tank whose modes were solved as `data`. The coefficients do
+/// not depend on the specific force, and they hold only without surface tension.
 pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     let (Some(mode), depth) = (data.modes.first(), data.fill) else {
         return FiniteAmplitude::default();
@@ -375,7 +377,7 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
         }
         if known.series_limit < LEAST_ANGLE {
             warnings.push(format!(
-                "finite amplitude: s and kappa of mode 1 hold up to {:.2} degrees at most. There the second-order wave is {STEEPEST} \
+                "finite amplitude: s and kappa of mode 1 hold up to {:.2} degrees at most, where the second-order wave is {STEEPEST} \
                  of the first-order wave (shallow liquid, or a mode of the surface near twice the frequency)",
                 known.series_limit.to_degrees()
             ));
@@ -390,8 +392,8 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     FiniteAmplitude { mode, mode_y, pendulum_limit, pendulum_limit_y, warnings }
 }
 
-/// Computes the coefficients of a tank with vertical walls of these radii and a flat bottom, the inner radius 0 without an
-/// inner wall.
+/// Computes the coefficients of a tank with a flat bottom and vertical walls with these inner and outer radii, m. The
+/// inner radius is 0 without an inner wall.
 fn upright_coefficients(
     [inner, outer]: [f64; 2],
     depth: f64,
@@ -439,7 +441,7 @@ fn cylinder_coefficients(
     }
     if let Some(limit) = limits::swirl_fold(depth / radius) {
         warnings.push(format!(
-            "finite amplitude: rotary motion folds at {:.1} degrees by a secondary resonance; beyond, another branch takes over",
+            "finite amplitude: at {:.1} degrees a secondary resonance folds the branch of rotary motion; beyond, the liquid moves on another branch",
             limit.to_degrees()
         ));
     }
@@ -447,8 +449,8 @@ fn cylinder_coefficients(
 }
 
 impl Coefficients {
-    /// Adds the share of a mode that has nearly twice the frequency of mode 1, if there is one, to the error. Returns `Err`
-    /// if this share is too large. `detuned` gives s and kappa for another frequency of the second order.
+    /// If another mode has nearly twice the frequency of mode 1, adds this mode's contribution to the error. Returns `Err`
+    /// if the contribution is too large. `detuned` returns s and kappa for a relative change of the second-order frequency.
     fn judged_near(
         mut self,
         excited: Option<[usize; 2]>,
@@ -457,7 +459,7 @@ impl Coefficients {
     ) -> Judged {
         let Some([m, n]) = excited else { return Ok(self) };
         let known = [self.nonlinear_inertia, self.nonlinear_stiffness];
-        // The second difference leaves out what the other modes change.
+        // The second difference removes the contributions of the other modes, which change smoothly.
         let [below, above] = [-2.0, 2.0].map(|factor| detuned(factor * DETUNING));
         let share = (0..2)
             .map(|i| (0.5 * (below[i] + above[i]) - known[i]).abs() / (1.0 + known[i].abs()))
@@ -477,7 +479,8 @@ impl Coefficients {
     }
 }
 
-/// Returns the radii of a tank with vertical walls and a flat bottom, the inner one 0 without an inner wall.
+/// Returns the inner and outer radius of a tank with vertical walls and a flat bottom; the inner one is 0
+/// without an inner wall.
 fn ring(data: &ModalData) -> Option<[f64; 2]> {
     let wall = data.wall.as_ref()?;
     let (inner, outer, bottom) = (wall.r_inner, wall.r_outer, wall.z_surface - data.fill);
@@ -518,16 +521,16 @@ fn box_coefficients(
     if difference < NEARLY_SQUARE {
         warnings.push(format!(
             "finite amplitude: the box's lengths differ by {:.1} %, so its modes along both exchange energy at finite amplitude; s and \
-             kappa hold for motion along one length alone",
+             kappa hold only for motion along one length",
             100.0 * difference
         ));
     }
     known
 }
 
-/// Computes the coefficients of a body of revolution with any wall; `lambda`, 1/m, is the first mode's by the
-/// boundary integral equation. For a ring the coefficients are refused: they are those between vertical walls with the same
-/// radii and the same lambda.
+/// Computes the coefficients of a body of revolution with any wall. `lambda`, 1/m, is the first mode's, from the
+/// boundary integral equation. For a ring, returns `Err` with the coefficients of a ring between vertical walls that
+/// has the same radii and the same lambda.
 fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<String>) -> Judged {
     let [Some(rough), Some(fine)] =
         DEGREES.map(|degree| contour_waves::waves(wall, degree, 1, 0.0))
@@ -551,7 +554,7 @@ fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<
         second: waves.second_wave * radius,
     });
     let mut known = Coefficients::new(found, wave);
-    // the harmonics' own error, seen in a number that is known to ten digits
+    // The harmonics' own error shows in lambda, which the boundary integral equation gives to ten digits.
     known.error = known.error.max(2.0 * (fine.lambda / (lambda * radius) - 1.0).abs());
     let detuned_by = |lambda: f64| ((4.0 * fine.lambda / lambda).sqrt() - 1.0).abs();
     let excited = fine.excited.iter().find(|(_, lambda)| detuned_by(*lambda) < DETUNING);

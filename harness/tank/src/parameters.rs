@@ -1,7 +1,7 @@
-//! A tank's modal parameters under the names of the FMUs' variables, and files of them.
+//! A tank's modal parameters under the names of the FMUs' variables, and files with these parameters.
 //!
-//! A set file holds `"name" = value`, TOML with quoted names. The SSV form is the parameter set of
-//! SSP 1.0. `hubslosh run --set-file`, the Python package and SSP tools read them.
+//! A set file is TOML with lines `"name" = value`, with the names in quotes. The SSV form is the parameter set of SSP
+//! 1.0. `hubslosh run --set-file` and the Python package read both; other SSP tools read the SSV form.
 
 use names::hubslosh::{self, DampingLaw, SloshSource, slosh};
 use names::{sloshtank, spacecraft};
@@ -18,12 +18,12 @@ use crate::table::{short, significant};
 use crate::tank::{Fill, Geometry, Shape, Tank};
 use crate::{damping, modal};
 
-/// Largest share of capillarity in the stiffness of mode 1 at which the coefficients of finite amplitude
-/// hold.
+/// Largest contribution of capillarity to the stiffness of mode 1, relative to gravity, at which the coefficients of
+/// finite amplitude are used.
 const MOST_CAPILLARY: f64 = 0.1;
 
-/// Surface tension over density, m3/s2, of a liquid whose surface tension is not given: the value of water, the largest of
-/// common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
+/// Surface tension divided by density, m3/s2, assumed for a liquid whose surface tension is not given: the value of water,
+/// the largest of common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
 const LARGEST_TENSION: f64 = 7.3e-5;
 
 /// The FMU that the parameters are for. HubSlosh gets a table of modes (`slosh.source = table`) and keeps the
@@ -36,7 +36,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// Returns the target's name of a variable of SloshTank's tank, such as `tank.mass[1]`.
+    /// Returns the name that a variable of SloshTank's tank, such as `tank.mass[1]`, has in this FMU, such as
+    /// `tank[2].mass[1]`.
     pub(crate) fn name(self, of_sloshtank: &str) -> String {
         match self {
             Target::Spacecraft { tank } => {
@@ -47,11 +48,14 @@ impl Target {
     }
 }
 
-/// Properties of the liquid other than its density: the specific force `gravity` along the axis at which
-/// damping ratios and stiffnesses hold, m/s², at least 0; kinematic viscosity `nu`, m2/s, without which the
-/// damping ratios are not set; surface tension `sigma`, N/m, without which there is no centring stiffness;
-/// the angle between surface and wall in the liquid, degrees (90 is a flat surface); and the rate at which tank and liquid turn about
-/// the tank's axis, rad/s, if they do.
+/// Properties of the liquid other than its density.
+///
+/// - `gravity`: specific force along the tank's axis, m/s², at least 0, for which damping ratios and stiffnesses are
+///   computed.
+/// - `nu`: kinematic viscosity, m2/s; without it the damping ratios are not set.
+/// - `sigma`: surface tension, N/m; without it there is no centring stiffness.
+/// - `contact_angle`: angle between surface and wall, measured in the liquid, degrees; 90 is a flat surface.
+/// - `spin`: rate at which tank and liquid rotate together about the tank's axis, rad/s, if they do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
     pub gravity: f64,
@@ -66,8 +70,8 @@ impl Liquid {
         Some(Fluid { rho: data.rho, sigma: self.sigma?, g: self.gravity })
     }
 
-    /// Returns a warning if no surface tension is given and it may have an effect, because with
-    /// [`LARGEST_TENSION`] the Bond number is below [`LOW_BOND`].
+    /// Returns a warning if no surface tension is given although it may have an effect: with [`LARGEST_TENSION`] the
+    /// Bond number would be below [`LOW_BOND`].
     fn missing_tension(&self, data: &ModalData) -> Option<String> {
         let bond = self.gravity * half_width(data).powi(2) / LARGEST_TENSION;
         let matters = self.sigma.is_none() && self.gravity > 0.0 && bond < LOW_BOND;
@@ -79,8 +83,8 @@ impl Liquid {
         })
     }
 
-    /// Returns the specific force along the axis, m/s2, below which the stiffnesses of the modes miss surface
-    /// tension; `None` if they hold down to 0.
+    /// Returns the specific force along the axis, m/s2, below which the stiffnesses of the modes are wrong because of
+    /// surface tension. `None` if the stiffnesses hold down to 0.
     fn lowest_gravity(&self, data: &ModalData) -> Option<f64> {
         let mode = data.modes.first()?;
         match self.sigma {
@@ -92,8 +96,8 @@ impl Liquid {
         }
     }
 
-    /// Returns true if `data` was solved with this viscosity at this gravity, surface tension and contact
-    /// angle.
+    /// Returns true if the damping in `data` was computed with this liquid's viscosity, gravity, surface
+    /// tension and contact angle.
     fn damped(&self, data: &ModalData) -> bool {
         let damping = data.damping.as_ref().map(|of| (of.nu, of.gravity));
         let surface = data.capillarity.as_ref().map(|of| (of.sigma, of.contact_angle));
@@ -102,7 +106,7 @@ impl Liquid {
     }
 }
 
-/// Returns the radius of a tank's free surface, or half the shorter length of a box, m.
+/// Returns the radius, m, of a tank's free surface; for a box, half of its shorter side.
 fn half_width(data: &ModalData) -> f64 {
     let lengths = [data.length_x, data.length_y].into_iter().flatten();
     data.r_surface.unwrap_or_else(|| 0.5 * lengths.fold(f64::INFINITY, f64::min))
@@ -116,10 +120,10 @@ pub enum Value {
     Item(&'static str),
 }
 
-/// Parameters under the names of an FMU's variables, with lines for the user about the source and accuracy of
-/// the values (`notes`), omitted values (`warnings`), and values far outside the range of their formula,
-/// which nobody should use unseen (`unknown`). `third_order` lists the modes, which count from 1, whose
-/// coefficients are among the `values`.
+/// Parameters under the names of an FMU's variables, and lines for the user: `notes` state the source and the accuracy
+/// of the values, `warnings` the values that were left out, and `unknown` the values so far outside the range of their
+/// formula that nobody should use them without a check. `third_order` lists the modes, counted from 1, whose
+/// coefficients of finite amplitude are among the `values`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     pub notes: Vec<String>,
@@ -129,8 +133,8 @@ pub struct ParameterSet {
     pub third_order: Vec<(usize, Coefficients)>,
 }
 
-/// Adds the stiffness by capillarity to the modes: the formula for a flat surface and, for the first mode of an upright
-/// cylinder, the table for the meniscus at the contact angle.
+/// Returns the modes with the stiffness by capillarity. It is computed by the formula for a flat surface; for the first
+/// mode of an upright cylinder with another contact angle, by the table for a curved meniscus.
 fn with_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -150,14 +154,14 @@ fn with_capillarity(
                 fluid.g
             ));
             set.warnings.push(
-                "capillarity: under a curved meniscus masses and heights, and the stiffnesses of the modes \
-                 after the first, are not known; they are those of a flat surface"
+                "capillarity: under a curved meniscus masses, heights, and the stiffnesses of the modes after \
+                 the first are not known; the values of a flat surface are used"
                     .into(),
             );
         }
         _ => set.warnings.push(format!(
-            "capillarity: the meniscus of a contact angle of {angle} degrees is known for an upright \
-             cylinder (shape = {{ cylinder = … }}) alone; k is that of a flat surface, 90 degrees"
+            "capillarity: the meniscus at a contact angle of {angle} degrees is known only for an upright \
+             cylinder (shape = {{ cylinder = … }}); k is that of a flat surface, 90 degrees"
         )),
     }
     for (n, Capillary { outside, unknown, .. }) in (1..).zip(&all) {
@@ -169,7 +173,7 @@ fn with_capillarity(
     all
 }
 
-/// Returns the centring stiffnesses of the modes, N/m. A negative stiffness is set to 0, because the FMUs refuse it.
+/// Returns the centring stiffnesses of the modes, N/m, 0 for a negative stiffness, because the FMUs do not accept it.
 fn springs(
     tank: &Tank,
     data: &ModalData,
@@ -179,8 +183,10 @@ fn springs(
 ) -> Vec<f64> {
     let Some(fluid) = liquid.fluid(data) else {
         if liquid.gravity == 0.0 {
-            set.warnings
-                .push("nothing centres the liquid at 0 m/s² without surface tension".to_string());
+            set.warnings.push(
+                "at 0 m/s² and without surface tension the liquid has no restoring force: k is 0"
+                    .to_string(),
+            );
         }
         set.warnings.extend(liquid.missing_tension(data));
         return vec![0.0; modes.len()];
@@ -190,8 +196,8 @@ fn springs(
         let (k, gravity) = (capillary.spring, liquid.gravity * mode.lambda);
         if k < 0.0 {
             set.warnings.push(format!(
-                "capillarity: k of mode {n} is {k:.3e} N/m, and the FMUs take none below 0; 0 is written, which \
-                 leaves the frequency {:.1e} of itself too high",
+                "capillarity: k of mode {n} is {k:.3e} N/m. The FMUs do not accept a negative k, so 0 is written; this \
+                 makes the frequency too high by the fraction {:.1e}",
                 1.0 - (capillary.omega2 / gravity).sqrt()
             ));
         }
@@ -200,8 +206,8 @@ fn springs(
     (1..).zip(modes.iter().zip(&all)).map(spring).collect()
 }
 
-/// Returns axis and number of the three modes that a box has in Spacecraft: the first along each axis, and
-/// the second with the larger mass.
+/// Returns (axis, index) of the three modes that represent a box in Spacecraft: the first mode along each axis, and the
+/// heavier one of the two second modes.
 fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     let mass = |axis: usize| axes[axis].get(1).map_or(0.0, |mode| mode.m);
     let mut chosen = vec![(0, 0), (1, 0)];
@@ -211,8 +217,8 @@ fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     chosen
 }
 
-/// Returns warnings about the surface tension of a tank's modes: the ranges that its formulas leave, or that
-/// it is not given although it has an effect.
+/// Returns warnings about the surface tension of a tank's modes: formulas that are used outside their range, or a
+/// surface tension that is not given although it has an effect.
 pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String> {
     match &data.capillarity {
         Some(found) => found.warnings.clone(),
@@ -220,8 +226,8 @@ pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String>
     }
 }
 
-/// Returns the natural frequencies of a tank's modes with the surface tension and contact angle of the
-/// liquid, at its gravity; `None` without surface tension.
+/// Returns the natural frequencies of a tank's modes with the liquid's surface tension and contact angle, at its
+/// `gravity`; `None` if no surface tension is given.
 pub fn tank_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -248,12 +254,11 @@ pub fn tank_capillarity(
     Some(modal::Capillarity { sigma, contact_angle, gravity, bond, modes, modes_y, warnings })
 }
 
-/// Solves a tank at a fill, and adds what depends on the liquid's other properties: capillarity, damping, and
-/// the amplitude dependence of the first mode.
+/// Solves for the modes of a tank at a fill, and adds the results that depend on further properties of the liquid:
+/// capillarity, damping, spin, and the amplitude dependence of the first mode.
 ///
 /// # Errors
-/// If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
-/// ([`Tank::fill_height`], [`Tank::solve`], [`tank_damping`]).
+/// The errors of [`Tank::fill_height`], [`Tank::solve`], [`spin`] and [`tank_damping`].
 pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
     let mut data = tank.solve(tank.fill_height(fill)?, modes)?;
     data.capillarity = tank_capillarity(tank, &data, liquid);
@@ -266,10 +271,10 @@ pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<Mo
     Ok(data)
 }
 
-/// Returns the damping of a tank's modes with the capillarity of the liquid, see [`damping::tank_damping`].
+/// Returns the damping of a tank's modes, see [`damping::tank_damping`], with their stiffness by capillarity.
 ///
 /// # Errors
-/// Without gravity and surface tension there is no natural frequency.
+/// If the liquid has neither gravity nor surface tension, because there is no natural frequency then.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
@@ -284,11 +289,12 @@ pub fn tank_damping(
 }
 
 impl ParameterSet {
-    /// Returns the parameters of a tank solved as `data`, with as many modes as both the tank and the FMU
-    /// have.
+    /// Returns the parameters of a tank whose modes were solved as `data`. The set has as many modes as `data` has, at
+    /// most as many as the FMU has.
     ///
     /// # Errors
-    /// A tank that the FMU cannot represent: number above four, or full; damping ratios without a
+    /// A tank that the FMU cannot represent (tank number above four, full tank), or a viscosity without gravity and
+    /// surface tension.
     /// specific force.
     pub fn new(
         tank: &Tank,
@@ -299,8 +305,8 @@ impl ParameterSet {
         ParameterSet::with_energy(tank, data, target, liquid, target != Target::HubSlosh)
     }
 
-    /// Does what [`ParameterSet::new`] does, with coefficients that give the wave's energy where they are
-    /// known and `has_energy` is true. Tanks with a fill table and HubSlosh have only coefficients of the third order.
+    /// Returns the parameters as [`ParameterSet::new`] does. If `has_energy` is true, coefficients that give the wave's
+    /// energy are used where they are known. HubSlosh and tanks with a fill table accept only third-order coefficients.
     pub(crate) fn with_energy(
         tank: &Tank,
         data: &ModalData,
@@ -341,15 +347,14 @@ impl ParameterSet {
             Geometry::Box { length_x: x, length_y: y } if x != y => Some([x, y]),
             _ => None,
         };
-        // For a box with unequal sides, the modes along both; otherwise those along the first axis.
+        // A box with unequal sides has modes along both sides, other tanks along the first axis only.
         let both = data.axes.as_ref().filter(|_| sides.is_some());
         let count = match (both, target) {
             (Some(_), Target::HubSlosh) => data.modes.len().min(most / 2),
             _ => data.modes.len().min(most),
         };
         let chosen: Vec<(usize, usize)> = match (both, target) {
-            // The modes of one axis come first in HubSlosh, because its outputs are those of mode
-            // 1.
+            // HubSlosh gets the modes of one axis first, then those of the other axis, because its outputs describe mode 1.
             (Some(_), Target::HubSlosh) => {
                 (0..2).flat_map(|axis| (0..count).map(move |n| (axis, n))).collect()
             }
@@ -369,10 +374,10 @@ impl ParameterSet {
             ));
             let start = "the liquid starts at the rate of its tank (set init.omega)";
             set.notes.push(match (target, spin.decay) {
-                (Target::HubSlosh, _) => "HubSlosh has no spin of the liquid".into(),
+                (Target::HubSlosh, _) => "HubSlosh does not model a spin of the liquid".into(),
                 (_, Some(_)) => start.into(),
                 (_, None) => format!(
-                    "{start}; spin_decay is known for upright cylinders with nu only, so that it does not rub against the wall"
+                    "{start}; spin_decay is known only for upright cylinders with nu, so the liquid has no friction at the wall here"
                 ),
             });
             set.warnings.extend(spin.warnings.iter().map(|warning| format!("spin: {warning}")));
@@ -407,7 +412,7 @@ impl ParameterSet {
         };
         let known = data.finite_amplitude.clone();
         let mut found = known.unwrap_or_else(|| finite_amplitude::amplitude_dependence(tank, data));
-        // Potential flow without surface tension gives them.
+        // The coefficients come from potential flow without surface tension.
         let stiff = modes[0].m * modes[0].lambda * liquid.gravity * MOST_CAPILLARY;
         if springs[0].first().is_some_and(|spring| spring.abs() > stiff) {
             found = FiniteAmplitude {
@@ -434,7 +439,7 @@ impl ParameterSet {
         for (n, (axis, _)) in first {
             let known = [found.mode, found.mode_y][*axis];
             let written = known.filter(is_written);
-            // Without its coefficients a mode is a pendulum.
+            // A mode without these coefficients is a pendulum in the FMU.
             let angle = match written {
                 Some(known) => Some(energy(&known).map_or(known.angle_limit, |of| of.angle_limit)),
                 None => [found.pendulum_limit, found.pendulum_limit_y][*axis],
@@ -484,7 +489,7 @@ impl ParameterSet {
         } else {
             set.notes.extend(found.warnings);
         }
-        // The same parameters for every FMU, with the prefix of its tank.
+        // Every FMU has the same parameters of its modes; only the prefix with the tank's name differs.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
             let mut real = |n: usize, what: &str, value: f64| {
                 values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
@@ -519,8 +524,8 @@ impl ParameterSet {
             let first_across = count + 1;
             set.notes.push(format!(
                 "modes 1 to {count} are those along the box's first length, {length_x} m, which lies along the tangent on HubSlosh's hub; \
-                 {first_across} to {} those along {length_y} m, along the radius (slosh.table.direction): what the hub's rate \
-                 does to these is in slosh.model = planar, to first order (linear) nothing; spherical and liquid are refused",
+                 {first_across} to {} those along {length_y} m, along the radius (slosh.table.direction). slosh.model = planar \
+                 includes the effect of the hub's rate on them, which is 0 to first order (linear); HubSlosh refuses spherical and liquid",
                 2 * count
             ));
             for n in first_across..=2 * count {
@@ -532,7 +537,7 @@ impl ParameterSet {
         match target {
             Target::HubSlosh => {
                 real(slosh::table::M_LIQ.into(), data.m_liq);
-                // specific force of the damping ratios; at 0 there are none
+                // specific force at which the damping ratios hold; there are none at 0
                 if liquid.gravity > 0.0 {
                     real(slosh::table::G_REF.into(), liquid.gravity);
                 }
@@ -546,7 +551,7 @@ impl ParameterSet {
                 of_modes("slosh.table", values);
                 let source = Value::Item(SloshSource::Table.name());
                 values.push((slosh::SOURCE.into(), source));
-                // The damping ratios come from the laminar layer.
+                // The damping ratios were computed from the laminar layer.
                 let law = Value::Item(DampingLaw::Laminar.name());
                 values.push((slosh::DAMPING_LAW.into(), law));
                 values.push((slosh::MODES.into(), Value::Integer(modes.len() as i64)));
@@ -566,13 +571,14 @@ impl ParameterSet {
                     .into());
                 }
                 let rest = match both {
-                    // Each bob is rigid liquid for motion along the other axis. Rotation about x moves it along y.
+                    // Each slosh mass counts as rigid liquid in motion along the other axis. Rotation about x moves
+                    // the liquid along y.
                     Some(axes) => modal::rest(data.m_liq, data.z_cg, axes.y.i_eff_cg, &modes),
                     None => data.rest(modes.len()),
                 };
                 real(target.name(M_0), rest.m_0);
                 real(target.name(H_0), rest.height);
-                // With the largest number of modes it may be below 0 by rounding.
+                // With the largest number of modes rounding can make it negative.
                 let least = if both.is_some() { f64::NEG_INFINITY } else { 0.0 };
                 real(target.name(I_0), rest.inertia.max(least));
                 match &data.spin {
@@ -600,15 +606,17 @@ impl ParameterSet {
                         real(target.name(&DIRECTION.element([n + 1, axis + 1])), 1.0);
                     }
                     set.notes.push(format!(
-                        "planar modes along both lengths: m_0 = {:.6} kg is the liquid less the masses of all, each of which is \
-                         rigid for motion across it",
+                        "planar modes along both lengths: m_0 = {:.6} kg is the mass of the liquid minus the masses of all modes; each slosh mass \
+                         counts as rigid liquid in motion across its direction",
                         rest.m_0
                     ));
                 }
                 of_modes(&target.name("tank"), values);
                 values.push((target.name(MODES), Value::Integer(modes.len() as i64)));
                 if target != Target::SloshTank {
-                    set.notes.push("set tanks to the number of tanks".to_string());
+                    set.notes.push(
+                        "set the parameter tanks to the number of tanks of the craft".to_string(),
+                    );
                 }
             }
         }
@@ -619,7 +627,7 @@ impl ParameterSet {
         }
         if modes[0].height.is_none() {
             set.warnings
-                .push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
+                .push("mode 1 has hardly any mass, so the height of its hinge is not defined: 0 is written".to_string());
         }
         set.warnings.dedup();
         Ok(ParameterSet { third_order, ..set })
@@ -642,7 +650,7 @@ impl ParameterSet {
 
     /// Returns the parameters as SSV, the parameter set of SSP 1.0.
     pub fn to_ssv(&self) -> String {
-        // Two hyphens would end a comment.
+        // XML forbids two hyphens in a comment.
         let notes = self.comments().map(|note| format!("  {}\n", note.replace("--", "- -")));
         let values = self.values.iter().map(|(name, value)| {
             let value = match value {

@@ -5,14 +5,12 @@
 //!
 //!   u(x)/2 + int dg/dn(x, y) u(y) r ds = int g(x, y) q(y) r ds.
 //!
-//! Modes: q = 0 on the wall W, q = lambda u on the free surface F. So with
-//! T = [(1/2 + D)^-1 S] restricted to F, T q = q/lambda: the largest eigenvalues of T. T is
-//! self-adjoint under the weight r ds. The pitch function psi has q = z n_r - r n_z everywhere
-//! (on F, n_z = 1 and n_r = 0: q = -r).
+//! Modes have q = 0 on the wall W and q = lambda u on the free surface F. So with T = [(1/2 + D)^-1 S] restricted to F,
+//! T q = q/lambda: the lowest modes belong to the largest eigenvalues of T. T is self-adjoint under the weight r ds.
+//! The pitch function psi (tank rotating about y) has q = z n_r - r n_z everywhere (on F, n_z = 1 and n_r = 0: q = -r).
 //!
-//! The method is Nystrom's on graded panels with Gauss points. Integrals over a panel close to x
-//! bisect the panel's own coordinate v until x is far from every part. Rules that absorb the
-//! logarithm integrate over the panel that contains x.
+//! The method is Nystrom's on graded panels with Gauss points. For a panel close to x, the panel's coordinate v is bisected
+//! until x is far from every part. On the panel that contains x, integration rules are used that absorb the logarithm.
 
 use nalgebra::DMatrix;
 
@@ -22,8 +20,8 @@ use crate::gauss::{Gauss, legendre, legendre_slopes};
 use crate::panel::{Boundary, BoundaryPoint, Panel};
 use crate::ring::potential;
 
-/// A boundary cut into panels with `order` Gauss points each. `surface` is the index of the first point on
-/// the free surface; `projection` turns values at the points of a panel into coefficients of Legendre
+/// The boundary of the liquid cut into panels with `order` Gauss points each. `surface` is the index of the first point
+/// on the free surface. `projection` turns the values at the points of a panel into coefficients of Legendre
 /// polynomials, [k * order + j].
 #[derive(Debug)]
 pub(crate) struct Discretisation {
@@ -36,8 +34,8 @@ pub(crate) struct Discretisation {
     projection: Vec<f64>,
 }
 
-/// Solutions at the boundary's points: lambda_n, 1/m, ascending; phi_n with int phi_n^2 r ds = 1 over F; and
-/// psi.
+/// Modes and pitch function at the boundary's points: lambda_n, 1/m, ascending; phi_n, normalised to int phi_n^2 r ds =
+/// 1 over the free surface; and psi.
 #[derive(Debug)]
 pub(crate) struct Solution {
     pub(crate) lambda: Vec<f64>,
@@ -57,18 +55,19 @@ struct Part {
 }
 
 const PART: usize = 16;
-/// Sum of semi-axes of the Bernstein ellipse outside which x is far from a part.
+/// A part of a panel is integrated with Gauss points if x lies outside the Bernstein ellipse whose semi-axes have this sum.
 const FAR: f64 = 2.3;
-/// The same limit for a whole panel, which then uses its own points.
+/// The same limit for a whole panel, which is then integrated with its own points, without bisection.
 const FAR_WHOLE: f64 = 3.0;
-/// Number of iterations for the eigenvectors. The slowest error component falls by about a third in each.
+/// Number of iterations for the eigenvectors. For a few modes each iteration reduces the slowest error component to about a
+/// third.
 const ITERATIONS: usize = 30;
-/// Number of points of the rule on each side of a point of its own panel, and the power with which the rule
-/// absorbs the logarithm.
+/// Number of points of the integration rule on each side of x on its own panel; [`OWN_POWER`] is the power with which
+/// the rule absorbs the logarithm.
 const OWN: usize = 20;
 const OWN_POWER: i32 = 5;
-/// Longest interval of v over which the rule with [`OWN`] points integrates, because the density is a polynomial of degree
-/// order - 1.
+/// Longest interval of v over which the rule with [`OWN`] points integrates. It is limited because the density is a
+/// polynomial of degree order - 1.
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
@@ -133,7 +132,7 @@ impl Discretisation {
         self.points.iter().map(|x| x.p[0]).collect()
     }
 
-    /// Returns the normal velocity of the boundary that rotates about (0, `z0`), at all points.
+    /// Returns the normal velocity, at all points, of the boundary rotating at 1 rad/s about (0, `z0`).
     pub(crate) fn pitch(&self, z0: f64) -> Vec<f64> {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
@@ -142,8 +141,8 @@ impl Discretisation {
         self.surface..self.points.len()
     }
 
-    /// Solves for the first `modes` modes, and psi for the normal velocity `pitch`. Returns `None` if the
-    /// matrix cannot be solved. For m = 1 the operator is regular, so this happens only with unusable panels.
+    /// Solves for the first `modes` modes, and for psi with the normal velocity `pitch`. Returns `None` if the matrix
+    /// cannot be solved. For m = 1 the operator is regular, so that this happens only if the panels are unusable.
     pub(crate) fn solve(&self, modes: usize, pitch: &[f64]) -> Option<Solution> {
         let count = self.len();
         let surface = self.on_surface();
@@ -314,8 +313,8 @@ impl Discretisation {
         Part { v0, v1, points, weights, values, halves: None }
     }
 
-    /// Returns the preimages of the point x and of its mirror image behind the axis in the complex plane of a
-    /// panel's v. The kernels are singular at both. Returns `None` far from the panel.
+    /// Returns the points in the complex plane of a panel's coordinate v that the panel maps to x, and to the mirror
+    /// image of x behind the axis. The kernels are singular at both. `None` if a point is far from the panel.
     fn preimages(
         &self,
         panel: &Panel,
@@ -328,7 +327,7 @@ impl Discretisation {
             if norm(w) > reach {
                 return None;
             }
-            // s + i d: foot of x on the panel's curve, and its distance, over the length
+            // s + i d: the foot of x on the panel's curve, and the distance of x from the foot, both divided by the length
             let [re, im] = self.boundary.foot(panel, w);
             let v = if panel.gamma > 1.0 {
                 let size = re.hypot(im).powf(1.0 / panel.gamma);
@@ -348,7 +347,7 @@ impl Discretisation {
         let mut rules = Vec::with_capacity(self.order);
         for &x in &self.rule.nodes {
             let mut points = Vec::new();
-            // [v0, v1] with x outside, or at one end
+            // intervals [v0, v1] that have x outside or at one end
             let mut stack = vec![(0.0, x), (x, 1.0)];
             while let Some((v0, v1)) = stack.pop() {
                 let length: f64 = v1 - v0;
@@ -431,7 +430,7 @@ impl Discretisation {
         total
     }
 
-    /// Returns radius and value of the largest |u| on the free surface, with the sign of u.
+    /// Returns the radius of the point of the free surface where |u| is largest, and u there, with its sign.
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];
@@ -449,8 +448,8 @@ impl Discretisation {
         best
     }
 
-    /// Returns a function given at all points along the free surface as (r, value), with `dense` intervals
-    /// per panel. It runs from the outer contact line to the axis or inner contact line, including both ends.
+    /// Returns the function `u`, given at all points, along the free surface as (r, value) with `dense` intervals per
+    /// panel, from the outer contact line to the axis or to the inner contact line, including both ends.
     pub(crate) fn along_surface(&self, u: &[f64], dense: usize) -> Vec<[f64; 2]> {
         let first = self.surface / self.order;
         let mut all = Vec::new();
@@ -498,8 +497,8 @@ struct OwnRule {
     values: Vec<f64>,
 }
 
-/// Returns the sum of the semi-axes of the ellipse with foci at the ends of [v0, v1] through a point of the
-/// complex plane, over the half length. The error of Gauss with n points falls as its power -2n.
+/// Returns the sum of the semi-axes of the ellipse that has its foci at the ends of [v0, v1] and passes through a point
+/// of the complex plane, divided by half of the length. The error of n Gauss points falls as this sum to the power -2n.
 fn bernstein(point: [f64; 2], v0: f64, v1: f64) -> f64 {
     let half = 0.5 * (v1 - v0);
     let x = (point[0] - 0.5 * (v0 + v1)) / half;
@@ -533,8 +532,8 @@ mod tests {
         |[r, z]| (r * (4.0 * z * z - r * r), [4.0 * z * z - 3.0 * r * r, 8.0 * r * z]),
     ];
 
-    /// Green's third identity holds to the error of 16 points per panel. At the step's inner edge, where r
-    /// behaves as v^9, the cubic is a polynomial of degree 27.
+    /// Green's third identity holds to the quadrature error of 16 points per panel. At the step's inner edge, where r
+    /// behaves as v^9, a cubic in r is a polynomial of degree 27 in v.
     #[test]
     fn harmonic_functions_satisfy_the_integral_equation() {
         for wall in walls() {
@@ -548,7 +547,7 @@ mod tests {
                     let u = DVector::from_iterator(values.len(), values.iter().map(|v| v.0));
                     let off = matrix * &u - right.column(right.ncols() - 1);
                     assert!(off.amax() < error, "{:e}", off.amax());
-                    // the sources on the free surface alone are the last of them
+                    // the sources on the free surface are the last of all sources
                     let on_surface = DVector::from_column_slice(&q[mesh.on_surface()]);
                     let mut wall_alone = q.clone();
                     wall_alone[mesh.on_surface()].fill(0.0);
@@ -561,9 +560,8 @@ mod tests {
         }
     }
 
-    /// r cos theta is a uniform flow, with int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the
-    /// walls. Near the step's inner edge the last 1e-6 of a panel counts three times, as for a flow around
-    /// the edge.
+    /// r cos theta is a uniform flow, whose int [u_s^2 + u^2/r^2] r ds over the free surface and the walls is known by hand.
+    /// Near the step's inner edge the last 1e-6 of a panel counts three times, as it should for a flow around the edge.
     #[test]
     fn the_surface_gradient_of_a_uniform_flow_is_exact() {
         let (sin, cos) = 20f64.to_radians().sin_cos();
@@ -610,7 +608,7 @@ mod tests {
                 let wave = |r: f64| sign * r * (1.0 - r * r / (3.0 * b * b));
                 let u: Vec<f64> = mesh.radii().into_iter().map(wave).collect();
                 let [r, value] = mesh.surface_peak(&u);
-                // The position of a flat maximum has half the digits of its value.
+                // The position of a flat maximum has half as many correct digits as its value.
                 assert!(
                     (r - b).abs() < 1e-6 && (value - sign * b / 1.5).abs() < 1e-12,
                     "{r} {value}"
@@ -627,8 +625,8 @@ mod tests {
         assert_eq!([bernstein([1.0, 0.0], 1.0, 3.0), bernstein([2.5, 0.0], 1.0, 3.0)], [1.0; 2]);
     }
 
-    /// Checks int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves. 20 points on each
-    /// side of x, stretched by the fifth power, have an error of 1e-12 of the logarithm.
+    /// Integrates v^k log|v - x| for k = 0 and 1, and polynomials. With 20 points on each side of x, stretched by the
+    /// fifth power, the error of the logarithm is 1e-12.
     #[test]
     fn quadrature_on_a_panel_with_a_logarithmic_singularity_is_exact() {
         let mesh = Discretisation::new(&walls()[0], 3, 12, false);
@@ -660,9 +658,9 @@ mod tests {
         }
     }
 
-    /// Checks the preimages of a point and of its image behind the axis in a panel's own v. v^gamma is the
-    /// foot point on the panel plus i times the distance over the length. The preimages are closer than the
-    /// rule of the panel's own points allows.
+    /// The preimages of a point and of its mirror image behind the axis, in the coordinate v of a panel: v^gamma is
+    /// the foot point on the panel plus i times the distance divided by the length. The tested points are too close
+    /// for the panel's own points.
     #[test]
     fn the_preimage_of_a_point_under_a_panel_s_map_is_found() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);

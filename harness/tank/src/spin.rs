@@ -1,23 +1,26 @@
 //! Liquid that turns with its tank about the tank's axis at a steady rate: its surface, its centre of mass, its
 //! inertia, and the effect of the spin on the first slosh mode.
 //!
-//! On the surface g z - Omega^2 r^2/2 = c. At the height z the liquid reaches inwards to r_i, r_i^2 = max(0, 2 (g z -
-//! c)/Omega^2). With integrals along the wall, up the outer and down the inner one,
+//! The surface is at g z - Omega^2 r^2/2 = c. At the height z the liquid reaches inwards to the radius r_i, with r_i^2
+//! = max(0, 2 (g z - c)/Omega^2). With integrals along the wall, up the outer wall and down the inner one,
 //!
-//!   m = rho pi int (r^2 - r_i^2) dz,   I_axis = rho (pi/2) int (r^4 - r_i^4) dz,
-//!   I_cg = I_axis/2 + int z^2 dm - m z_cg^2
+//! ```text
+//! m = rho pi int (r^2 - r_i^2) dz,   I_axis = rho (pi/2) int (r^4 - r_i^4) dz,
+//! I_cg = I_axis/2 + int z^2 dm - m z_cg^2
+//! ```
 //!
-//! The first gives c. A lid, a bare floor and weightlessness need nothing else.
+//! The first equation gives c. Lids, dry floors and weightlessness are covered by the same equations.
 //!
-//! Seen from a tank that turns, the first mode of an upright cylinder runs around the axis against the spin (l > 0) and with it
-//! (l < 0) at
+//! Seen from a rotating tank, the first mode of an upright cylinder runs around the axis against the spin (l > 0) and
+//! with the spin (l < 0) at
 //!
 //!   l = C Omega +- sqrt(C^2 Omega^2 + omega_0^2)
 //!
-//! with C of [`SpinLimit`], whereas a pendulum, which does not take part in the spin, has C = 1. The FMUs have both, and leave their
-//! range at the same limits.
+//! with C of [`SpinLimit`]. A pendulum, which does not take part in the spin, has C = 1. The FMUs model both, and
+//! report the mode as out of range at the same limits as this module.
 //!
-//! The laminar layer of the floor spins the liquid up at the rate sqrt(nu Omega)/h (Greenspan and Howard, J. Fluid Mech. 17, 1963).
+//! The laminar layer at the floor brings the liquid to the tank's rate, at sqrt(nu Omega)/h (Greenspan and Howard, J.
+//! Fluid Mech. 17, 1963).
 //!
 //! Source: derived from the equations of a rotating liquid, to the first order in Omega. A solution for all Omega differs by at
 //! most 1 % at Omega^2 R/g = 0.1 and h >= R, by 4 % at h = R/4, and by 6 % at 0.3.
@@ -30,15 +33,16 @@ use crate::contour::{Contour, Problems, bisect};
 use crate::modal::{ModalData, Spin};
 use crate::tank::{Geometry, Shape, Tank};
 
-/// Error of the frequency of a pendulum, (1 - C) Omega/omega_0, above which a warning says that
-/// pendulums do not take part in the spin of the liquid.
+/// Relative error of a pendulum's frequency, (1 - C) Omega/omega_0, above which a warning says that pendulums do not
+/// take part in the spin of the liquid.
 const PENDULUM_ERROR: f64 = 0.05;
 
-/// Computes the steady rotation of a tank's liquid, solved as `data`, about the tank's axis at `omega`, rad/s, under the specific
-/// force `gravity`, m/s². `nu` is the kinematic viscosity, m²/s.
+/// Computes the steady rotation of the liquid of a tank, whose modes were solved as `data`, about the tank's axis at
+/// `omega`, rad/s, under the specific force `gravity`, m/s². `nu` is the kinematic viscosity, m²/s.
 ///
 /// # Errors
-/// A box, which has no axis of revolution; a tank without a free surface; a rate that is not above 0; liquid in separate pools.
+/// A box, because it has no axis of revolution; a tank without a free surface; a rate that is not above 0; liquid that
+/// may lie in separate pools.
 pub fn spin(
     tank: &Tank,
     data: &ModalData,
@@ -96,18 +100,21 @@ pub fn spin(
         match omega_0 {
             Some(rate) => beyond(
                 limit.is_exceeded(omega, rate * rate),
-                "liquid that spins so fast has no mode that is known to some per cent (Omega^2 R/g above 0.3, or a wave among \
+                "at this rate no mode is known to some per cent (Omega^2 R/g is above 0.3, or the wave's frequency is in the range of \
                  inertial waves)",
             ),
-            None => beyond(true, "without a frequency at rest there is no mode"),
+            None => beyond(
+                true,
+                "the frequency of the first mode of the liquid at rest is 0 or not known",
+            ),
         },
     ];
     let in_range = !out_of_range.contains(&true);
     let error = (1.0 - c) * ratio.unwrap_or_default() / 2.0;
-    // The FMUs have the gyroscopic coefficient of an upright cylinder.
+    // The FMUs can have the gyroscopic coefficient of an upright cylinder.
     if in_range && !is_cylinder && error > PENDULUM_ERROR {
         warnings.push(format!(
-            "the frequencies of a pendulum, which the FMUs have without gyroscopic[1], are up to {:.0} % off those of the spinning liquid",
+            "without gyroscopic[1] the FMUs model pendulums, whose frequencies differ by up to {:.0} % from those of the spinning liquid",
             100.0 * error
         ));
     }
@@ -141,8 +148,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns the surface of the rotating liquid below which `contour` contains `volume`, m3.
-    /// `omega` is the rate, rad/s, `gravity` the specific force, m/s2.
+    /// Returns the surface of the rotating liquid if `contour` contains the volume `volume`, m3, of liquid. `omega` is
+    /// the rate, rad/s, `gravity` the specific force, m/s2.
     fn holding(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();
