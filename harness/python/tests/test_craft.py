@@ -238,7 +238,7 @@ def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
         assert text in str(error.value)
     for fill, text in {
         ("50%",): "one for each of ox, fuel",
-        "120%": r"tank ox: The fill is 120 %; it must be 0 to 100 %",
+        "120%": r"tank ox: The fill is 120 % of the tank's volume; it must be 0 to 100 %",
     }.items():
         with pytest.raises(FmuError, match=text):
             craft.parameters(fill)

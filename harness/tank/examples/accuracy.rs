@@ -1,5 +1,5 @@
 //! Measures accuracy and time for every tank of `tests/tanks.json`: deviation from the reference over five modes,
-//! stated error, and the shortest time of several repetitions on one core.
+//! stated error, and the shortest computing time of several repetitions on one core.
 //!
 //! `cargo run --release -p hubslosh-tank --features studies --example accuracy [REPETITIONS [NAME]]`
 

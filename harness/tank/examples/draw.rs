@@ -1,4 +1,4 @@
-//! Draws a tank at a fill and a sweep over its fills, and prints the table.
+//! Draws a tank at a fill, and a sweep over its fills, and prints the table of its modal parameters.
 //!
 //! `cargo run -p hubslosh-tank --features studies --example draw -- TANK.toml FILL TANK.svg SWEEP.svg`
 
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(tank_svg, picture::tank(&tank, &data, GRAVITY))?;
     let depth = tank.depth().unwrap_or(data.fill);
     let fills: Vec<f64> = (1..20).map(|i| 0.05 * depth * i as f64).collect();
-    // a fill at a shoulder has no modes
+    // A fill at a horizontal part of the wall has no modes.
     let fills: Vec<f64> = fills.into_iter().filter(|f| tank.solve(*f, 1).is_ok()).collect();
     let swept: Result<_, Problems> = sweep::sweep(&tank, &fills, 5);
     std::fs::write(sweep_svg, picture::sweep(&tank, &swept?, GRAVITY))?;

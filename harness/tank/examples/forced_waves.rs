@@ -5,19 +5,20 @@
 //! cargo run --release -p hubslosh-tank --features studies --example forced_waves -- sphere circle 9 4 0.2 0.4 0.6
 //! ```
 //!
-//! prints, for a tank that moves on a line (`line`) or on a circle, the fill, the frequency over that of small waves, the
-//! acceleration over g, and the wave's largest slosh angle, phase (degrees) and force over the weight of the slosh mass; then the
-//! errors of the slosh mass of the third order, and of the slosh mass with the wave's energy where its coefficients are known:
-//! angle (%), phase (degrees) and force (%). The numbers are the degree of the harmonics and the largest multiple of the
-//! frequency. `swirl` has a tank that moves on a line while its liquid rotates; each row has angle and phase along and
-//! across. A fill takes about a minute.
+//! prints one row for each wave in a tank that moves on a line (`line`) or on a circle (`circle`): the fill; the
+//! frequency divided by that of small waves; the acceleration over g; and the wave's largest slosh angle, phase
+//! (degrees) and force over the weight of the slosh mass. Then follow the errors of the third-order slosh mass, and
+//! those of the slosh mass with the wave's energy where its coefficients are known: angle (%), phase (degrees) and
+//! force (%). In the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills
+//! follow. With `swirl` the tank moves on a line while its liquid rotates; each row then has angle and phase along the
+//! line and across it. A fill takes about a minute.
 use std::f64::consts::{PI, TAU};
 
 use formulas::energy_terms::EnergyTerms;
 use hubslosh_tank::forced::{Forced, ForcedWave, PHASES, Space, Walls, first_harmonic};
 use hubslosh_tank::{Tank, finite_amplitude};
 
-/// Steady motion of a slosh mass: q and its momentum, in the units of its length and frequency (m = g = l = 1).
+/// Steady motion of a slosh mass: q and its momentum, in units of its length and frequency (m = g = l = 1).
 #[derive(Clone, Copy)]
 struct Bob {
     terms: EnergyTerms,
@@ -49,7 +50,7 @@ impl Bob {
         ]
     }
 
-    /// Marches for `periods` from the state of the wave; returns the last period.
+    /// Integrates `periods` periods from the state of the wave, and returns the last period.
     fn steady(&self, wave: &ForcedWave, periods: usize) -> Option<ForcedWave> {
         let steps = 2 * PHASES;
         let h = TAU / wave.ratio / steps as f64;
@@ -60,7 +61,7 @@ impl Bob {
         let rate = |q: &[f64]| wave.ratio * first_harmonic(q)[1];
         let start = [wave.q[0][0], wave.q[1][0]];
         let v = [rate(&wave.q[0]), rate(&wave.q[1])];
-        // momentum from the rate
+        // momentum from the velocity
         let mut x = [start[0], start[1], v[0], v[1]];
         for _ in 0..50 {
             let r = self.rates(x, [0.0; 2]);
@@ -100,7 +101,7 @@ fn largest(q: &[Vec<f64>; 2]) -> f64 {
     (0..PHASES).map(|i| q[0][i].hypot(q[1][i])).fold(0.0, f64::max)
 }
 
-/// Amplitude and phase, degrees, of the first harmonic of x relative to the acceleration along x.
+/// Returns the amplitude and the phase, degrees, of the first harmonic of q relative to the acceleration along x.
 fn phase(wave: &ForcedWave, axis: usize) -> [f64; 2] {
     let [c, s] = first_harmonic(&wave.q[axis]);
     let [a, b] = wave.push[0];
@@ -136,7 +137,7 @@ fn main() {
 
 const ZETA: f64 = 0.01;
 
-/// A tank at a fill, with its slosh masses of the third order and with the wave's energy.
+/// A tank at a fill, with its third-order slosh mass and its slosh mass with the wave's energy.
 struct Filled {
     fill: f64,
     share: f64,
@@ -176,7 +177,7 @@ impl Filled {
         }
     }
 
-    /// Prints waves of 2 to 14 degrees at the frequency of free waves of 9 degrees and 1 % from it.
+    /// Prints waves of 2 to 14 degrees at the frequency of free waves of 9 degrees, and at frequencies 1 % from it.
     fn steady(&self, is_circle: bool, resolution: [usize; 2]) {
         let space = if is_circle { Space::Circle } else { Space::Plane };
         let peak = 1.0 + 0.5 * self.shifts[usize::from(is_circle)] * 9f64.to_radians().powi(2);
@@ -205,7 +206,8 @@ impl Filled {
         }
     }
 
-    /// Prints rotary waves, which begin with the last slosh mass's wave at a stroke of 0.0082 R and 1.01 of the frequency.
+    /// Prints rotary waves, which start from a wave of the last slosh mass at a stroke of 0.0082 R and at 1.01 times
+    /// the frequency.
     fn swirl(&self, resolution: [usize; 2]) {
         let (ratio, bob) = (1.01, self.bobs[self.bobs.len() - 1]);
         let push = 0.0082 * self.lambda * f64::powi(ratio, 2);

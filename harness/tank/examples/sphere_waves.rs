@@ -1,6 +1,6 @@
 //! Prints the rows of `src/sphere_waves.rs`: coefficients of the first mode in a sphere that give the wave's energy.
 //!
-//! `cargo run --release -p hubslosh-tank --example sphere_waves` takes minutes.
+//! `cargo run --release -p hubslosh-tank --example sphere_waves` takes some minutes.
 
 use hubslosh_tank::{Fill, Tank, finite_amplitude, parameters};
 

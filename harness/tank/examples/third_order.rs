@@ -1,4 +1,4 @@
-//! Draws how frequency depends on amplitude in an upright cylinder, the figure of HubSlosh's documentation.
+//! Draws the figure of HubSlosh's documentation that shows how the frequency depends on the amplitude in an upright cylinder.
 //!
 //! `cargo run --release -p hubslosh-tank --features studies --example third_order -- modelDescription/HubSlosh/documentation/liquid.svg`
 

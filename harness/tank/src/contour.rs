@@ -732,7 +732,7 @@ mod tests {
     /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, whether the tank is that of a model or large.
     /// A closed contour begins at its highest point. A point within 1e-9 of the size from the axis counts as on the axis.
     #[test]
-    fn a_tank_is_closed_to_a_share_of_its_size() {
+    fn a_contour_with_a_gap_below_1e_6_of_its_size_counts_as_closed() {
         for size in [1.0 / 64.0, 1.0, 16.0] {
             for (gap, is_closed) in [(0.9e-6, true), (1.1e-6, false)] {
                 let to = |r: f64, z: f64| [size * r, size * z];

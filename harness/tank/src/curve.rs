@@ -24,14 +24,13 @@ pub(crate) fn cross(a: Point, b: Point) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Shapes of a segment, lengths in m. Each has its own parameter t.
+/// Shapes of a segment, lengths in m. Each shape has its own parameter t.
 ///
 /// - `Line`: straight from one point to the other, t = 0..1.
 /// - `Ellipse`: center + (a_r cos t, a_z sin t), t the eccentric angle in rad; a circle has a_r = a_z.
-/// - `Cassini`: oval about (0, zc), a > c, with the foci at the distance c from its centre. At the polar
-///   angle t, rad, the distance rho from the centre follows from rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2
-///   2t).
-/// - `Cosine`: r = r0 + r1 cos(pi p), p and z linear in t = 0..1.
+/// - `Cassini`: oval about (0, zc), a > c, with the foci at the distance c from its centre. At the polar angle t,
+///   rad, the distance rho from the centre follows from rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2 2t).
+/// - `Cosine`: r = r0 + r1 cos(pi p); p and z are linear in t = 0..1.
 /// - `Cubic`: c_0 + c_1 t + c_2 t^2 + c_3 t^3, t = 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Curve {
@@ -135,8 +134,8 @@ fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
     (rho, slope / (2.0 * rho))
 }
 
-/// A curve between two values of its parameter, in the direction from the first to the second, which may be
-/// less than the first.
+/// A curve between two values `from` and `to` of its parameter, in the direction from the first to the second. `to` may
+/// be less than `from`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     pub curve: Curve,
@@ -196,8 +195,8 @@ impl Segment {
         self.curve.point_at(self.from + s * (self.to - self.from))
     }
 
-    /// Returns the angle, rad, through which the tangent turns along the segment; for an ellipse an
-    /// upper bound of it.
+    /// Returns the angle, rad, through which the tangent turns along the segment; for an ellipse, an upper
+    /// bound of this angle.
     pub(crate) fn turn(&self) -> f64 {
         let count = 32;
         let mut total = 0.0;
@@ -230,7 +229,7 @@ mod tests {
             Curve::Cubic { c: [[0.1, 0.0], [1.0, 0.2], [-0.3, 0.5], [0.2, -0.1]] },
         ];
         for curve in curves {
-            // an eighth of the square of the interval times the third derivative, up to 40
+            // error of the finite difference: at most an eighth of the squared interval times the third derivative, 40
             let [before, after] = [0.3999, 0.4001].map(|t| curve.point_at(t));
             let slope = sub(after, before).map(|d| d / 2e-4);
             assert!(norm(sub(slope, curve.slope(0.4))) < 1e-6, "{curve:?}");
@@ -239,7 +238,7 @@ mod tests {
                     (curve.chord(0.4, dt), sub(curve.point_at(0.4 + dt), curve.point_at(0.4)));
                 assert!(norm(sub(chord, plain)) < 4e-16, "{curve:?} {dt}");
             }
-            // at 1e-12 a difference of points would have only four digits
+            // With a step of 1e-12 a difference of coordinates would have only four digits.
             let (chord, slope) = (curve.chord(0.4, 1e-12), curve.slope(0.4));
             assert!(norm(sub(chord, [1e-12 * slope[0], 1e-12 * slope[1]])) < 1e-23, "{curve:?}");
         }

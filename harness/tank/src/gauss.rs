@@ -76,7 +76,7 @@ mod tests {
         legendre(v + h, &mut high);
         legendre_slopes(v, &mut slopes);
         for j in 0..8 {
-            // central difference: h^2 times the third derivative, at most 1e4 here
+            // error of the central difference: h^2 times the third derivative, at most 1e4 here
             assert!(((high[j] - low[j]) / (2.0 * h) - slopes[j]).abs() < 1e-7);
         }
     }

@@ -2,8 +2,8 @@
 
 use formulas::interpolation::{derivatives, quintic};
 
-/// Piecewise quintic through (x_i, y_i), twice continuously differentiable ([`formulas::interpolation`]). It
-/// is not limited at a turning point of the data, because the true maximum lies between the points.
+/// Piecewise quintic through (x_i, y_i), twice continuously differentiable ([`formulas::interpolation`]). At a turning
+/// point of the data it may exceed the data, because the true maximum lies between the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monotone {
     x: Vec<f64>,
@@ -21,8 +21,8 @@ impl Monotone {
         Monotone::interpolate(x, y, false)
     }
 
-    /// Interpolates like [`Monotone::new`], but stays between its two points everywhere, as the FMUs' tables
-    /// do, so that it turns where the data turn.
+    /// Interpolates like [`Monotone::new`], but never exceeds the values of the two neighbouring points, so that it
+    /// turns exactly where the data turn. The FMUs interpolate their tables in this way.
     ///
     /// # Panics
     /// The same as for [`Monotone::new`].
@@ -87,8 +87,8 @@ mod tests {
                 (0..=30000).map(|i| sign * curve.evaluate(i as f64 * 5e-5)).collect();
             assert!(samples.windows(2).all(|w| w[1] >= w[0] - 1e-15));
             for &x in &x[1..10] {
-                // the difference of the second differences on both sides falls with their step,
-                // down to the rounding error of 1e-4
+                // The second differences on both sides of a point differ by an amount that falls with the step, down to
+                // the rounding error of 1e-4.
                 let jump = |h: f64| {
                     let second = |c: f64| {
                         (curve.evaluate(c + h) - 2.0 * curve.evaluate(c) + curve.evaluate(c - h))

@@ -8,8 +8,7 @@
 use crate::interpolation::Monotone;
 use crate::modal::Mode;
 
-/// A liquid of density `rho` (kg/m³) and surface tension `sigma` (N/m) at the specific force `g` along the
-/// axis (m/s²).
+/// Properties of a liquid: density `rho`, kg/m³; surface tension `sigma`, N/m; specific force `g` along the axis, m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fluid {
     pub rho: f64,
@@ -23,10 +22,10 @@ impl Fluid {
     }
 }
 
-/// A mode with capillarity: the square of its natural frequency, 1/s², and the centring `spring` at the slosh mass, N/m,
-/// which is slightly negative for a wetting liquid at a large Bond number. `outside` has one sentence for each range of the
-/// formula that the tank is outside of. `unknown` is true if the formula does not apply to this tank and its contribution
-/// exceeds 10 % of omega^2.
+/// A mode with capillarity: the square `omega2` of its natural frequency, 1/s², and the centring stiffness `spring` at
+/// the slosh mass, N/m, which is slightly negative for a wetting liquid at a large Bond number. `outside` has one
+/// sentence for each range of the formula that the tank is outside of. `unknown` is true if the formula does not apply
+/// to this tank and its contribution exceeds 10 % of omega^2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capillary {
     pub omega2: f64,
@@ -35,11 +34,11 @@ pub struct Capillary {
     pub unknown: bool,
 }
 
-/// Largest share of capillarity in omega^2 of a mode whose shape it changes.
+/// Largest contribution of capillarity to omega^2, relative to gravity, of a mode whose shape phi_n it changes.
 const LARGEST_SHARE: f64 = 0.1;
 
-/// Returns the specific force, m/s², below which [`flat`] is not known for a mode whose shape changes;
-/// `tension` is sigma/rho.
+/// Returns the specific force, m/s², below which [`flat`] is not valid for a mode whose shape phi_n changes;
+/// `tension` is sigma/rho, m3/s2.
 pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
     tension * mode.surface_gradient / LARGEST_SHARE
 }
@@ -70,10 +69,10 @@ pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
 const XI: f64 = formulas::cylinder::XI[0];
 const BOND: [f64; 6] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0];
 const ANGLE: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
-/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, constant contact angle and
-/// free line, for the Bond numbers `BOND` (rows) and contact angles `ANGLE`, degrees (columns). The values
-/// come from the capillary eigenproblem on the static meniscus, with errors of 1e-6 in both limits, and are
-/// given to their digits.
+/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, constant contact angle and free
+/// contact line, for the Bond numbers `BOND` (rows) and the contact angles `ANGLE`, degrees (columns). The values come
+/// from the capillary eigenproblem on the static meniscus, whose error is 1e-6 where the exact result is
+/// known; they are rounded to the digits given.
 const TABLE: [[f64; 7]; 6] = [
     [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263],
     [8.0827, 7.5726, 6.9609, 6.2873, 5.6101, 5.0195, 4.7587],
@@ -92,21 +91,21 @@ fn flat_omega2(bond: f64) -> f64 {
     XI * bond + XI.powi(3)
 }
 
-/// Returns the shift of Omega_1^2 by the curved meniscus, relative to the flat surface.
+/// Returns the shift of Omega_1^2 by the curved meniscus, relative to Omega_1^2 of the flat surface.
 ///
-/// The table is interpolated in cos(angle) and ln(1 + Bo), so that 90 degrees is exact. Beyond Bo = 100 the
-/// shift approaches its limit -2 xi^2 cos(angle) as 1/Bo (shape derivative of the eigenvalue).
+/// The table is interpolated in cos(angle) and ln(1 + Bo), so that the shift at 90 degrees is exactly 0. Above Bo = 100
+/// the shift approaches its limit -2 xi^2 cos(angle) as 1/Bo (shape derivative of the eigenvalue).
 fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     let cosine = |angle: f64| if angle == 90.0 { 0.0 } else { angle.to_radians().cos() };
     let cos = cosine(contact_angle);
-    // cos rises with falling angle; at 90 degrees the shift is exactly 0
+    // ascending cosines, that is falling angles; at 90 degrees the shift is exactly 0
     let cosines = ANGLE.map(cosine);
     let at_row = |row: usize| {
         let difference: Vec<f64> = (0..7)
             .map(|k| if k == 0 { 0.0 } else { TABLE[row][k] - flat_omega2(BOND[row]) })
             .collect();
         let [c5, c6] = [cosines[5], cosines[6]];
-        // the last 5 degrees are 0.4 % of the cosine: linear extrapolation
+        // From 5 to 0 degrees the cosine changes by 0.4 %: linear extrapolation.
         if cos > c6 {
             return difference[6] + (difference[6] - difference[5]) * (cos - c6) / (c6 - c5);
         }
@@ -121,9 +120,10 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     Monotone::new(&places, &values).evaluate(bond.ln_1p())
 }
 
-/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of
-/// Omega_1^2 of the deep cylinder's meniscus, times tanh(xi h/R), is added to [`flat`]. At 90 degrees, and
-/// without surface tension, the result is exactly [`flat`]. Outside 0 to 90 degrees the nearer end is used.
+/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2
+/// by the meniscus of a deep cylinder, times tanh(xi h/R), is added to the result of [`flat`]. At 90 degrees, and
+/// without surface tension, the result is exactly that of [`flat`]. For a contact angle outside 0 to 90 degrees the
+/// nearer limit is used.
 pub fn cylinder(
     mode: &Mode,
     radius: f64,
@@ -131,7 +131,7 @@ pub fn cylinder(
     contact_angle: f64,
     fluid: Fluid,
 ) -> Capillary {
-    // 0/0 without gravity and surface tension; the value has no effect below.
+    // 0/0 without gravity and surface tension. The value has no effect below.
     let bond = fluid.bond(radius);
     let Capillary { omega2, spring, mut outside, unknown } = flat(mode, fluid);
     if !(0.0..=90.0).contains(&contact_angle) {

@@ -10,9 +10,9 @@
 //!
 //!   m_n = rho pi lambda_n A_n^2/N_n,   H_n = B_n/A_n,   I_eff = rho pi int psi dpsi/dn r ds
 //!
-//! Sources: Lomen, NASA CR-230; Dodge 2000, chapter 3; signs and I_eff derived anew. A mode with
-//! hardly any mass can have any height H_n, but m_n H_n and m_n H_n^2 are always finite. The code
-//! therefore keeps A_n/sqrt(N_n) and B_n/sqrt(N_n), and gives H_n only where it has a meaning.
+//! Sources: Lomen, NASA CR-230; Dodge 2000, chapter 3; signs and I_eff derived anew. A mode with hardly any mass can
+//! have any height H_n, whereas m_n H_n and m_n H_n^2 are always finite. The code therefore computes with A_n/sqrt(N_n)
+//! and B_n/sqrt(N_n), and returns H_n only for modes with mass.
 
 use serde::Serialize;
 
@@ -24,20 +24,19 @@ const MASSLESS: f64 = 1e-9;
 
 /// One mode; number `n` is 1 for the lowest frequency. Heights are in m from the contour's own zero.
 ///
-/// - `lambda` = omega_n^2/g, 1/m, and times the outer radius of the free surface (`lambda_r`) or the length
-///   of the box (`lambda_l`); `l` = 1/lambda is the pendulum's length, m.
-/// - `m`, `m_ratio`: slosh mass, kg, and over the mass of the liquid.
-/// - `height`, `hinge`: height of the slosh mass at rest, and of the hinge l above it; `None` if the mass is below 1e-9 of
-///   the liquid's. `m_h` and `m_h2` are m h, kg m, and m h^2, kg·m², with h = H - z_cg.
-/// - `wave`, `wave_inner`: elevation of the surface at the outer and the inner wall per angle of the
-///   pendulum, m/rad; `wave_peak` is the largest elevation anywhere (first mode only), at the radius
-///   `r_peak`, m; `shape` has (r, m/rad) from the axis or inner wall outwards.
-/// - `beta` = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, for the damping by the laminar layer at the
-///   wall.
-/// - `surface_gradient` = int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2: the contribution of capillarity to the
-///   stiffness.
-/// - `vertical_wall`: true if the walls are vertical at the free surface; `upright`: true if the bottom is
-///   flat, too, so that capillarity does not change phi_n.
+/// - `lambda` = omega_n^2/g, 1/m; `lambda_r` is lambda times the outer radius of the free surface, `lambda_l` lambda
+///   times the length of a box; `l` = 1/lambda is the pendulum's length, m.
+/// - `m`: slosh mass, kg; `m_ratio`: slosh mass divided by the mass of the liquid.
+/// - `height`: height of the slosh mass at rest; `hinge`: height of the hinge, l above it; both `None` if the slosh
+///   mass is below 1e-9 of the liquid's mass. `m_h` and `m_h2` are m h, kg m, and m h^2, kg·m², with h = H - z_cg.
+/// - `wave`, `wave_inner`: elevation of the surface at the outer and at the inner wall per angle of the pendulum,
+///   m/rad; `wave_peak`: largest elevation anywhere (first mode only), at the radius `r_peak`, m; `shape`: points (r,
+///   m/rad) of the surface from the axis or inner wall outwards.
+/// - `beta` = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, from which the damping by the laminar layer
+///   at the wall follows.
+/// - `surface_gradient` = int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2, from which the stiffness by capillarity follows.
+/// - `vertical_wall`: true if the walls are vertical at the free surface; `upright`: true if the bottom is flat, too,
+///   so that capillarity does not change phi_n.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Mode {
     pub n: usize,
@@ -74,8 +73,8 @@ pub struct Mode {
     pub upright: bool,
 }
 
-/// Fixed mass, kg, when the first `modes` modes are pendulums, with its height, m from the contour's own
-/// zero, which can lie outside the tank, and its inertia across the axis about its own centre, kg·m².
+/// Fixed mass `m_0`, kg, that remains when the first `modes` modes are modelled as pendulums; its height, m from the
+/// contour's own zero, which can lie outside the tank; and its inertia across the axis about its own centre, kg·m².
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rest {
     pub modes: usize,
@@ -86,8 +85,8 @@ pub struct Rest {
     pub inertia: f64,
 }
 
-/// Modal parameters along one horizontal axis of a box: inertias of the liquid about its centre of mass,
-/// kg·m², rigid and under a lid, the modes, and the fixed mass after 1, 2, ... modes.
+/// Modal parameters of a box along one of its horizontal sides: inertias of the liquid about its centre of mass, kg·m²,
+/// if it is rigid and if it is under a lid; the modes; and the fixed mass with 1, 2, ... modes as pendulums.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
     #[serde(rename = "I_frozen_cg")]
@@ -104,12 +103,13 @@ pub struct Axes {
     pub y: Axis,
 }
 
-/// Damping of a tank's modes with smooth walls, at the kinematic viscosity `nu`, m2/s, and the specific force
-/// `gravity` along the axis, m/s². `shape` is the measured shape of the wetted wall, or `other`, and `parts`
-/// are the measured shapes of parts of the wall if the whole wall is none. `correlation` is the first mode's
-/// damping from the shape's correlation, if it has one, and `taken` explains the value that was chosen. Modes
-/// are in the order of their frequency; a box has `modes` along its first and `modes_y` along its second
-/// length.
+/// Damping of the modes of a tank with smooth walls, for the kinematic viscosity `nu`, m2/s, at the specific force
+/// `gravity` along the axis, m/s².
+///
+/// - `shape`: the measured shape of the wetted wall, or `other`; then `parts` are the measured shapes of parts of the wall.
+/// - `correlation`: damping ratio of the first mode by the correlation of the shape, if the shape has one.
+/// - `taken`: sentence that explains the chosen damping ratio.
+/// - `modes`: in the order of their frequency; for a box along its first side, and `modes_y` along its second side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Damping {
     pub nu: f64,
@@ -126,8 +126,8 @@ pub struct Damping {
     pub warnings: Vec<String>,
 }
 
-/// A measured shape of a part of the wetted wall: its share of the area, and the factor of its correlation
-/// over the laminar layer at its wall.
+/// A measured shape of a part of the wetted wall: its share of the area, and the damping by its correlation divided by
+/// the damping by the laminar layer at its wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DampingPart {
     pub shape: &'static str,
@@ -135,10 +135,10 @@ pub struct DampingPart {
     pub factor: f64,
 }
 
-/// Natural frequencies with surface tension `sigma`, N/m, a contact angle between surface and wall, degrees
-/// (90 is a flat surface), and the specific force `gravity` along the axis, m/s². `bond` is rho g R^2/sigma
-/// with the free surface's outer radius; a box, and a liquid without surface tension, have none. Modes are in
-/// the order of [`ModalData::modes`], those along a box's second length in `modes_y`.
+/// Natural frequencies with the surface tension `sigma`, N/m, a contact angle between surface and wall, degrees (90 is
+/// a flat surface), and the specific force `gravity` along the axis, m/s². `bond` is rho g R^2/sigma with the outer
+/// radius of the free surface; `None` for a box or without surface tension. Modes are in the order of
+/// [`ModalData::modes`]; `modes_y` are the modes along a box's second side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Capillarity {
     pub sigma: f64,
@@ -153,15 +153,15 @@ pub struct Capillarity {
 }
 
 /// One mode with surface tension: natural frequency, rad/s, and centring stiffness at the slosh mass, N/m, which is
-/// negative for a meniscus that softens the surface; `None` where no formula holds.
+/// negative if a curved meniscus lowers the frequency; `None` if no formula is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CapillaryMode {
     pub omega: Option<f64>,
     pub k: Option<f64>,
 }
 
-/// The damping of one mode: natural frequency with capillarity, rad/s, damping ratio with its expected
-/// interval, and the ratio by the laminar layer at the wall alone.
+/// Damping of one mode: natural frequency with capillarity, rad/s, damping ratio with the interval in which it is
+/// expected, and the damping ratio by the laminar layer at the wall only.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModeDamping {
     pub omega: f64,
@@ -170,21 +170,21 @@ pub struct ModeDamping {
     pub laminar: f64,
 }
 
-/// Modal parameters of a tank at one fill. Heights are in m from the contour's own zero, except `fill`, the
-/// height of the free surface above the lowest point.
+/// Modal parameters of a tank at one fill. Heights are in m from the contour's own zero, except `fill`, the height of
+/// the free surface above the lowest point.
 ///
 /// - `kind`: `revolution` or `box`; `rho`: density, kg/m³.
-/// - `r_surface`, `r_inner`: outer and inner radius of the free surface, m; the inner one is 0 if the surface
-///   reaches the axis. `length_x`, `length_y`: lengths of a box, m.
-/// - `m_liq`, `z_cg`, `z_lowest`: mass of the liquid, kg, height of its centre of mass, and height of the
-///   tank's lowest point, which is 0 for shapes and boxes.
-/// - `i_frozen_cg`, `i_frozen_axis`: inertia of the rigid liquid across the axis about its centre of mass and
+/// - `r_surface`, `r_inner`: outer and inner radius of the free surface, m; the inner one is 0 if the surface reaches
+///   the axis. `length_x`, `length_y`: sides of a box, m.
+/// - `m_liq`, `z_cg`, `z_lowest`: mass of the liquid, kg, height of its centre of mass, and height of the tank's
+///   lowest point, which is 0 for shapes and boxes.
+/// - `i_frozen_cg`, `i_frozen_axis`: inertia of the rigid liquid across the axis about its centre of mass, and
 ///   about the axis, kg·m².
-/// - `i_eff_cg`, `i_eff_axis`: the same of the liquid under a lid; about the axis it is the inertia of the
-///   liquid that rotates with the tank, 0 in a tank of revolution.
-/// - `modes`: in the order of their frequencies, for a box those along its first length; `axes` has both.
-///   `rest`: fixed mass after 1, 2, ... modes.
-/// - `capillarity`, `damping`: if surface tension and viscosity are known. `finite_amplitude`: see
+/// - `i_eff_cg`: inertia of the liquid under a lid across the axis about its centre of mass, kg·m²; `i_eff_axis`:
+///   inertia of the liquid that rotates with the tank about the axis, 0 in a tank of revolution.
+/// - `modes`: in the order of their frequencies, for a box those along its first side; `axes`: the modes of both
+///   sides of a box. `rest`: fixed mass with 1, 2, ... modes as pendulums.
+/// - `capillarity`, `damping`: present if the surface tension or the viscosity is known. `finite_amplitude`: see
 ///   [`crate::finite_amplitude`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ModalData {
@@ -216,12 +216,12 @@ pub struct ModalData {
     pub rest: Vec<Rest>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
-    /// Estimated error of all values except beta and I_0. It is relative for lambda and l, and otherwise a
-    /// part of: m_liq for masses; m_liq R for m_n H_n and m_0 H_0; m_liq R^2 for inertias; R for waves and
-    /// z_cg. R is the outer radius of the free surface.
+    /// Estimated error of all values except beta and I_0. The error of lambda and l is relative to their values. The
+    /// errors of other values are relative to: m_liq for masses; m_liq R for m_n H_n and m_0 H_0; m_liq R^2 for
+    /// inertias; R for waves and z_cg, where R is the outer radius of the free surface.
     pub error: f64,
-    /// Estimated error of I_0, as a part of m_liq R^2. The fixed mass of a shallow dish is far above it, and
-    /// its lever arm multiplies the error of m_0.
+    /// Estimated error of I_0, relative to m_liq R^2. It can be larger than `error`: the fixed mass of a shallow dish
+    /// is far above the dish, and this lever arm multiplies the error of m_0.
     #[serde(rename = "error_I_0")]
     pub error_i_0: f64,
     pub error_beta: f64,
@@ -255,33 +255,34 @@ pub struct Spin {
     pub z_apex: Option<f64>,
     /// Height up to which the outer wall is wet, m from the contour's own zero.
     pub z_wall: f64,
-    /// Radius within which the floor is dry, m: of the surface at the height of the lowest point. 0 if the floor is wet.
+    /// Radius inside which the floor is dry, m: the radius of the surface at the height of the lowest point; 0 if
+    /// the floor is wet.
     pub r_dry: f64,
-    /// Omega^2 R/g with the outer radius R of the surface at rest; `None` without gravity.
+    /// Omega^2 R/g, where R is the outer radius of the surface at rest; `None` without gravity.
     #[serde(rename = "Omega2_R_g")]
     pub flatness: Option<f64>,
     /// Spin ratio 2 Omega/omega_0, where omega_0 is the frequency of the first mode without spin; `None` without a
     /// mode.
     #[serde(rename = "2Omega_omega")]
     pub ratio: Option<f64>,
-    /// Frequencies of the first mode of an upright cylinder seen from the tank, Hz: first of the wave that runs
-    /// against the spin, then of the wave that runs with the spin.
+    /// Frequencies of the first mode of an upright cylinder seen from the rotating tank, Hz: of the wave that runs
+    /// against the spin, and of the wave that runs with the spin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequencies: Option<[f64; 2]>,
     /// Gyroscopic coefficient C of the first mode of an upright cylinder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyroscopic: Option<f64>,
-    /// Rate at which the liquid of an upright cylinder takes up the rate of its tank by the laminar layer of its floor, 1/s; `None`
-    /// if the viscosity is not given.
+    /// Rate, 1/s, at which the laminar layer at the floor of an upright cylinder brings the liquid to the rate of its
+    /// tank; `None` if the viscosity is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay: Option<f64>,
-    /// True if the parameters of the liquid at rest still describe the motion of the spinning one.
+    /// True if the parameters of the liquid at rest still describe the motion of the rotating liquid.
     pub in_range: bool,
     pub warnings: Vec<String>,
 }
 
-/// A mode at the free surface and the wall, with the quantities of [`Mode`]: shape (r, elevation per angle)
-/// from the axis or inner wall outwards, and the largest elevation per angle as (r, m/rad).
+/// The free surface in a mode, with further quantities of [`Mode`]: `shape` has points (r, elevation per angle) from
+/// the axis or inner wall outwards, `peak` the largest elevation per angle as (r, m/rad).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Surface {
     pub(crate) shape: Vec<[f64; 2]>,
@@ -330,8 +331,8 @@ impl Mode {
 }
 
 impl ModalData {
-    /// Creates the modal data of a tank. `inertias` are the inertia of the rigid liquid across the
-    /// axis about the centre of mass, that about the axis, and the effective inertia.
+    /// Creates the modal data of a tank. `inertias` are, in this order, the inertia of the rigid liquid across the axis
+    /// about the centre of mass, the inertia of the rigid liquid about the axis, and the effective inertia across the axis.
     pub(crate) fn new(
         kind: &'static str,
         rho: f64,
@@ -374,9 +375,8 @@ impl ModalData {
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
 
-    /// Returns natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or
-    /// (`along_y`) second length. With surface tension they come from [`Capillarity`], and are `None` where no formula
-    /// holds.
+    /// Returns the natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or (`along_y`)
+    /// second side. If the data have [`Capillarity`], returns its frequencies instead, `None` where no formula is valid.
     pub fn frequencies(&self, gravity: f64, along_y: bool) -> Vec<Option<f64>> {
         let omegas: Vec<Option<f64>> = match (&self.capillarity, &self.axes) {
             (Some(found), _) => {
@@ -402,10 +402,10 @@ impl ModalData {
         )
     }
 
-    /// Returns the fixed mass when the first `modes` modes are pendulums.
+    /// Returns the fixed mass that remains when the first `modes` modes are modelled as pendulums.
     ///
     /// # Panics
-    /// If there are fewer modes.
+    /// If the data have fewer modes.
     pub fn rest(&self, modes: usize) -> Rest {
         rest(self.m_liq, self.z_cg, self.i_eff_cg, &self.modes[..modes])
     }
@@ -426,8 +426,8 @@ struct Approximation {
     i_eff: f64,
 }
 
-/// Returns the orders of the discretisations that are compared. With `panels` panels the largest one has at
-/// most about 800 unknowns. The first serves only to estimate the error.
+/// Returns the orders of the discretisations that are compared; the first order serves only to estimate the error. With
+/// `panels` panels the discretisation of the largest order has at most about 800 unknowns.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -452,8 +452,8 @@ struct Pair {
     error_beta: f64,
 }
 
-/// Returns the best approximation and its estimated errors, on the usual panels, or on finer ones if these
-/// are not accurate enough.
+/// Returns the best approximation and its estimated errors, on the usual panels or, if the usual panels are not
+/// accurate enough, on shorter panels.
 fn pair(wall: &Wall, volume: &Volume, rho: f64, modes: usize) -> Option<Pair> {
     let usual = pair_on(wall, volume, rho, modes, false);
     if usual.as_ref().is_some_and(|pair| pair.error < ENOUGH) {
@@ -485,16 +485,15 @@ fn pair_on(wall: &Wall, volume: &Volume, rho: f64, modes: usize, fine: bool) -> 
     })
 }
 
-/// Estimates the error from the last two differences between discretisations. It is their geometric mean with
-/// the last counted twice, or the last if that is larger. Convergence is irregular: two discretisations may
-/// agree by chance, so the last difference alone is not a bound. The more suddenly the difference falls, the
-/// farther the mean stays above it.
+/// Estimates the error from the last two differences between discretisations: the geometric mean of `before`, `last`
+/// and `last`, or `last` if that is larger. `last` by itself is not a bound, because convergence is irregular and two
+/// discretisations may agree by chance. The more suddenly the difference falls, the farther the mean stays above it.
 fn estimate(before: f64, last: f64) -> f64 {
     last.max((before * last * last).cbrt())
 }
 
-/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. A full closed tank, whose
-/// `wall` has no free surface, has no modes and only the effective inertia.
+/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. If `wall` is that of a full closed
+/// tank, without a free surface, the result has only the effective inertia and no modes.
 ///
 /// # Errors
 /// If the estimated error is above 1e-2.
@@ -519,9 +518,9 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<Mod
     Ok(data)
 }
 
-/// Returns twice the largest differences between two discretisations, as defined at [`ModalData::error`]. The
-/// factor is needed because weak corners converge only with the fourth power of the order. With orders 12 and
-/// 16 the error of the finer one is then 0.46 of the difference, with 20 and 24 0.93.
+/// Returns twice the largest differences between two discretisations, as defined at [`ModalData::error`]. The factor 2
+/// is needed because results at weak corners converge only with the fourth power of the order: with orders 12 and 16
+/// the error of the finer discretisation is then 0.46 of the difference, with orders 20 and 24 0.93.
 fn difference(a: &Approximation, b: &Approximation, r: f64, m_liq: f64) -> (f64, f64) {
     let mut error = (a.i_eff - b.i_eff).abs() / (m_liq * r * r);
     let mut error_beta: f64 = 0.0;
@@ -597,8 +596,8 @@ fn approximate(
 mod tests {
     use super::*;
 
-    /// The stated error is twice the difference of two discretisations, divided by a reference quantity: lambda and beta by
-    /// themselves, masses by the liquid's 5 kg, moments and waves by R = 2 m, inertias by both.
+    /// The stated error is twice the difference of two discretisations, divided by a reference quantity: lambda and beta
+    /// by their own values, masses by the liquid's 5 kg, moments by 5 kg times R = 2 m, waves by R, inertias by 5 kg R^2.
     #[test]
     fn each_stated_error_is_relative_to_its_reference_quantity() {
         let approximation = |change: &dyn Fn(&mut Mode)| {
@@ -629,13 +628,13 @@ mod tests {
         let mut other = approximation(&|_| {});
         other.i_eff -= step;
         assert_eq!(found(&other), ((step / 10.0, 0.0), (step / 10.0, 0.0)));
-        // 3 and 6 of 4 and 8, the other way 4 and 8 of 3 and 6
+        // relative differences of (3, 6) from (4, 8), and in the other order of (4, 8) from (3, 6)
         let ratios = found(&approximation(&|mode| (mode.lambda, mode.beta) = (3.0, 6.0)));
         assert_eq!(ratios.0, (0.5, 0.5));
         assert!((ratios.1.0 - 2.0 / 3.0).abs() < 1e-15 && (ratios.1.1 - 2.0 / 3.0).abs() < 1e-15);
     }
 
-    /// A sphere that is nearly full, with a free surface much smaller than the tank.
+    /// A sphere that is nearly full has a free surface much smaller than the tank.
     #[test]
     fn stated_errors_of_modes_are_relative_to_the_radius_of_the_free_surface() {
         let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];
@@ -649,7 +648,7 @@ mod tests {
         let over =
             |a: &Approximation, b: &Approximation| difference(a, b, radius, 2.0 * volume.volume).0;
         let [first, second, third] = [over(&a, &b), over(&b, &c), over(&c, &d)];
-        // if the estimate is above the wanted error, the next discretisation is used
+        // If the estimated error is too large, a discretisation of higher order is used.
         let mean = |before: f64, last: f64| last.max((before * last * last).cbrt());
         let first = mean(first, second);
         let expected = if first > WANTED { mean(second, third) } else { first };
@@ -657,9 +656,9 @@ mod tests {
         assert!((found.error / expected - 1.0).abs() < 1e-6, "{:e} {expected:e}", found.error);
     }
 
-    /// Solves random contours of lines, splines and ellipses with corners, fills and numbers of modes.
-    /// Compares with the result on panels of half the length, which has no point in common. Contours that the
-    /// halved panels do not resolve cannot serve as a reference.
+    /// Solves random contours of lines, splines and ellipses, with corners, at random fills and numbers of modes. The
+    /// reference is the result on panels of half the length, which have no point in common with the tested panels.
+    /// Contours that the halved panels do not resolve are skipped.
     fn errors_over_stated_ones(seeds: core::ops::Range<u64>) -> Vec<f64> {
         seeds.filter_map(error_over_stated_one).collect()
     }
@@ -706,12 +705,12 @@ mod tests {
         let volume = Volume::from_wall(&wall);
         let found = pair(&wall, &volume, 1.0, modes)?;
         let mesh = Discretisation::new(&wall.segments, modes, 16, false);
-        // Beyond 20 points the rules for close points do not integrate better.
+        // Above 20 points the rules for points close to the panel do not get more accurate.
         let top = (1000 / mesh.panel_count()).clamp(8, 20);
         let [rough, exact] = [top - 4, top]
             .map(|order| approximate(&mesh.halved(order), &wall, &volume, 1.0, modes));
         let (rough, exact) = (rough?, exact?);
-        // differences count twice
+        // The stated error is twice the difference.
         let off = |a: &Approximation| {
             difference(a, &exact, wall.r_outer, volume.volume).0 / 2.0 / found.error
         };
@@ -722,8 +721,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// With twice the last difference alone the error would be 0.74 (seed 7) and 0.99 (114) of the stated
-    /// one, which leaves no margin.
+    /// If the stated error were only twice the last difference, the true error would be 0.74 (seed 7) and 0.99 (seed
+    /// 114) of it, which leaves no margin.
     #[test]
     fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -4,12 +4,11 @@ use crate::curve::{Curve, Point, Segment, add, cross, dot, norm, sub};
 
 pub(crate) type Corner = usize;
 
-/// Part of a segment with its own coordinate v = 0..1. Counted from the segment's `end` (or start), the
-/// curve's parameter is s = s0 + length v^gamma.
+/// Part of a segment with its own coordinate v = 0..1. The curve's parameter, counted from the segment's end if `end`
+/// is true and otherwise from its start, is s = s0 + length v^gamma.
 ///
-/// At a corner of interior angle al the velocity potential behaves as rho^(pi/al), rho the distance. With
-/// gamma > 1 it is a smooth function of v, and so are the singular parts of all kernels. `nu` is the exponent
-/// pi/al at the corner, if gamma > 1.
+/// At a corner of interior angle al the velocity potential behaves as rho^nu, nu = pi/al, where rho is the distance
+/// from the corner. With gamma > 1 it is a smooth function of v, and so are the singular parts of all kernels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
     pub(crate) segment: usize,
@@ -20,9 +19,8 @@ pub(crate) struct Panel {
     pub(crate) nu: f64,
 }
 
-/// A point of the boundary with the data for the integral equation: unit normal `n` out of the liquid,
-/// `speed` ds/dv, m, the curve's parameter with its distances from the segment's ends, and the nearer end
-/// with the vector from there.
+/// A point `p` of the boundary with its data for the integral equation: unit normal `n` out of the liquid, `speed` ds/dv, m,
+/// the curve's parameter `t` and its distances from the segment's ends, and the vector `offset` from the nearer end, `corner`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryPoint {
     pub(crate) p: Point,
@@ -36,9 +34,9 @@ pub(crate) struct BoundaryPoint {
     offset: Point,
 }
 
-/// Segments of the wall, then of the free surface, counter-clockwise in (r, z). `surface` is the index of the
-/// free surface, or the number of segments without one; `ends` are exact on the axis; `grading` holds (gamma,
-/// nu) at the start and the end of every segment.
+/// Segments of the wall, and after them the free surface, counter-clockwise in (r, z). `surface` is the index of the
+/// free surface; without a free surface it is the number of segments. `ends` are exact on the axis. `grading` holds
+/// (gamma, nu) at the start and at the end of every segment.
 #[derive(Clone, Debug)]
 pub(crate) struct Boundary {
     pub(crate) segments: Vec<Segment>,
@@ -48,8 +46,8 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    /// Creates the boundary from `wall`, which runs from the axis or the inner contact line to the outer one,
-    /// cut at the free surface.
+    /// Creates the boundary from `wall`, which is cut at the free surface, and runs from the axis or the inner contact
+    /// line to the outer contact line.
     pub(crate) fn new(wall: &[Segment]) -> Boundary {
         let mut segments = wall.to_vec();
         let (inner, outer) = (wall[0].start(), wall[wall.len() - 1].end());
@@ -68,13 +66,12 @@ impl Boundary {
             let before = segments[i].tangent(1.0);
             let after = segments[next].tangent(0.0);
             if i + 1 == count && inner[0] <= 0.0 {
-                // An apex on the axis is a corner; the middle of the surface is not.
+                // An apex on the axis is a corner, but the middle of the free surface is not.
                 let apex = |tangent: Point| if tangent[1].abs() < 1e-9 { 1.0 } else { APEX };
                 (grading[i][1].0, grading[next][0].0) = (apex(before), apex(after));
                 continue;
             }
-            // In a cusp the tangents do not determine the inside, but the curves shortly before and
-            // after do.
+            // In a cusp the tangents do not determine the inside. The curves shortly before and after the cusp do.
             let inner = cross(segments[i].tangent(0.999), segments[next].tangent(0.001));
             let cusp = cross(before, after).atan2(dot(before, after)).abs() > 3.13 && inner > 0.0;
             let corner = if cusp { (1.0, 1.0) } else { grading_at(before, after, count > FEW) };
@@ -165,12 +162,12 @@ impl Boundary {
         corner == 0 && self.ends[0][0][0] == 0.0
     }
 
-    /// Cuts the boundary into panels over which the solution is smooth. No panel turns by more than 60
-    /// degrees. None is long compared with the free surface, its distance from the surface, the gap to
-    /// another part of the boundary, or its neighbour. The panels must resolve `modes` modes. A `fine` cut is
-    /// for contours whose details the usual one does not resolve.
+    /// Cuts the boundary into panels over which the solution is smooth. No panel turns by more than 60 degrees. No
+    /// panel is long compared with the free surface, with the panel's distance from the free surface, with its distance
+    /// from another part of the boundary, or with its neighbours. The panels resolve `modes` modes. `fine` gives
+    /// shorter panels, for contours with details that the usual panels do not resolve.
     pub(crate) fn panels(&self, modes: usize, fine: bool) -> Vec<Panel> {
-        // A thin layer or a cusp would take too many panels, so the gap has less weight then.
+        // In a thin layer or a cusp this would take too many panels, so that longer panels are allowed there.
         let (width, many) = if fine { (0.6 * WIDTH, 2 * MANY) } else { (WIDTH, MANY) };
         let gaps = if fine { [1.0, 4.0, 16.0] } else { [2.5, 10.0, 40.0] };
         for gap in gaps {
@@ -188,14 +185,14 @@ impl Boundary {
             let inner = Panel { length, ..*panel };
             // Only the half at the corner is graded.
             let outer = Panel { s0: panel.s0 + length, gamma: 1.0, nu: 1.0, ..inner };
-            // In the order along the contour.
+            // in the order along the contour
             if panel.end { [outer, inner] } else { [inner, outer] }
         };
         panels.iter().flat_map(halves).collect()
     }
 
-    /// Returns panels at most `gap` times as long as their distance from another part, or `None` if they
-    /// would number more than `many`. Panels on the surface are at most `width` of its width.
+    /// Returns panels that are at most `gap` times as long as their distance from another part of the boundary, and, on
+    /// the free surface, at most `width` of its width. `None` if there would be more than `many` panels.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
         let (longest, z_surface) = match self.ends.get(self.surface) {
@@ -278,13 +275,13 @@ impl Boundary {
 const FEW: usize = 12;
 const MANY: usize = 36;
 const WIDTH: f64 = 0.35;
-/// Exponent gamma with which points are concentrated towards an apex on the axis. The potential near an apex is a power of the distance
-/// with an exponent between 0.8 and 2, except for very slender cones.
+/// Exponent gamma that concentrates points towards an apex on the axis. The potential near an apex is a power of the
+/// distance with an exponent between 0.8 and 2, except for very slender cones.
 const APEX: f64 = 4.0;
 
-/// Returns gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole number, so
-/// that the curve is an analytic function of v, and gamma nu is at least 6. A contour of `many` short
-/// segments turns little at each. Such weak corners need no panels of their own.
+/// Returns gamma and nu = pi/al at a corner between two directions of travel. gamma is a whole number, so that the
+/// curve is an analytic function of v, and gamma nu is at least 6. A contour of `many` short segments turns only little
+/// at each joint; such weak corners get a smaller gamma, because they need no panels of their own.
 fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
@@ -343,9 +340,9 @@ mod tests {
         vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
     }
 
-    /// A corner where the liquid has an angle of pi/2 has nu = 2, and a re-entrant corner with 3 pi/2 has nu = 2/3. At a
-    /// jump of the curvature rho^2 log rho becomes smooth in the cube of v. A cusp gets the largest gamma. Weak corners
-    /// between many short segments get less grading.
+    /// A corner where the liquid has an angle of pi/2 has nu = 2, and a re-entrant corner with 3 pi/2 has nu = 2/3. At
+    /// a jump of the curvature the potential has a term rho^2 log rho, which is smooth if rho is proportional to v^3. A
+    /// cusp gets the largest gamma. Weak corners between many short segments get a smaller gamma.
     #[test]
     fn corners_are_graded_by_their_angle() {
         let at = |degrees: f64, many: bool| {
@@ -372,8 +369,9 @@ mod tests {
         assert_eq!(at(1.0, false).0, 6.0);
     }
 
-    /// The points of each panel lie between its ends, and panels follow one another along the boundary. ds/dv is the slope
-    /// of the distance along the boundary, normals point outwards, and the lengths of the panels add up to the boundary.
+    /// The points of each panel lie between its ends, and panels follow one another along the boundary. ds/dv is
+    /// the derivative of the arc length, normals point outwards, and the lengths of the panels add up to the
+    /// length of the boundary.
     #[test]
     fn panels_follow_one_another_along_the_whole_boundary() {
         let cap = 0.8 * 20f64.to_radians().cos();
@@ -405,7 +403,7 @@ mod tests {
                         let h = 1e-5;
                         let [a, x, b] = [v - h, v, v + h].map(|v| boundary.point(panel, v));
                         let slope = sub(b.p, a.p).map(|d| 0.5 * d / h);
-                        // h^2 times the third derivative of v^9, 504 of the length
+                        // error of the finite difference: h^2 times the third derivative of v^9, 504 of the length
                         assert!((norm(slope) - x.speed).abs() < 1e-7, "{panel:?}");
                         assert!(dot(slope, x.n).abs() < 1e-7 && (norm(x.n) - 1.0).abs() < 1e-15);
                         // the liquid is to the left of the direction of travel
@@ -445,9 +443,8 @@ mod tests {
         }
     }
 
-    /// The foot of a point near an arc is at the angle of the point, and its distance is measured along the
-    /// arc; near a line, along the line. Each of the four steps reduces the error by the ratio of distance to
-    /// radius, 1e-1.
+    /// The foot of a point near an arc has the same polar angle as the point, and its distance is measured along the arc;
+    /// near a line, along the line. Each of the four iterations reduces the error to the ratio of distance to radius, 1e-1.
     #[test]
     fn the_foot_of_a_point_is_the_nearest_of_the_panel() {
         for wall in [sphere(), ring(), step()] {
@@ -494,7 +491,7 @@ mod tests {
                 let panels = boundary.panels(3, fine);
                 let length = |panel: &Panel| {
                     let [a, b] = [1e-300, 1.0].map(|v| boundary.point(panel, v).p);
-                    // between chord and arc of 60 degrees at most
+                    // ratio of chord to arc of 60 degrees at most
                     (norm(sub(a, b)), norm(sub(a, b)) * (PI / 6.0) / 0.5)
                 };
                 let mut pairs: Vec<_> = panels.windows(2).map(|p| [p[0], p[1]]).collect();

@@ -1,4 +1,4 @@
-//! Drawings of the tank with its liquid and mode shapes, and of a sweep: self-contained SVG.
+//! Draws a tank with its liquid and mode shapes, and a sweep over the fill, as self-contained SVG.
 
 use core::fmt::Write as _;
 
@@ -16,7 +16,7 @@ const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
 pub const FAINT: &str = "#999";
 
-/// Area of a diagram on the page, px, with the values that its edges stand for.
+/// Rectangle of a diagram on the page, px, and the values of x and y at its edges.
 #[derive(Clone, Copy)]
 pub struct Frame {
     pub left: f64,
@@ -182,7 +182,7 @@ fn draw_tank(svg: &mut String, frame: &Frame, section: &Section) {
     for side in [section.wetted.clone(), mirrored(&section.wetted)] {
         if let (Some(first), Some(last)) = (side.first().copied(), side.last().copied()) {
             let mut area = side;
-            // to the axis, or to the inner contact line
+            // to the axis or to the inner contact line
             let inner = if (first[1] - section.z_surface).abs() < 1e-9 * last[0].abs() {
                 first[0]
             } else {
@@ -225,9 +225,10 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
     }
 }
 
-/// Draws the tank in section with its liquid and the free surface in each mode, with equal largest elevations. For modes
-/// with more than 1 % of the mass it draws the pendulum's hinge and slosh mass if they lie in the drawing. `gravity`, m/s²,
-/// gives the frequencies if the result has none with surface tension.
+/// Draws the section of the tank with its liquid and, for each mode, the free surface, scaled to equal largest
+/// elevations. For modes with more than 1 % of the mass it also draws the pendulum's hinge and slosh mass if they lie
+/// inside the drawing. The frequencies are those at the specific force `gravity`, m/s², unless the data have
+/// frequencies with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
@@ -310,15 +311,15 @@ fn three_digits(value: f64) -> String {
     if places == 12 { format!("{value:.2e}") } else { format!("{value:.places$}") }
 }
 
-/// Draws a sweep over the fill: the tank on the left, and frequencies, mass ratios and hinges of the modes at
-/// the same height of the free surface.
+/// Draws a sweep over the fill: the tank on the left, and at the same heights of the free surface the frequencies, the
+/// mass ratios and the hinges of the modes on the right.
 pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
     let Some(last) = rows.last() else { return page(200.0, 60.0, "sweep", "") };
     let section = section(tank, last);
     let margin = 0.05 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
     let mut frame = tank_frame(&section, 80.0, 70.0, [320.0, 420.0], margin);
-    // the charts of low tanks keep their size
+    // Charts beside a low tank are made higher than the tank.
     let scale = (300.0 / frame.height).max(1.0);
     let chart_height = frame.height * scale;
     frame.top += 0.5 * (chart_height - frame.height);
@@ -349,7 +350,7 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
         if k < 2 {
             low = 0.0;
         }
-        // all frequencies are 0 without gravity, and all hinges equal for a sphere
+        // All frequencies are 0 without gravity, and all hinges of a sphere are equal.
         if high - low < 1e-9 {
             (low, high) = (low - 0.5, high + 0.5);
         }

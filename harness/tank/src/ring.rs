@@ -5,8 +5,8 @@
 //!
 //!   g(x, y) = int_0^2pi cos(theta)/(4 pi |x - y|) dtheta = Q(chi)/(2 pi sqrt(r r')),
 //!
-//! Q = Q_1/2 the Legendre function of the second kind, half-integer degree (Cohl and Tohline,
-//! ApJ 527 (1999) 86). With k^2 = 2/(chi + 1) and the complete elliptic integrals K(k), E(k)
+//! where Q = Q_1/2 is the Legendre function of the second kind of half-integer degree (Cohl and Tohline, ApJ 527 (1999)
+//! 86). With k^2 = 2/(chi + 1) and the complete elliptic integrals K(k), E(k)
 //!
 //!   Q = chi k K - (2/k) E,        Q' = (k/2) [K - chi E/(chi - 1)]        (DLMF 14.5(v), 14.10.4).
 

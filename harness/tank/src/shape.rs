@@ -1,7 +1,7 @@
 //! Recognises the shapes of the wetted contour, so that the damping of a tank does not depend on how it is drawn.
 //!
-//! [`recognise`] finds a wall that is one shape, [`parts`] the shapes of its lower parts. A capsule is a sphere up to the
-//! end of its lower dome.
+//! [`recognise`] finds the shape of the whole wall; [`parts`] finds the shapes of the wall's lower parts. For example,
+//! the wall of a capsule is a sphere up to the end of its lower dome.
 
 use formulas::damping::{self, smooth_step};
 
@@ -9,14 +9,14 @@ use crate::contour::Wall;
 use crate::curve::{Point, Segment, norm, sub};
 use crate::tank::Shape;
 
-/// Largest distance of the wetted wall from a sphere, cylinder, cone or torus, over its size, at
-/// which the wall counts as this shape.
+/// Largest distance of the wetted wall from a sphere, cylinder, cone or torus, relative to its size, at which the wall
+/// counts as this shape.
 const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
 
-/// A shape with measured damping that the wetted wall has, and the fill, m above the lowest point.
-/// The shape is made large enough for the fill.
+/// A shape that the wetted wall has and whose damping was measured, and the fill, m above the lowest point. The shape
+/// is made high enough for the fill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
     pub shape: Shape,
@@ -72,8 +72,8 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sampled(wall, places);
     let mut found: Vec<Part> =
         KINDS.into_iter().filter_map(|kind| kind.part(&points, fill)).collect();
-    // Shallow walls are several shapes in part. The odds of each share are those of this shape alone, so that a share
-    // of 1 leaves nothing to the others.
+    // A shallow wall can be similar to several shapes. Their shares are weighted so that the ratio of each share to the
+    // remainder stays as if only this shape were considered; a share of 1 leaves nothing for the other shapes.
     let beyond = |skip: usize| -> f64 {
         found
             .iter()
@@ -91,13 +91,14 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     found
 }
 
-/// Returns the measured shapes that the whole wetted wall is near, each with a share that falls from 1 on the
-/// shape to 0 at a distance of [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
+/// Returns the measured shapes that are similar to the whole wetted wall. The share of a shape falls from 1 for an
+/// exact wall to 0 at the distance [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
 pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sampled(wall, PLACES);
     let Some(cut) = Cut::from_whole_wall(&points, fill) else { return Vec::new() };
     let widest = points.iter().fold(0.0, |widest: f64, p| widest.max(p[0]));
-    // not the size of a pool or of a pipe, in which every shape is near every other
+    // The radius of a flat pool or the height of a thin pipe would be too large a size: every shape would be similar
+    // to every other one.
     let size = fill.min(widest);
     let of_kind = |kind: Kind| {
         let shape = kind.shape_through(cut)?;
@@ -109,11 +110,11 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     KINDS.into_iter().filter_map(of_kind).collect()
 }
 
-/// Distance of the wall from a shape, over its size, from which the wall does not count as this shape.
+/// Distance of the wall from a shape, relative to the wall's size, from which on it does not count as this shape.
 const FAR: f64 = 0.01;
 
-/// Distance of the wall from a shape, over depth or largest radius, from which the wall is not near this
-/// shape. A spheroid that is a few per cent off a sphere dissipates as much as the sphere.
+/// Distance of the wall from a shape, relative to the smaller of depth and largest radius, from which on it does not count
+/// as similar to this shape. A spheroid that differs by a few per cent from a sphere dissipates as much as the sphere.
 const NEAR: f64 = 0.1;
 
 const LEAST: f64 = 0.02;
@@ -127,9 +128,8 @@ fn sampled(wall: &Wall, places: usize) -> Vec<Point> {
     wall.segments.iter().flat_map(on).collect()
 }
 
-/// The lower part of a wall, below a level: the radii of its contact lines, m (no inner one if the wall
-/// begins on the axis), the height of its lowest point, m from the contour's own zero, and the depth at the
-/// level, m.
+/// The part of a wall below a level: the radii of its contact lines, m (`inner` is `None` if the wall begins on the
+/// axis), the height of its lowest point, m from the contour's own zero, and the depth at the level, m.
 #[derive(Clone, Copy)]
 struct Cut {
     inner: Option<f64>,
@@ -183,8 +183,8 @@ impl Kind {
         }
     }
 
-    /// Returns the part of the wall that is of this kind, without regard to other kinds; `None` below
-    /// [`LEAST`].
+    /// Returns the part of the wall that has a shape of this kind, as if there were no other kinds. `None` if its share
+    /// is at most [`LEAST`].
     fn part(self, points: &[Point], fill: f64) -> Option<Part> {
         let whole = Cut::from_whole_wall(points, fill)?;
         let lowest =
@@ -192,7 +192,8 @@ impl Kind {
         let bands: Vec<f64> =
             points.windows(2).map(|p| (p[0][0] + p[1][0]) * norm(sub(p[1], p[0]))).collect();
         let area: f64 = bands.iter().sum();
-        // Levels from the free surface down to the lowest point: weight of the wall below, its share, shape and depth.
+        // For each level, from the free surface down to the lowest point: weight of the wall below it, its
+        // share, shape and depth.
         let (mut weight, mut sums) = (0.0_f64, [0.0; 4]);
         let mut above: Option<[f64; 4]> = None;
         for level in (lowest + 1..points.len()).rev() {
@@ -219,7 +220,7 @@ impl Kind {
             let share = if level + 1 == points.len() { 1.0 } else { share };
             let [size, ring] = dimensions(&shape);
             let values = [share, share * size, share * ring, share * cut.depth];
-            // A lower part counts at least as much as the wall that it is a part of.
+            // The wall below a lower level counts at least as much as the larger wall that contains it.
             if here > weight {
                 let from = above.unwrap_or(values);
                 for ((sum, a), b) in sums.iter_mut().zip(from).zip(values) {
@@ -268,7 +269,7 @@ fn crossing(a: Point, b: Point, z: f64) -> f64 {
 fn distance(shape: &Shape, [r, z]: Point, bottom: f64) -> f64 {
     let z = z - bottom;
     match *shape {
-        // The bottom or the wall, whichever is nearer.
+        // distance from the bottom or from the side, whichever is nearer
         Shape::Cylinder { radius, .. } => f64::min(z.abs(), (r - radius).abs()),
         Shape::Cone { half_angle, .. } => {
             let (sin, cos) = half_angle.to_radians().sin_cos();

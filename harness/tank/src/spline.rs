@@ -11,12 +11,12 @@ const CORNER: f64 = 0.7;
 
 const MANY: usize = 100;
 
-/// Fits cubic splines through the points, twice continuously differentiable between corners. A point where
-/// the polyline turns by more than 40 degrees is a corner. At the axis the curve is horizontal. At its other
-/// ends and at corners its third derivative is constant over two intervals (not-a-knot).
+/// Fits cubic splines through the points, twice continuously differentiable between corners. A point where the polyline
+/// turns by more than 40 degrees ([`CORNER`]) is a corner. At the axis the curve is horizontal. At its other ends and
+/// at corners the third derivative is constant over the first two intervals (not-a-knot).
 ///
 /// # Errors
-/// Two equal points in succession.
+/// Two successive points that are equal.
 pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     let same: Vec<String> = points
         .windows(2)
@@ -45,7 +45,7 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     Ok(segments)
 }
 
-/// Keeps every k-th of very many points and both ends, so that all `total` points give about 100 segments.
+/// Keeps every k-th point and both ends, with k so that `total` points give about 100 segments.
 fn thinned(points: &[Point], total: usize) -> Vec<Point> {
     let every = total.div_ceil(MANY);
     let last = points.len() - 1;
@@ -60,7 +60,7 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
         segments.push(Segment::line(points[0], points[1]));
         return;
     }
-    // Slopes d at the points: continuity of the second derivative inside, conditions at the ends.
+    // unknown slopes d at the points: the second derivative is continuous inside; two conditions at the ends
     let mut matrix = DMatrix::zeros(count, count);
     let mut right: [DVector<f64>; 2] = [DVector::zeros(count), DVector::zeros(count)];
     let secant = |i: usize, axis: usize| (points[i + 1][axis] - points[i][axis]) / h[i];
@@ -80,7 +80,7 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
             continue;
         }
         if count == 3 {
-            // a parabola: the second derivatives at both ends of the interval agree
+            // three points: a parabola, whose second derivatives at both ends of the interval agree
             matrix[(row, row)] = 1.0;
             matrix[(row, inner)] = 1.0;
             for axis in 0..2 {
@@ -141,7 +141,7 @@ mod tests {
     }
 
     fn near(a: Point, b: Point) {
-        // second and third derivatives are of the order of 10 and 100, from a solved system
+        // Second and third derivatives are of the order of 10 and 100, and come from the solution of a linear system.
         assert!(norm(sub(a, b)) < 1e-10 * (1.0 + norm(b)), "{a:?} {b:?}");
     }
 

@@ -7,12 +7,12 @@ use svgtypes::{PathParser, PathSegment};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 
-/// Reads the first `<path>` of a drawing, with the axis at x = 0, y downwards, and `scale` m per unit.
-/// Supports lines, cubic and quadratic curves, and arcs with unrotated axes. Leaves out lines that close the
-/// path along the axis.
+/// Reads the first `<path>` of a drawing, in which the axis is at x = 0 and y points downwards; `scale` is in m per
+/// unit of the drawing. Supports lines, cubic and quadratic curves, and arcs with unrotated axes. Lines that close the
+/// path along the axis are left out.
 ///
 /// # Errors
-/// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
+/// A file that cannot be read; a file without a path, or with a transform, rotated arcs or several subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
     let text = crate::contour::read_text(path)
         .map_err(|why| Problems::from(format!("{}: {why}", path.display())))?;
@@ -37,7 +37,7 @@ enum Fault {
 }
 
 fn first_path(text: &str) -> Result<String, Fault> {
-    // drawing programs write SVG's document type
+    // SVG files of drawing programs have a document type declaration.
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     let drawing = roxmltree::Document::parse_with_options(text, options)?;
     for element in drawing.descendants().filter(roxmltree::Node::is_element) {
@@ -54,14 +54,14 @@ fn first_path(text: &str) -> Result<String, Fault> {
 
 fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, Fault> {
     let mut segments: Vec<Segment> = Vec::new();
-    // in the drawing's own coordinates
+    // in the coordinates of the drawing
     let (mut here, mut start) = ([0.0, 0.0], [0.0, 0.0]);
     let mut control: Option<(Point, bool)> = None; // last control point, of a cubic
     let place = |p: Point| [scale * p[0], -scale * p[1]];
     for part in PathParser::from(data) {
         let part = part?;
         let to = |abs: bool, x: f64, y: f64| if abs { [x, y] } else { [here[0] + x, here[1] + y] };
-        // the last control point mirrored, for smooth curves
+        // the mirrored last control point, with which smooth curves begin
         let mirrored = |cubic: bool| match control {
             Some((c, kind)) if kind == cubic => [2.0 * here[0] - c[0], 2.0 * here[1] - c[1]],
             _ => here,
@@ -109,7 +109,7 @@ fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, Fault> {
                     return Err(Fault::Rotated);
                 }
                 let d = to(abs, x, y);
-                // y is mirrored, and so is the sense of rotation
+                // y is mirrored, which also reverses the sense of rotation.
                 segments.push(arc(
                     place(here),
                     place(d),
@@ -151,10 +151,10 @@ fn raised([a, b, c]: [Point; 3]) -> Segment {
     bezier([a, third(a, b), third(c, b), c])
 }
 
-/// Creates the arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix B.2.4).
+/// Creates the arc of an ellipse from `p` to `q`, counter-clockwise if `up` is true (SVG 2, appendix B.2.4).
 fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
     let (rx, ry) = (rx.abs(), ry.abs());
-    // on the unit circle
+    // scaled to the unit circle
     let (u, v) = ([p[0] / rx, p[1] / ry], [q[0] / rx, q[1] / ry]);
     let half = [0.5 * (v[0] - u[0]), 0.5 * (v[1] - u[1])];
     let square = dot(half, half);

@@ -7,19 +7,17 @@ use crate::modal::{ModalData, Mode, ModeDamping};
 use crate::parameters::{Liquid, tank_damping};
 use crate::tank::Tank;
 
-/// Modal parameters at ascending fills, one row each. Without liquid or without a free surface a row has no
-/// modes.
+/// Modal parameters at ascending fills, one row each. The row of a fill without liquid or without a free surface has no modes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     pub rows: Vec<ModalData>,
 }
 
-/// Solves at each of the `fills`, m above the lowest point, for `modes` modes.
-///
-/// A fill of 0 or without a free surface gives a row without modes.
+/// Solves for `modes` modes at each of the `fills`, m above the lowest point. A fill of 0, and a fill without a free
+/// surface, give a row without modes.
 ///
 /// # Errors
-/// Lists the problems of all fills; also if the fills do not ascend.
+/// The problems of all fills, listed; also fills that do not ascend.
 pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems> {
     let mut problems = Vec::new();
     if fills.is_empty() {
@@ -53,10 +51,10 @@ impl Sweep {
         }
     }
 
-    /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units are
-    /// SI; H and hinge count from the contour's own zero. Damping ratios with the ends of their intervals,
-    /// and the third-order coefficients of mode 1 with their error and the largest angle of their validity,
-    /// rad, have columns if any row has them. The columns are empty where they are not known.
+    /// Returns the rows as comma-separated values with a heading. Units are SI; H and hinge count from the contour's
+    /// own zero. Damping ratios with their intervals, and the third-order coefficients of mode 1 with their error and
+    /// the largest angle of their validity, rad, have columns if any row has them. Values that are not known, and modes
+    /// that a row lacks, are empty.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
         let is_damped = self.rows.iter().any(|row| row.damping.is_some());

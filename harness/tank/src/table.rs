@@ -13,8 +13,8 @@ pub(crate) fn significant(value: f64) -> String {
     if rounded == 0.0 { "0".into() } else { rounded.to_string() }
 }
 
-/// Returns the result as text: liquid, modes, rigid liquid, and the error. `gravity`, m/s², gives the
-/// frequencies if the result has none with surface tension.
+/// Returns the data as text: liquid, modes, rigid liquid, and error. The frequencies are those at the specific force
+/// `gravity`, m/s², unless the data have frequencies with surface tension.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = Text::default();
     let (name, fill, rho) = (data.name.as_deref().unwrap_or("tank"), short(data.fill), data.rho);

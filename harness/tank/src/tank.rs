@@ -40,9 +40,9 @@ enum Entry {
 /// - `Cylinder`: upright, with flat ends. `Annulus`: upright, with a flat bottom.
 /// - `Spheroid`: ellipsoid of revolution about the vertical axis.
 /// - `Cone`: apex at the bottom, open at the top.
-/// - `DomedCylinder`: elliptical domes; `bottom` and `top` are their heights, 0 for flat ends; below 0 the
-///   bottom bulges into the tank.
-/// - `Torispherical`: heads with a spherical crown and a toroidal knuckle.
+/// - `DomedCylinder`: cylinder with elliptical domes; `bottom` and `top` are the heights of the domes, 0 for a flat
+///   end. If `bottom` is negative, the bottom bulges into the tank.
+/// - `Torispherical`: cylinder whose heads have a spherical crown and a toroidal knuckle.
 /// - `Torus`: ring with a circular section, its axis vertical.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -92,7 +92,7 @@ impl Shape {
                 above(0.0, &[("radius", radius), ("height", height)]);
                 above(-height, &[("bottom", bottom)]);
                 above(-f64::MIN_POSITIVE, &[("top", top)]);
-                // the bottom edge of the cylindrical part
+                // lower edge of the cylindrical part
                 let z = bottom.max(0.0);
                 let mut segments = vec![if bottom == 0.0 {
                     Segment::line([0.0, 0.0], [radius, 0.0])
@@ -146,8 +146,8 @@ impl Shape {
     }
 }
 
-/// Shape of a tank: a body of revolution, with the shape from which it was built, if any, or a box that is
-/// open at the top, lengths in m.
+/// Shape of a tank, lengths in m: a body of revolution, with the [`Shape`] from which it was built, if any, or a box
+/// that is open at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     Revolution { contour: Contour, shape: Option<Shape> },
@@ -161,8 +161,8 @@ pub struct Tank {
     pub geometry: Geometry,
 }
 
-/// Amount of liquid in a tank: height of the free surface above the tank's lowest point, m; part of the
-/// tank's volume, 1 for a full tank; or mass of the liquid, kg.
+/// Amount of liquid in a tank, given as the height of the free surface above the tank's lowest point, m; as a fraction
+/// of the tank's volume, 1 for a full tank; or as the mass of the liquid, kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fill {
     Height(f64),
@@ -190,7 +190,7 @@ impl core::str::FromStr for Fill {
 /// computing time grows fast.
 const MOST_SEGMENTS: usize = 200;
 
-/// Terms of the TOML reader, and the words of a tank file that replace them in messages.
+/// Phrases of the TOML reader's messages, and the phrases about tank files that replace them.
 const TERMS: [(&str, &str); 7] = [
     (
         "invalid type: unit variant, expected struct variant",
@@ -212,7 +212,7 @@ fn in_words(error: &toml::de::Error) -> String {
 pub const MOST_MODES: usize = 20;
 
 impl Tank {
-    /// Reads the file of a tank. Other files that it names are relative to it.
+    /// Reads a tank from a TOML file. Paths in the file are relative to the file's folder.
     ///
     /// # Errors
     /// Lists all problems of the file.
@@ -221,7 +221,7 @@ impl Tank {
         Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
     }
 
-    /// Parses the text of a tank's file; `folder` is the folder of the files that it names.
+    /// Parses the text of a tank's TOML file. Paths in the text are relative to `folder`.
     ///
     /// # Errors
     /// Lists all problems of the file.
@@ -259,7 +259,10 @@ impl Tank {
         ];
         let names: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
         if names.len() > 1 {
-            problems.push(format!("{} exclude each other: give one of them.", names.join(" and ")));
+            problems.push(format!(
+                "{} exclude each other: give only one of them.",
+                names.join(" and ")
+            ));
         }
         let geometry = if let Some(entries) = &file.profile {
             revolution(entries.iter().map(segment).collect(), None)
@@ -297,19 +300,18 @@ impl Tank {
         self.contour().map(Contour::depth)
     }
 
-    /// Returns the height of the free surface above the lowest point, m, at a fill. A part of the volume and
-    /// a mass may be 0 or the tank's whole capacity. A height is returned unchanged.
+    /// Returns the height of the free surface above the lowest point, m, for a given amount of liquid. A fraction of the
+    /// volume may be 0 to 1, and a mass 0 to the mass of the full tank. A height is returned unchanged and unchecked.
     ///
     /// # Errors
-    /// If it is more than the tank holds or less than 0, or a part of a box, which is open at the
-    /// top.
+    /// An amount above the tank's capacity or below 0; a fraction of a box, which is open at the top.
     pub fn fill_height(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = self.contour().map(Contour::capacity);
         let volume = match (fill, capacity) {
             (Fill::Height(height), _) => return Ok(height),
             (Fill::Share(share), _) if !(0.0..=1.0).contains(&share) => {
                 return Err(format!(
-                    "The fill is {} %; it must be 0 to 100 % of the tank's volume.",
+                    "The fill is {} % of the tank's volume; it must be 0 to 100 %.",
                     100.0 * share
                 )
                 .into());
@@ -340,8 +342,8 @@ impl Tank {
         })
     }
 
-    /// Returns the mass of the liquid at `fill`, m above the lowest point, kg, which is the mass of
-    /// [`Tank::solve`], without solving for modes where these take time.
+    /// Returns the mass of the liquid, kg, at `fill`, m above the lowest point. It is bit-identical to the mass in the
+    /// result of [`Tank::solve`], but does not take the time to solve for modes.
     ///
     /// # Errors
     /// A fill outside the tank.
@@ -360,14 +362,14 @@ impl Tank {
         }
     }
 
-    /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed
-    /// tank has no free surface and no modes.
+    /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed tank has
+    /// no free surface and no modes.
     ///
-    /// Cylinders and annuli given by their dimensions, and boxes, have a closed form. The boundary integral
-    /// equation solves all others.
+    /// Cylinders and annuli given by their dimensions, and boxes, are solved in closed form, all other tanks by
+    /// the boundary integral equation.
     ///
     /// # Errors
-    /// A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
+    /// A fill outside the tank; a number of modes outside 1 to [`MOST_MODES`].
     pub fn solve(&self, fill: f64, modes: usize) -> Result<ModalData, Problems> {
         let mut problems = Vec::new();
         if !(1..=MOST_MODES).contains(&modes) {
@@ -437,8 +439,8 @@ impl Tank {
     }
 }
 
-/// Returns the value of `result` if there are no problems, and otherwise an error that lists
-/// `problems` and those of `result`.
+/// Returns the value of `result` if there are no `problems`; otherwise an error that lists `problems` and the errors of
+/// `result`.
 fn with_problems<T>(mut problems: Vec<String>, result: Result<T, Problems>) -> Result<T, Problems> {
     match result {
         Ok(value) if problems.is_empty() => return Ok(value),
@@ -491,7 +493,7 @@ fn segment(entry: &Entry) -> Segment {
     }
 }
 
-/// Reads two columns r, z in m. A first line without numbers is a heading, and `#` begins a comment.
+/// Reads two columns r, z in m. A first line without numbers counts as a heading, and `#` begins a comment.
 fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

@@ -1,7 +1,7 @@
-//! Amplitude dependence of the frequency of the first mode of a tank with vertical walls and a flat
-//! bottom: potential flow to third order.
+//! Dependence of the first mode's frequency on its amplitude, in a tank with vertical walls and a flat bottom:
+//! potential flow to third order.
 //!
-//! Surface elevation eta and surface potential Phi are canonical variables (Zakharov 1968) with
+//! The surface elevation eta and the surface potential Phi are canonical variables (Zakharov 1968) with
 //!
 //! ```text
 //! L = int Phi eta_t dS - H,   H = (1/2) int (Phi G Phi + g eta^2) dS
@@ -9,9 +9,9 @@
 //! G_2 = -(1/2) (D^2 eta^2 G_0 + G_0 eta^2 D^2 - 2 G_0 eta G_0 eta G_0)
 //! ```
 //!
-//! This holds unchanged for a vertical wall, because products of functions with zero slope at the
-//! wall also have zero slope. With g = 1, psi is the first mode of the cross-section, with wave number
-//! k and T = k tanh k h = omega^2. A wave of two such modes X and Y of the same frequency,
+//! These equations hold unchanged for vertical walls, because products of functions with zero slope at the wall also
+//! have zero slope there. With g = 1, psi is the first mode of the cross-section, with wave number k and T = k tanh k h
+//! = omega^2. A wave that consists of two modes X and Y of this frequency,
 //!
 //! ```text
 //! eta = a (X cos wt + Y sin wt),   Phi = b (X sin wt - Y cos wt)
@@ -24,16 +24,16 @@
 //! eta_2 = sum (p_0 + p_2 cos 2wt + q_2 sin 2wt) chi,   Phi_2 = sum (f sin 2wt + g cos 2wt) chi
 //! ```
 //!
-//! L averaged over a period is stationary in p_0, p_2, q_2, f and g. The remaining L = L_2 a^2 + L_4 a^4
-//! is stationary in a, which is the nonlinear dispersion relation (Whitham 1974). The integrals are
-//! C = int chi psi^2, N = int chi^2 and by grad psi.grad psi = k^2 psi^2 + (1/2) Lap psi^2
+//! L averaged over a period is stationary with respect to p_0, p_2, q_2, f and g. The remaining L = L_2 a^2 + L_4 a^4
+//! is stationary with respect to a, which is the nonlinear dispersion relation (Whitham 1974). The integrals in L_4 are
+//! C = int chi psi^2, N = int chi^2 and, because grad psi.grad psi = k^2 psi^2 + (1/2) Lap psi^2,
 //!
 //! ```text
 //! int chi |grad psi|^2 = (k^2 - kappa^2/2) C,   int psi grad psi.grad chi = (kappa^2/2) C
 //! int psi^2 G_0 psi^2 = sum t C^2/N
 //! ```
 //!
-//! and likewise for X^2, Y^2 and X Y. The cross-section enters only by k, C, N and int psi^4.
+//! and likewise for X^2, Y^2 and X Y. The cross-section enters only through k, C, N and int psi^4.
 //!
 //! The equivalent mass on a surface, with q/l the slosh angle,
 //!
@@ -50,17 +50,16 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::gauss::{Gauss, legendre, legendre_slopes};
 
-/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third order is not
-/// valid.
+/// Relative difference between 2 omega_1 and the frequency of an excited mode, below which the third order is not valid.
 pub const DETUNING: f64 = 0.01;
 
-/// A mode that the square of the first mode excites, with its wave number `kappa`, 1/m.
+/// A mode chi that the square of the first mode excites, with its wave number `kappa`, 1/m.
 ///
-/// - `mode` names it: azimuthal number and number from 1 in round sections, half waves over the angle and
-///   number from 1 in sectors, half waves along the motion and across it in boxes.
-/// - `planar`, `circular`: squared projections on chi over N and the first mode's N. The first belongs to (X^2 + Y^2)/2,
-///   which excites the frequency 0. The second, at 2 omega, belongs to (X^2 - Y^2)/2 and X Y.
-/// - `at_wall`: C chi/N at the wall, planar motion.
+/// - `mode` identifies it: azimuthal number and number from 1 in round sections; half waves over the angle and number
+///   from 1 in sectors; half waves along the motion and across it in boxes.
+/// - `planar`, `circular`: squared projections on chi, divided by N and by the first mode's N. The first element belongs
+///   to (X^2 + Y^2)/2, which excites the frequency 0; the second belongs to (X^2 - Y^2)/2 and X Y, which excite 2 omega.
+/// - `at_wall`: C chi/N at the wall, for planar motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
     pub mode: [usize; 2],
@@ -70,10 +69,10 @@ pub struct Excited {
     pub at_wall: f64,
 }
 
-/// The first mode and the modes that its square excites, independent of the depth. `k` is the first mode's
-/// wave number, 1/m, and `amplitude` is a per slosh angle, m: int psi x/int psi^2, with x along the motion.
-/// `fourth` is int psi^4/int psi^2 of planar motion and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of
-/// circular motion, `None` if the section has none.
+/// The first mode and the modes that its square excites; they do not depend on the depth. `k` is the first mode's wave
+/// number, 1/m, and `amplitude` is a per slosh angle, m: int psi x/int psi^2, with x along the motion. `fourth` is int
+/// psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of circular motion, `None` if the
+/// section has no circular motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
     pub k: f64,
@@ -83,19 +82,19 @@ pub struct Overlaps {
 }
 
 impl Overlaps {
-    /// Computes the overlaps of a circular section of radius 1 with `count` modes of each azimuthal number.
+    /// Computes the overlap integrals of a circular section of radius 1 with `count` modes of each azimuthal number.
     pub fn new(count: usize) -> Overlaps {
         Overlaps::round(0.0, 1.0, count)
     }
 
-    /// Computes the overlaps of a circular (`inner` = 0) or annular section with `count` modes of each
+    /// Computes the overlap integrals of a circular (`inner` = 0) or annular section with `count` modes of each
     /// azimuthal number, radii in m.
     pub fn round(inner: f64, outer: f64, count: usize) -> Overlaps {
         let [first, mean, double] = [1.0, 0.0, 2.0].map(|nu| Radial::new(inner, outer, nu, count));
         Overlaps::from_waves(&first, &mean, &double)
     }
 
-    /// Returns the overlaps of psi = u(r) cos(nu theta) with the modes of the orders 0 and 2 nu.
+    /// Returns the overlap integrals of psi = u(r) cos(nu theta) with the modes of the orders 0 and 2 nu.
     fn from_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
         let psi = first.mode(0);
         let mut excited = Vec::new();
@@ -103,7 +102,7 @@ impl Overlaps {
             for n in 0..radial.kappa.len() {
                 let chi = radial.mode(n);
                 let c = radial.integral(|i| psi[i] * psi[i] * chi[i]);
-                // with the integrals of cos^2 and sin^2 times 1, or cos and sin of 2 nu theta
+                // times the integrals over theta of cos^2 or sin^2 of nu theta with 1, or with cos or sin of 2 nu theta
                 let [planar, circular] = match waves {
                     0 => [[c * c / 8.0; 2], [c * c / 2.0, 0.0]],
                     _ => [[c * c / 16.0; 2], [0.0, c * c / 2.0]],
@@ -127,7 +126,7 @@ impl Overlaps {
         }
     }
 
-    /// Returns the overlaps of a box for motion along `length`, m, with another length across it.
+    /// Returns the overlap integrals of a box for motion along its side `length`, m; the other side is different.
     pub fn rectangle(length: f64) -> Overlaps {
         let k = PI / length;
         Overlaps {
@@ -144,8 +143,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the overlaps of a square box, for planar motion along its sides or (`diagonal`) along a
-    /// diagonal.
+    /// Returns the overlap integrals of a square box, for planar motion along its sides or, if `diagonal` is
+    /// true, along a diagonal.
     pub fn square(length: f64, diagonal: bool) -> Overlaps {
         let k = PI / length;
         let double = [([2, 0], [0.5, 0.25]), ([0, 2], [0.0, 0.25])];
@@ -172,14 +171,14 @@ impl Overlaps {
         }
     }
 
-    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at a depth, m.
-    /// The shift is 0 for a motion that the section does not have.
+    /// Returns the relative shifts of omega^2 per squared slosh angle, in planar and in circular motion, at a depth, m.
+    /// If the section has no circular motion, its shift is 0.
     pub fn shifts(&self, depth: f64) -> [f64; 2] {
         self.detuned_shifts(depth, 0.0)
     }
 
-    /// Returns the shifts if the frequency of 2 omega in the response of the excited modes were higher by the
-    /// part `detuning`. A large difference shows that a pole is close.
+    /// Returns the shifts with a changed response of the excited modes, which are computed at the frequency 2 omega (1
+    /// + `detuning`). A large difference shows that a pole is close.
     pub(crate) fn detuned_shifts(&self, depth: f64, detuning: f64) -> [f64; 2] {
         let [t_1, _, b] = self.wave(depth);
         let k2 = self.k * self.k;
@@ -195,13 +194,13 @@ impl Overlaps {
                 *l_4 += weight[0] * mean + weight[1] * double;
             }
         }
-        // a (omega^2/T - 1)/2 + 4 L_4 a^3 = 0, and twice that of the circular motion.
+        // a (omega^2/T - 1)/2 + 4 L_4 a^3 = 0; circular motion has twice this.
         let amplitude2 = self.amplitude * self.amplitude;
         [-8.0 * l_4[0] * amplitude2, -4.0 * l_4[1] * amplitude2]
     }
 
-    /// Returns s and kappa of the equivalent mass at a depth, m. Without circular motion s is 1, and kappa
-    /// gives the planar shift.
+    /// Returns s and kappa of the equivalent mass at a depth, m. If the section has no circular motion, s is 1 and
+    /// kappa gives the planar shift.
     pub fn equivalent(&self, depth: f64) -> [f64; 2] {
         self.detuned_equivalent(depth, 0.0)
     }
@@ -227,7 +226,7 @@ impl Overlaps {
         self.amplitude * self.amplitude * self.excited.iter().map(elevation).sum::<f64>()
     }
 
-    /// Returns T, omega and the first-order amplitude b of the potential per elevation, with g = 1.
+    /// Returns T, omega, and the first-order amplitude b of the potential divided by that of the elevation, with g = 1.
     fn wave(&self, depth: f64) -> [f64; 3] {
         let t_1 = self.k * (self.k * depth).tanh();
         // eta_t = G_0 Phi
@@ -237,8 +236,7 @@ impl Overlaps {
     fn response(&self, mode: &Excited, depth: f64, detuning: f64) -> Response {
         let [t_1, omega, b] = self.wave(depth);
         let t = mode.kappa * (mode.kappa * depth).tanh();
-        // int chi (|grad psi|^2 - (G_0 psi)^2) and int psi (grad psi.grad chi - G_0 psi G_0 chi)
-        // over C
+        // int chi (|grad psi|^2 - (G_0 psi)^2) and int psi (grad psi.grad chi - G_0 psi G_0 chi), both divided by C
         let elevated = self.k * self.k - mode.kappa * mode.kappa / 2.0 - t_1 * t_1;
         let carried = mode.kappa * mode.kappa / 2.0 - t_1 * t;
         let driven = omega * (1.0 + detuning);
@@ -250,8 +248,7 @@ impl Overlaps {
         }
     }
 
-    /// Returns the excited mode whose frequency is twice the first mode's frequency within [`DETUNING`] at a depth,
-    /// m.
+    /// Returns the excited mode whose frequency is within [`DETUNING`] of twice the first mode's frequency at a depth, m.
     pub fn secondary_resonance(&self, depth: f64) -> Option<[usize; 2]> {
         let [t_1, ..] = self.wave(depth);
         let near = |mode: &&Excited| {
@@ -262,8 +259,8 @@ impl Overlaps {
     }
 }
 
-/// Equations of an excited mode per C: t, the source of the mean elevation, and matrix and vector of (p_2,
-/// f).
+/// Equations of an excited mode, divided by C: t, the source of the mean elevation, and the matrix and the vector of
+/// the equations for (p_2, f).
 struct Response {
     t: f64,
     elevated: f64,
@@ -281,10 +278,10 @@ fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     -0.5 * v.dot(&(inverse(m) * v))
 }
 
-/// Radial parts u of the modes of order nu, by Galerkin's method: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with
-/// u' = 0 at the walls and int u^2 r dr = 1, where a constant is not a mode. `r` and `weights` (with r dr) are points and
-/// weights of the quadrature, m; `kappa` are the wave numbers, 1/m, ascending; `values` has u at the nodes, one mode a
-/// column, and `at_wall` u at the outer wall.
+/// Radial parts u of the modes of order nu, by Galerkin's method: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with u' = 0 at
+/// the walls and int u^2 r dr = 1; a constant is not a mode. `r` and `weights` (which include r dr) are points and
+/// weights of the quadrature, m; `kappa` are the wave numbers, 1/m, ascending; `values` has u at the points, one mode a
+/// column, and `at_wall` has u at the outer wall.
 struct Radial {
     r: Vec<f64>,
     weights: Vec<f64>,
@@ -297,7 +294,7 @@ impl Radial {
     fn new(inner: f64, outer: f64, nu: f64, count: usize) -> Radial {
         let size = count + count / 2 + 16;
         let rule = Gauss::new(4 * size);
-        // In a circle r = outer s^2 makes r^nu smooth. The point s = 1 is for the wall.
+        // In a circle, r = outer s^2 makes r^nu smooth. The last point, s = 1, is at the wall.
         let place = |s: f64| match inner {
             0.0 => (outer * s * s, 2.0 * outer * s),
             _ => (inner + (outer - inner) * s, outer - inner),
@@ -324,7 +321,7 @@ impl Radial {
         }
         let (mass, stiffness) =
             (mass.tr_mul(&mass), stiffness.tr_mul(&stiffness) + over_r.tr_mul(&over_r));
-        // The bases are linearly independent, so that Cholesky's factor exists.
+        // The base functions are linearly independent, so that the Cholesky factor exists.
         let factor = mass.cholesky().map_or_else(|| DMatrix::identity(size, size), |c| c.l());
         let half = factor.solve_lower_triangular(&stiffness).unwrap_or_else(|| stiffness.clone());
         let whole = factor.solve_lower_triangular(&half.transpose()).unwrap_or(half);
@@ -345,7 +342,7 @@ impl Radial {
         }
     }
 
-    /// Returns u of a mode at the nodes, with a positive value at the outer wall.
+    /// Returns u of a mode at the points of the quadrature, with a positive value at the outer wall.
     fn mode(&self, n: usize) -> Vec<f64> {
         self.values.column(n).iter().copied().collect()
     }
@@ -374,14 +371,14 @@ pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64
         let [linear, constant] = [front * (twice + 2.0) * twice, -front * nu * nu];
         let before = n * (n + nu) * (twice + 2.0) / ((n + 1.0) * (n + nu + 1.0) * twice);
         p = (p.1, (linear * y + constant) * p.1 - before * p.0);
-        // the derivatives by y; p.0 is the polynomial that the new one was made of
+        // derivatives with respect to y; p.0 is the polynomial of the previous degree
         slope = (slope.1, linear * p.0 + (linear * y + constant) * slope.1 - before * slope.0);
     }
     all
 }
 
-/// Returns Legendre polynomials over the width of a ring and their derivatives by r, at the part `s` of the
-/// width.
+/// Returns Legendre polynomials over the width of a ring, and their derivatives with respect to r, at the fraction
+/// `s` of the width.
 fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
     let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
     legendre(s, &mut values);
@@ -393,8 +390,8 @@ fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
 
-    /// The reference is table 9.5 of Abramowitz and Stegun, to more digits. The zero of J0' at 0 does not
-    /// belong to a mode. The tolerance is the rounding of the largest eigenvalue, about 1e6.
+    /// The reference is table 9.5 of Abramowitz and Stegun, to more digits. The zero of J0' at 0 does not belong to a
+    /// mode. The tolerance covers the rounding error of the largest eigenvalue, about 1e6.
     #[test]
     fn wave_numbers_of_the_circle_equal_those_of_the_tables() {
         for (nu, known) in [

@@ -1,10 +1,10 @@
 //! Compares the third-order model with fully nonlinear potential flow in upright cylinders, whose frequencies over the
 //! amplitude (backbones) are in tests/backbones.csv.
 //!
-//! Each row has the frequency of a planar and of a rotary periodic wave at a slosh angle, divided by the frequency of small
-//! waves. They were computed by a variational method (Luke's principle, with 8 planar and 10 rotary truncations) with its
-//! error; a second method, which marches in time, agrees within 0.12 %. Columns are empty beyond the end of the
-//! computation. At h/R = 1 the planar branch is the one of large amplitudes, from 4 degrees.
+//! Each row has the frequencies of a planar and of a rotary periodic wave at a slosh angle, divided by the frequency of
+//! small waves. A variational method (Luke's principle, with 8 planar and 10 rotary truncations) computed them, and its
+//! error is given, too; a second method, which marches in time, agrees within 0.12 %. Columns are empty at angles that
+//! the method did not reach. At h/R = 1 the planar branch is the one of large amplitudes, which begins at 4 degrees.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -51,7 +51,7 @@ fn bob(of: &EnergyTerms, angle: f64) -> [f64; 2] {
                 + (kappa - 1.0) * q.powi(3) / 2.0
                 + 0.375 * kappa_2 * q.powi(5);
             let inertia = 1.0 + slope * slope + (s - 1.0) * q * q + s_2 * q.powi(4);
-            // height(a) - height(q) over a^2 - q^2
+            // (height(a) - height(q))/(a^2 - q^2)
             let rise = 1.0 / ((1.0 - q * q).sqrt() + (1.0 - a * a).sqrt())
                 + (kappa - 1.0) * (a * a + q * q) / 8.0
                 + kappa_2 * (a.powi(4) + a * a * q * q + q.powi(4)) / 16.0;
@@ -76,9 +76,9 @@ fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f6
     None
 }
 
-/// Finds where the frequency of the model with the computed coefficients leaves the frequencies of fully nonlinear
-/// potential flow, and compares these angles with the stated limits. For rotary motion the model holds to larger angles,
-/// except where its branch folds.
+/// The stated limit of a model is the slosh angle at which its frequency begins to differ from fully nonlinear
+/// potential flow. The test finds this angle from the frequencies. In rotary motion the model is valid up to larger
+/// angles, except where a secondary resonance folds its branch.
 #[test]
 fn angle_limits_are_where_the_model_s_frequency_leaves_nonlinear_potential_flow() {
     for (fill, rows) in backbones() {
@@ -92,7 +92,7 @@ fn angle_limits_are_where_the_model_s_frequency_leaves_nonlinear_potential_flow(
         let fold = limits::swirl_fold(fill).map_or(f64::INFINITY, f64::to_degrees);
         let rotary = end(&rows, 1, &third, limits::FREQUENCY).unwrap_or(f64::INFINITY);
         assert!(rotary > limit.min(fold) - 0.5, "h/R {fill}: {limit} {fold} {rotary}");
-        // A forced response is wrong before.
+        // A forced response becomes wrong at a smaller angle.
         let found = end(&rows, 0, &third, limits::FORCED);
         assert!(
             found.is_none_or(|found| known.forced.to_degrees() < found),
@@ -154,8 +154,8 @@ fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     }
 }
 
-/// In tanks other than cylinders the limit is a share of the angle at which the series breaks down. The test shows that
-/// this estimate is conservative in cylinders of every depth, whose limits are known.
+/// In tanks other than cylinders the limit is a share of the angle at which the series breaks down. In cylinders of
+/// every depth, whose true limits are known, this estimate must be smaller than the true limit.
 #[test]
 fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
     let mut smallest = f64::INFINITY;
@@ -176,6 +176,6 @@ fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
         smallest = smallest.min(ends / domed.angle_limit);
         println!("{fill} {:.3}", ends / domed.angle_limit);
     }
-    // The share is that of a sphere, 0.12; the smallest share of cylinders is 0.17.
+    // The share that is used, 0.12, is that of a sphere; the smallest share of cylinders is 0.17.
     assert!((1.0..1.5).contains(&smallest), "{smallest}");
 }

@@ -1,4 +1,5 @@
-//! Damping over the fill and over the shape of a tank: no steps, and one rule on both sides of each transition.
+//! Damping as a function of the fill and of the shape of a tank has no steps, and follows one rule on both
+//! sides of each transition.
 
 use crate::common::tank;
 use formulas::damping;
@@ -6,8 +7,8 @@ use hubslosh_tank::Tank;
 use hubslosh_tank::modal::Damping;
 use hubslosh_tank::parameters::{Liquid, tank_damping};
 
-/// Kinematic viscosity, m2/s, and specific force, m/s2, at which the tanks below are within the
-/// range of the sphere's correlation.
+/// Kinematic viscosity, m2/s, and specific force, m/s2, at which most tanks below are within the range of the
+/// correlation for spheres.
 const SLOW: [f64; 2] = [1e-6, 0.3];
 
 fn at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
@@ -20,9 +21,9 @@ fn of(shape: &str) -> Tank {
     tank(&format!("density = 1000.0\n{shape}"))
 }
 
-/// Name, tank, and liquid of the tests. A cone, a sphere and a torus have one correlation at every
-/// fill, a box has none, a cylinder two. The walls of capsule, cylinder with a dome, cone with a
-/// cylinder and dish are a measured shape up to a tangent or a corner.
+/// Name, tank, and liquid (viscosity, specific force) of the tests. Cone, sphere and torus have one correlation at
+/// every fill, the box has none, and the cylinder has two. The walls of capsule, cylinder with a dome, cone with a
+/// cylinder, and dish are a measured shape up to a tangent point or a corner.
 const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ("sphere", "shape = { sphere = { radius = 0.3 } }", SLOW),
     (
@@ -51,8 +52,9 @@ const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ),
 ];
 
-/// Returns the largest relative changes between neighbours of `count` + 1 fills, 0.1 % of the tank's height apart. The
-/// jumps are of the damping ratio, and of ratio and interval divided by the laminar layer's, which has a slope of its own.
+/// Returns the largest relative changes between neighbours of `count` + 1 fills that are 0.1 % of the tank's height
+/// apart: of the damping ratio; and, divided by the damping of the laminar layer, which changes with the fill by
+/// itself, of the damping ratio and of both ends of the interval.
 fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64; 4] {
     let depth = tank.depth().unwrap_or(1.0);
     let numbers = |i: usize| {
@@ -73,7 +75,8 @@ fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn the_damping_ratio_has_no_step_at_500_fills() {
-    // At a corner of the wall the layer itself is steep: 3 % at that of the cone with a cylinder.
+    // At a corner of the wall the laminar layer itself changes by 3 % from fill to fill, for example in the
+    // cone with a cylinder.
     for (name, shape, liquid) in &TANKS[..7] {
         let tank = of(shape);
         let from = 0.25 * tank.depth().unwrap_or(1.0);
@@ -82,8 +85,9 @@ fn the_damping_ratio_has_no_step_at_500_fills() {
     }
 }
 
-/// Covers each place where a wall leaves a shape: tangents, shoulder, corner, knuckle. Covers the ends of the ranges of
-/// sphere, cylinder and torus, and the torus where its correlation falls below the laminar layer.
+/// Covers each place where a wall stops being a measured shape: tangent point, shoulder, corner, knuckle. Also
+/// covers the ends of the measured ranges of sphere, cylinder and torus, and the torus where its correlation falls
+/// below the laminar layer.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn damping_has_no_step_where_a_wall_leaves_a_shape() {
@@ -111,18 +115,18 @@ fn damping_has_no_step_where_a_wall_leaves_a_shape() {
 
 /// Covers fills at the tangent of a capsule, where the dome meets the cylinder, and fills within the cylinder.
 #[test]
-fn a_capsule_keeps_the_factor_of_its_dome_on_the_dome_s_share() {
+fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
     let (_, shape, liquid) = TANKS[1];
     let tank = of(shape);
     let ratio = |fill: f64| {
         let mode = at(&tank, fill, liquid).modes[0];
         mode.zeta / mode.laminar
     };
-    // 3.16 layers at the tangent, and no fall to 1.45 there
+    // 3.16 layers at the tangent point, without a fall to 1.45 layers there
     assert!((ratio(0.3001) / ratio(0.3) - 1.0).abs() < 2e-3);
     let full = at(&tank, 0.7, liquid);
     let [part] = &full.parts[..] else { panic!("{full:?}") };
-    // the dome of 0.3 m of a wetted height of 0.7 m, and the lowest part of the cylinder
+    // The dome is 0.3 m of a wetted height of 0.7 m; the lowest part of the cylinder counts as sphere in part.
     assert!(part.shape == "sphere" && (3.0 / 7.0..0.52).contains(&part.share), "{part:?}");
     let mean = 1.45 + part.share * (part.factor - 1.45);
     assert!((full.modes[0].zeta / full.modes[0].laminar / mean - 1.0).abs() < 1e-12);
@@ -135,7 +139,7 @@ fn a_capsule_keeps_the_factor_of_its_dome_on_the_dome_s_share() {
 /// The damping of a wall that is partly a measured shape lies between the correlation of the shape and 1.45 times the
 /// laminar layer, and the interval contains both.
 #[test]
-fn a_mixture_lies_between_its_correlations_and_its_interval_holds_them() {
+fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains_them() {
     let walls = [
         ("capsule", [0.32, 0.5, 0.9]),
         ("dish", [0.07, 0.2, 0.4]),
@@ -158,12 +162,12 @@ fn a_mixture_lies_between_its_correlations_and_its_interval_holds_them() {
     }
 }
 
-/// Spheroids and capsules that pass through the sphere: near it the ratio changes with the shape as a smooth function
-/// does, far from the sphere the shape is quite different. At 0.8 of the height the sphere has ten layers, which the
-/// interval of a spheroid a few per cent off holds.
+/// Spheroids and capsules whose dimensions pass through those of a sphere. Near the sphere the ratio is a smooth
+/// function of the dimensions; far from the sphere the shape is quite different. At 0.8 of the height the sphere has
+/// ten laminar layers, and the interval of a spheroid that differs by a few per cent contains this value.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
-fn near_a_sphere_every_shape_has_its_damping() {
+fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
     let solved = |e: f64| {
         let height = 0.3 * (1.0 + e);
         let tank =
@@ -184,7 +188,7 @@ fn near_a_sphere_every_shape_has_its_damping() {
             assert!((zeta / sphere - 1.0).abs() < 1e-5 + 10.0 * e, "{e:e}: {zeta} {sphere}");
         }
     }
-    // 0.5 % of the axis apart, through the whole transition
+    // 0.5 % of the axis apart, from one end of the transition to the other
     let all: Vec<f64> = (-6..=6).map(|i| spheroid(5e-3 * f64::from(i))).collect();
     for pair in all.windows(2) {
         assert!((pair[1] / pair[0]).ln().abs() < 0.5, "{all:?}");
@@ -198,8 +202,8 @@ fn near_a_sphere_every_shape_has_its_damping() {
     }
 }
 
-/// The wall of these tanks is one measured shape at every fill, so that the damping ratio equals the published formula to
-/// the last digit but one.
+/// The wall of these tanks is one measured shape at every fill, so that the damping ratio equals the published formula,
+/// but for the last digit.
 #[test]
 fn a_wall_that_is_one_shape_has_its_published_correlation() {
     let close = |found: f64, expected: f64| {

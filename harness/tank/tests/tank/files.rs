@@ -26,7 +26,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 0.5, 1] }, { line = [0.5, 1, 0.5, -0.5] }]",
             "crosses itself near (0.5",
         ),
-        // its first line and its last one; a corner on a line, at its height or at its radius
+        // crossings of the first line and the last line, and of a line by a corner at its height or at its radius
         (
             "profile = [{ line = [0.5, 1, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 0.4, 0.5] }]",
             "crosses itself near (0.500000, 0.583333) m (segments 1 and 4)",
@@ -47,7 +47,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
             "profile = [{ line = [0, 0.5, 0.5, 0.5] }, { line = [0.5, 0.5, 0.6, 0] }, { line = [0.6, 0, 1, 0] }, { line = [1, 0, 0.3, 0.5] }, { line = [0.3, 0.5, 1, 0.9] }]",
             "crosses itself",
         ),
-        // back on itself, exactly or but for a billionth of a radian
+        // a line that folds back on the previous one, exactly or but for a billionth of a radian
         (
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 1, 0.5] }]",
             "crosses itself near (1.000000, 1.000000) m (segments 2 and 3)",
@@ -71,7 +71,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
         ("profile = [{ arc = [0, 1, -1, -90, 0] }]", "radii -1 and -1 m must be above 0"),
         ("profile = [{ ellipse = [0, 1, 1, 0, -90, 0] }]", "radii 1 and 0 m must be above 0"),
         ("profile = [{ ellipse = [0, 1, 0, 1, -90, 0] }]", "radii 0 and 1 m must be above 0"),
-        // 110 m high, and 1 m wide
+        // This tank is 110 m high and 1 m wide.
         (
             "profile = [{ line = [0, -60, 1, -60] }, { line = [1, -60, 1, 50] }]",
             "is 110.000000 m large",
@@ -137,13 +137,13 @@ fn every_impossible_fill_has_a_clear_message() {
         ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", -1.0, "must be above 0"),
         ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", f64::NAN, "fill is NaN"),
         ("shape = { sphere = { radius = 1.0 } }", 2.1, "above the top of the tank, 2.000000 m"),
-        // a shoulder at 0.5
+        // a horizontal part of the wall at 0.5 m
         (
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 0.5] }, { line = [1, 0.5, 2, 0.5] }, { line = [2, 0.5, 2, 1] }]",
             0.5,
             "horizontal part",
         ),
-        // walls that are level at the free surface: an inner one, an outer one, and the top of a dome
+        // walls that are horizontal at the free surface: an inner wall, an outer wall, and the top of a dome
         (
             "profile = [{ arc = [0.5, 0, 0.3, 90, 0] }, { line = [0.8, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
             0.3,
@@ -159,7 +159,7 @@ fn every_impossible_fill_has_a_clear_message() {
             0.3,
             "horizontal part",
         ),
-        // and a little below
+        // free surfaces a little below them
         (
             "profile = [{ arc = [0.5, 0, 0.3, 90, 0] }, { line = [0.8, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
             0.295,
@@ -171,13 +171,13 @@ fn every_impossible_fill_has_a_clear_message() {
             0.295,
             "",
         ),
-        // a ring-shaped sump around a dome, and a second one outside
+        // a ring-shaped sump around a dome, and a second sump outside it
         (
             "profile = [{ line = [0, 0, 1, 1] }, { line = [1, 1, 2, 0] }, { line = [2, 0, 3, 2] }]",
             0.5,
             "separate pools",
         ),
-        // an inner wall that begins under the surface
+        // an inner wall that begins below the free surface
         (
             "profile = [{ line = [0.5, 0.2, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
             0.15,
@@ -222,7 +222,7 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
             );
             Tank::parse(&text, Path::new(""))
         };
-        // a contact line within 1e-9 of a joint is at the joint
+        // A contact line within 1e-9 of a joint is moved to the joint.
         let text = format!(
             "density = 1.0\nprofile = [{{ line = [0, 0, {c}, 0] }}, {{ line = [{c}, 0, {c}, {}] }}, {{ line = [{c}, {}, {c}, {c}] }}]",
             0.5 * c,
@@ -232,7 +232,7 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
         let surface = |off: f64| contour.cut(c * (0.5 + off)).unwrap().z_surface;
         assert_eq!([-0.9e-9, 0.9e-9].map(surface), [0.5 * c; 2]);
         assert!([-1.1e-9, 1.1e-9].iter().all(|off| surface(*off) != 0.5 * c), "{c}");
-        // over the size, 2
+        // relative to the size of 2 m
         assert!(parsed(1.9e-6).is_ok());
         assert!(parsed(2.1e-6).unwrap_err().to_string().contains("open"), "{c}");
         let Geometry::Revolution { contour, .. } = parsed(0.0).unwrap().geometry else { panic!() };
@@ -283,9 +283,9 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
         "shape = { sphere = { radius = 1.0 } }",
         "shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }",
         "shape = { annulus = { inner_radius = 0.3, outer_radius = 1.0, height = 2.0 } }",
-        // a dome that bulges into the tank, so that the contour starts above its lowest point
+        // a dome that bulges into the tank, so that the contour starts above the tank's lowest point
         "profile = [{ arc = [0, -1.05, 1.45, 90, 46.39718102729638] }, { line = [1, 0, 1, 2] }, { ellipse = [0, 2, 1, 0.6, 0, 90] }]",
-        // a shoulder at half its depth, where the first bisection falls
+        // a horizontal part of the wall at half the depth, where the first bisection step falls
         "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 0.5] }, { line = [1, 0.5, 2, 0.5] }, { line = [2, 0.5, 2, 1] }]",
     ];
     for text in tanks {
@@ -320,8 +320,8 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     assert!("1.2 m".parse::<Fill>().unwrap_err().to_string().contains("neither a height in m"));
 }
 
-/// Heights of a shape count from its lowest point, of a contour from the zero of its drawing. The test compares the
-/// same tank in both forms, in table, JSON and file.
+/// Heights of a shape count from its lowest point, heights of a contour from the zero of its drawing. The test compares
+/// one tank in both forms, in the table, the JSON and the parameter file.
 #[test]
 fn table_and_file_state_the_zero_of_heights() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
@@ -343,7 +343,7 @@ fn table_and_file_state_the_zero_of_heights() {
     }
 }
 
-/// The whole tank is drawn once and cut at any fill; it equals the contour drawn to that fill.
+/// A tank that is drawn completely and cut at a fill equals the contour drawn up to that fill.
 #[test]
 fn the_wetted_contour_ends_at_the_fill() {
     let whole = solve("shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }", 0.5, 3);
@@ -397,15 +397,15 @@ fn built_in_shapes_have_the_volumes_of_textbooks() {
         let data = solve(&format!("shape = {{ {shape} }}"), fill, 2);
         assert!((data.m_liq / (1000.0 * volume) - 1.0).abs() < 1e-12, "{shape}");
     }
-    // heads as in the reference: crown 2, knuckle 0.2
+    // heads as in the reference: crown radius 2, knuckle radius 0.2
     let heads = "shape = { torispherical = { radius = 1.0, height = 1.0, crown_radius = 2.0, knuckle_radius = 0.2 } }";
     let bottom = tank(&format!("density = 1.0\n{heads}"));
     assert!((bottom.depth().unwrap() - 1.0 - 2.0 * 0.387_548_450_340_290_2).abs() < 1e-12);
     assert!(bottom.solve(1.5, 2).is_ok());
 }
 
-/// Points are joined by straight lines. With `spline` a curve through the same points is far closer
-/// to the original: for 25 points of a half circle the chord error is 2e-3, the spline error 1e-6.
+/// Points are joined by straight lines. With `spline` a curve through the points is far closer to the original: for 25
+/// points of a half circle the error of the lines is 2e-3, the error of the spline 1e-6.
 #[test]
 fn points_are_straight_lines_or_a_spline() {
     let folder = tempfile::tempdir().unwrap();
@@ -428,7 +428,7 @@ fn points_are_straight_lines_or_a_spline() {
     let exact = 1.560_157_174;
     assert!((lines.modes[0].lambda - exact).abs() > 1e-3);
     assert!((spline.modes[0].lambda - exact).abs() < 1e-5, "{}", spline.modes[0].lambda);
-    // a curve measured at very many points is thinned out, straight lines through them are refused
+    // Very many points are thinned out for a spline, but refused for straight lines.
     let many: String = (0..=2000)
         .map(|i| core::f64::consts::PI * (i as f64 / 2000.0 - 0.5))
         .map(|a| format!("{:.12},{:.12}\n", a.cos().max(0.0), 1.0 + a.sin()))
@@ -440,12 +440,12 @@ fn points_are_straight_lines_or_a_spline() {
     let tank = Tank::parse(&format!("{text}\nspline = true"), folder.path()).unwrap();
     let lambda = tank.solve(1.0, 2).unwrap().modes[0].lambda;
     assert!((lambda - exact).abs() < 1e-7, "{lambda}");
-    // two points are a cone
+    // Two points make a cone.
     std::fs::write(folder.path().join("two.csv"), "0,0\n1,2\n").unwrap();
     let cone = Tank::parse("density = 1.0\npoints = 'two.csv'", folder.path()).unwrap();
     let mass = cone.solve(1.0, 1).unwrap().m_liq;
     assert!((mass / (core::f64::consts::PI / 12.0) - 1.0).abs() < 1e-12, "{mass}");
-    // a file with a bad line names it
+    // The message of a file with a bad line names the line.
     std::fs::write(folder.path().join("bad.csv"), "0,0\n1,zero\n1,1,1\n").unwrap();
     let said =
         Tank::parse("density = 1.0\npoints = 'bad.csv'", folder.path()).unwrap_err().to_string();
@@ -456,8 +456,8 @@ fn points_are_straight_lines_or_a_spline() {
     assert!(said.contains("1 point(s); a contour needs at least two"), "{said}");
 }
 
-/// A drawing in millimetres, y downwards: hemispherical bottom as an arc, wall, top dome as two curves
-/// (a quarter circle by a cubic to 3e-4), closed along the axis. Absolute and relative commands.
+/// A drawing in millimetres with y downwards: a hemispherical bottom as an arc, a wall, a top dome as two curves (a
+/// quarter circle as a cubic is accurate to 3e-4), closed along the axis. The path has absolute and relative commands.
 #[test]
 fn a_contour_is_read_from_an_svg_drawing() {
     let folder = tempfile::tempdir().unwrap();
@@ -488,16 +488,16 @@ fn a_contour_is_read_from_an_svg_drawing() {
         }
         assert!((tank.solve(1.8, 1).unwrap().modes[0].lambda / 5.445_194 - 1.0).abs() < 2e-3);
     }
-    // a parabola is a quadratic curve: z = r^2 from the axis to 1, pi/2 m3 of a paraboloid
+    // A parabola is a quadratic curve: z = r^2 from the axis to r = 1 encloses pi/2 m3.
     for path in ["M 0 1 Q 0.5 1 1 0", "m 0 3 q 0.5 0 1 -1"] {
         let data = read(path, 1.0).unwrap().solve(1.0, 1).unwrap();
         let volume = data.m_liq / 1000.0;
         assert!((volume / core::f64::consts::FRAC_PI_2 - 1.0).abs() < 1e-12, "{path}: {volume}");
-        // and its centre at two thirds of the height
+        // The centre of mass of this paraboloid is at two thirds of its height.
         let center = data.z_cg - data.z_lowest;
         assert!((center - 2.0 / 3.0).abs() < 1e-12, "{path}: {center}");
     }
-    // arcs the long way round and the other sense: a whole sphere's section
+    // arcs the long way round and in the other sense: the section of a whole sphere
     let sphere = read("M 0 2 A 1 1 0 0 0 1 1 A 1 1 0 0 0 0 0", 1.0).unwrap();
     assert!((sphere.solve(1.0, 1).unwrap().modes[0].lambda - 1.560_157_174).abs() < 1e-8);
     let whole = read("M 0 2 A 1 1 0 1 0 0 0", 1.0).unwrap();
@@ -549,7 +549,7 @@ fn a_contour_has_at_most_200_segments() {
 }
 
 #[test]
-fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
+fn a_result_states_if_the_tank_is_a_body_of_revolution_or_a_box() {
     for (text, kind) in [
         ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", "revolution"),
         ("profile = [{ arc = [0, 0, 1, -90, 90] }]", "revolution"),
@@ -563,8 +563,7 @@ fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     }
 }
 
-/// The printed table of a box of 0.8 m by 0.5 m, which has modes along both lengths, is tested:
-/// each number stands below its heading.
+/// The printed table of a box of 0.8 m by 0.5 m, which has modes along both sides: each number stands below its heading.
 #[test]
 fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
@@ -591,14 +590,14 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
         let [low, high] = mode.interval;
         let expected = [n, mode.omega / core::f64::consts::TAU, mode.zeta, low, high, mode.laminar];
         for (found, expected) in row.iter().zip(expected) {
-            // three digits of an interval
+            // The interval is printed with three digits.
             assert!((found / expected - 1.0).abs() < 5e-3, "{row:?} {expected}");
         }
     }
     assert_eq!(rows.matches("n along y").count(), 1, "{rows}");
 }
 
-/// Sets each dimension alone to its limit, which is not allowed, and to a value slightly above, which is.
+/// Sets each dimension, one at a time, to its limit, which is refused, and to a value slightly above it, which is accepted.
 #[test]
 fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
     let dome = |bottom: f64, top: f64| {
@@ -668,7 +667,7 @@ fn modes_are_numbered_from_1() {
         }
         let rest: Vec<_> = data.rest.iter().map(|rest| rest.modes).collect();
         assert_eq!(rest, [1, 2, 3], "{text}");
-        // a wave at an inner wall where there is one
+        // An inner wall has a wave, too.
         let inner = data.modes.iter().all(|mode| mode.wave_inner.is_some());
         let none = data.modes.iter().all(|mode| mode.wave_inner.is_none());
         assert_eq!((inner, none), (text.contains("annulus"), !text.contains("annulus")), "{text}");
@@ -709,8 +708,8 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
     assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
 }
 
-/// A result for which damping was computed gives the same parameter file as a result without, because the file computes the
-/// damping for its own liquid.
+/// Writes a parameter file from a result with damping and from one without. Both files are equal, because the file
+/// computes the damping for its own liquid.
 #[test]
 fn parameters_belong_to_the_liquid_and_not_to_the_result() {
     let text = "density = 875.0\n\
@@ -744,7 +743,7 @@ fn parameters_belong_to_the_liquid_and_not_to_the_result() {
 /// The mass of a fill, computed without the modes, is bit-identical to the mass in the solution with modes, at every fill
 /// and in a full tank.
 #[test]
-fn the_mass_equals_that_of_the_solution() {
+fn the_mass_without_modes_equals_the_mass_of_the_solution_with_modes() {
     for text in [
         "shape = { sphere = { radius = 0.4 } }",
         "shape = { cylinder = { radius = 0.4, height = 0.8 } }",

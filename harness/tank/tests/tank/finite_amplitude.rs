@@ -32,7 +32,7 @@ fn refused(text: &str, fill: f64, why: &str) {
 
 /// Compares with fully nonlinear potential flow in the bench's tank of radius 81.5 mm, with 10 and 5 cm of liquid. Each
 /// pair is a slosh angle in degrees and the frequency divided by the frequency of small waves. The potential flow was
-/// computed without an expansion in the steepness; at 8 degrees the fifth order adds 3e-4.
+/// computed without expansion in the steepness; at 8 degrees terms of the fifth order contribute 3e-4.
 #[test]
 fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     for (fill, planar, circular) in [
@@ -56,7 +56,7 @@ fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
 /// Computes the same tank as a shape, as a profile, and with a bottom that is almost but not exactly flat, which the method
 /// for arbitrary contours solves.
 #[test]
-fn both_methods_agree_within_their_errors() {
+fn the_methods_for_flat_bottoms_and_for_any_contour_agree_within_their_errors() {
     for fill in [0.5, 1.3, 2.5] {
         let shape = known("shape = { cylinder = { radius = 1.0, height = 3.0 } }", fill);
         let profile = known("profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 3] }]", fill);
@@ -90,12 +90,12 @@ fn coefficients_depend_only_on_the_shape() {
         assert!((scale * sphere.wave_second - other.wave_second).abs() < 1e-6 * scale);
     }
     assert!((sphere.angle_limit - small.angle_limit).abs() < 1e-6, "{small:?}");
-    // Large waves in the capsule leave its sphere, so that its limit is an estimate.
+    // The capsule is not a sphere above its joint, where large waves reach, so that its limit is an estimate.
     assert!(capsule.angle_limit < sphere.angle_limit, "{capsule:?}");
 }
 
-/// Refuses a ring with inclined walls, a nearly full sphere (in which the error is large), and depths with secondary
-/// resonances.
+/// Coefficients are left out for a ring with inclined walls, a nearly full sphere (where their error is large), and
+/// depths with secondary resonances.
 #[test]
 fn unknown_coefficients_are_refused_with_a_reason() {
     refused("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3, "ring of liquid");
@@ -108,9 +108,9 @@ fn unknown_coefficients_are_refused_with_a_reason() {
     );
 }
 
-/// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa instead of the values of a
-/// pendulum, and limits are stated at every depth: also at h/R = 0.5 and 0.4, where the series breaks down only at 22
-/// degrees, in shallow liquid, and for the fold of rotary motion.
+/// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa, not those of a
+/// pendulum. Limits are stated at every depth: also at h/R = 0.5 and 0.4, where the series is valid up to 22 degrees,
+/// and in shallow liquid. The fold of rotary motion is stated, too.
 #[test]
 fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     let at = |fill: f64| known("shape = { cylinder = { radius = 1.0, height = 4.0 } }", fill);
@@ -138,8 +138,9 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
 }
 
-/// In a sphere both models end where forced waves of potential flow were found to differ by 3 %. Beyond the table the limit is
-/// an estimate, at h/R = 1.5 smaller than the 2.6 degrees at which a forced wave of the third order differs by 3 %.
+/// In a sphere both models end at the angle at which their response differs by 3 % from forced waves of potential flow.
+/// Beyond the table the limit is an estimate; at h/R = 1.5 it is smaller than the 2.6 degrees at which a forced wave of
+/// the third-order model differs by 3 %.
 #[test]
 fn limits_of_a_sphere_follow_from_its_forced_waves() {
     let at = |fill: f64| known("shape = { sphere = { radius = 1.0 } }", fill);
@@ -160,7 +161,8 @@ fn limits_of_a_sphere_follow_from_its_forced_waves() {
     assert!(deep.angle_limit.to_degrees() < 2.62, "{deep:?}");
 }
 
-/// The test of the FMU with forced waves has the coefficients and limits of each tank as `hubslosh tank` writes them.
+/// The FMU's test with forced waves reads coefficients and limits from a file, which must be those that `hubslosh tank`
+/// writes.
 #[test]
 fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
     let rows = include_str!("../../../../fmu/craft/tests/craft/forced_waves.csv").lines().skip(1);
@@ -241,8 +243,8 @@ fn angle_limit(text: &str, share: f64, liquid: Liquid) -> (f64, bool) {
     (limit.to_degrees(), !third_order_of(&set).is_empty())
 }
 
-/// The range of mode 1 never ends at the FMU's 45 degrees because nothing is known: tanks without coefficients have the angle
-/// at which a pendulum differs from the liquid.
+/// Mode 1 never has the FMU's default limit of 45 degrees just because no limit is known: for a tank without
+/// coefficients the limit is the angle at which a pendulum differs from the liquid.
 #[test]
 fn files_have_an_angle_limit_for_every_shape_and_fill() {
     let mut pendulums = 0;
@@ -252,7 +254,7 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
         "shape = { domed_cylinder = { radius = 1.0, height = 0.5, bottom = 0.7, top = 0.7 } }",
         "shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }",
         "shape = { annulus = { inner_radius = 0.4, outer_radius = 1.0, height = 2.0 } }",
-        // of 0.6 m height
+        // a box filled to 0.6 m
         "box = [0.8, 0.8]",
     ] {
         for i in 1..20 {
@@ -272,8 +274,8 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
     assert!(limit < 6.3 && !has_coefficients, "{limit}");
 }
 
-/// In spheres between h/R 1.1 and 1.25 the third-order theory has poles. There the frequency of the liquid changes with the
-/// amplitude more strongly than on both sides of the poles, so that the range of a pendulum is smaller.
+/// In spheres between h/R 1.1 and 1.25 the third-order theory has poles. There the frequency of the liquid changes more
+/// strongly with the amplitude than at other fills, so that the range of a pendulum is smaller.
 #[test]
 fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
     let at = |fill: f64| found("shape = { sphere = { radius = 1.0 } }", fill);
@@ -305,7 +307,7 @@ fn files_have_the_energy_terms_where_they_are_known() {
         set.values.iter().filter_map(number).collect()
     };
     for (fill, target, prefix, count) in [
-        // the series ends below 5 degrees
+        // The third-order series is valid only below 5 degrees.
         (0.024, Target::SloshTank, "tank", 0),
         (0.025, Target::SloshTank, "tank", 6),
         (0.05, Target::Spacecraft { tank: 2 }, "tank[2]", 6),
@@ -409,7 +411,7 @@ fn large_waves_are_refused_for_a_box_and_a_ring_with_a_reason() {
 /// If no surface tension is given, a tank whose Bond number may be below 100 gets a warning. With 1000 kg/m3,
 /// R = 0.1 m and the largest expected sigma/rho of 7.3e-5 m3/s2 this is the case below 0.73 m/s2.
 #[test]
-fn a_missing_surface_tension_is_warned_of_where_it_matters() {
+fn a_missing_surface_tension_gives_a_warning_at_low_bond_numbers() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.1 } }");
     let data = tank.solve(0.1, 1).unwrap();
     for (gravity, sigma, expected) in
@@ -430,7 +432,7 @@ fn a_missing_surface_tension_is_warned_of_where_it_matters() {
         if let Value::Real(x) = found.1 { x } else { panic!("{found:?}") }
     };
     assert!((g_bond(None) / 0.73 - 1.0).abs() < 1e-3, "{}", g_bond(None));
-    // With sigma the FMU is out of range where the file would be refused.
+    // With sigma, the FMU is out of range at the gravity at which the file would be refused.
     for (factor, refused) in [(0.99, true), (1.01, false)] {
         let liquid = Liquid { gravity: factor * g_bond(Some(0.07)), sigma: Some(0.07), ..WATER };
         let set = ParameterSet::new(&tank, &data, Target::SloshTank, liquid).unwrap();
@@ -440,7 +442,7 @@ fn a_missing_surface_tension_is_warned_of_where_it_matters() {
 
 /// A rectangular box has the planar shifts of the frequency with s = 1; a square box also has circular motion.
 #[test]
-fn boxes_have_a_pair_for_each_length() {
+fn boxes_have_third_order_coefficients_for_each_length() {
     let long = found("box = [0.8, 0.5]", 0.4);
     let (x, y) = (long.mode.unwrap(), long.mode_y.unwrap());
     assert!((x.planar + 0.3155).abs() < 1e-4 && (y.planar + 0.3943).abs() < 1e-4, "{x:?} {y:?}");
@@ -525,10 +527,10 @@ fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     assert!(third_order_of(&set).is_empty());
 }
 
-/// For a torus, near a pole, in shallow liquid and with dominant surface tension the file has no coefficients, but gives
-/// the reason.
+/// For a torus, near a pole, in shallow liquid, and with dominant surface tension the file has no coefficients
+/// and gives the reason.
 #[test]
-fn files_without_coefficients_say_why() {
+fn files_without_coefficients_state_the_reason() {
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
     let low = Liquid { gravity: 0.01, sigma: Some(0.07), ..WATER };
     for (text, fill, liquid, why) in [
@@ -558,8 +560,8 @@ fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
     })
 }
 
-/// The file has s and kappa at each point of the fill table and states their errors in its notes; there is no single pair
-/// for all fills.
+/// The file has s and kappa at each point of the fill table, with their errors in its notes, and no pair that is
+/// used for all fills.
 #[test]
 fn a_draining_tank_has_the_coefficients_of_every_fill() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -580,8 +582,7 @@ fn a_draining_tank_has_the_coefficients_of_every_fill() {
 }
 
 /// In the sphere the third order has poles from 0.556 to 0.63 m, and the coefficients are not known above 0.85 m. Between
-/// known fills the values stay between the values of the neighbouring fills; above the last known fill they keep the value
-/// there.
+/// known fills the values of the table stay between the neighbouring values; above the last known fill they keep its value.
 #[test]
 fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -630,13 +631,13 @@ fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     }
 }
 
-/// The stated errors of a table whose points the command has placed equal the errors at further fills between these points.
+/// The errors of a placed table that its notes state equal the errors at further fills between its points.
 #[test]
 fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
     compare_placed_tables(&[("cylinder = { radius = 0.5, height = 1.5 }", 0.7, 1.4)]);
 }
 
-/// Does the same for shapes whose modes are computed, not known in closed form.
+/// The same for shapes whose modes are computed by the boundary integral equation, not in closed form.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn a_placed_table_of_a_cone_and_of_a_sphere_states_the_error_of_the_coefficients() {
@@ -670,7 +671,7 @@ fn compare_placed_tables(tanks: &[(&str, f64, f64)]) {
         let stated: f64 =
             note.split(" within ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         println!("{shape}: {worst:.1e}, stated {stated:.1e}");
-        // The largest error lies between the middles.
+        // The largest error may lie beside the middle of an interval, where the table measures it.
         assert!(worst < 3.0 * stated + 1e-6 && stated < 0.01, "{shape}: {worst:e} {stated:e}");
     }
 }

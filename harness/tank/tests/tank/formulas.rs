@@ -11,9 +11,8 @@ fn laminar(mode: &Mode, nu: f64, g: f64) -> f64 {
     damping::laminar(mode.beta, nu, (g * mode.lambda).sqrt())
 }
 
-/// Stephens's formula gives 1.493 times the damping of the laminar layer at every depth; its factor
-/// tanh(1.84 x)^(-1/4) comes from the layer's omega. The rounded 1.84 in place of 1.8412 makes 0.2
-/// %.
+/// Stephens's formula gives 1.493 times the damping of the laminar layer at every depth; its factor tanh(1.84 x)^(-1/4)
+/// comes from the frequency in the layer's damping. The rounded 1.84 instead of 1.8412 makes a difference of 0.2 %.
 #[test]
 fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     for fill in [0.02, 0.05, 0.0815, 0.15, 0.25] {
@@ -26,7 +25,7 @@ fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
 /// The damping ratio by Mikishev and Dorozhkin's formula is 1.39 to 1.54 times the damping ratio of the laminar layer from
 /// h/R = 0.5 on, but only 0.90 times at h/R = 0.2.
 #[test]
-fn mikishev_dorozhkin_leaves_its_range_in_shallow_liquid() {
+fn mikishev_and_dorozhkin_s_formula_is_below_the_laminar_layer_in_shallow_liquid() {
     for (x, least, most) in
         [0.5, 1.0, 2.0, 3.0].map(|x| (x, 1.38, 1.55)).into_iter().chain([(0.2, 0.89, 0.91)])
     {
@@ -59,8 +58,8 @@ fn damping_of_the_laminar_layer_in_cylinder_and_box_equals_published_values() {
     }
 }
 
-/// The two branches of the formula for spheres have the same value at half full. Up to there it is 2 to 4.5 times the
-/// laminar layer.
+/// The two branches of the formula for spheres have the same value in a half-full sphere. Up to this fill the formula
+/// gives 2 to 4.5 times the damping of the laminar layer.
 #[test]
 fn damping_of_a_sphere_is_continuous() {
     let zeta = |x: f64| damping::sphere(0.1, 0.1 * x, 1e-6, 9.81);
@@ -73,21 +72,21 @@ fn damping_of_a_sphere_is_continuous() {
 }
 
 #[test]
-fn cone_and_torus_have_their_values() {
+fn damping_of_cone_and_torus_equals_values_computed_by_hand() {
     // b = 30: C5 = 1.3817, C4 = 0.638; Re = 1e-6/sqrt(9.81 0.125) = 9.0305e-7
     let cone = damping::cone(0.5, 30.0, 1e-6, 9.81);
     let by_hand = 4.964 / core::f64::consts::TAU * 1.3817 / 0.638f64.sqrt() * 9.0305e-7f64.sqrt();
     assert!((cone / by_hand - 1.0).abs() < 1e-5);
-    // the measured tank itself, half full: y = 0.5 gives the fit alone
+    // the measured tank itself, half full: at y = 0.5 the formula is the fit without a correction
     let torus = damping::torus(0.0635, 0.0635, 3.3e-6, 9.81);
     let fit = 1.6629 / 16.0 - 3.7955 / 8.0 + 3.5583 / 4.0 - 1.6759 / 2.0 + 0.3865;
     assert!((torus * core::f64::consts::TAU / fit - 1.0).abs() < 1e-12);
 }
 
-/// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) holds exactly, and the integral over the contour gives the same.
-/// At g = 0 only the stiffness by surface tension remains.
+/// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) holds exactly, and the integral over a drawn contour gives
+/// the same result. At g = 0 only the stiffness by surface tension remains.
 #[test]
-fn flat_surface_is_exact_in_a_cylinder() {
+fn capillarity_of_a_flat_surface_is_exact_in_a_cylinder() {
     let (r, h) = (0.0815f64, 0.1);
     let solved = solve(
         &format!("profile = [{{ line = [0, 0, {r}, 0] }}, {{ line = [{r}, 0, {r}, {h}] }}]"),
@@ -110,7 +109,7 @@ fn flat_surface_is_exact_in_a_cylinder() {
             assert!(a.outside.is_empty());
         }
     }
-    // a leaning wall, and a bowl where the first order is not enough
+    // an inclined wall, and a bowl for which the first order in surface tension is not enough
     let sphere = solve("shape = { sphere = { radius = 1.0 } }", 0.5, 1);
     let fluid = Fluid { rho: 997.0, sigma: 0.072, g: 9.81 };
     assert_eq!(low_gravity::flat(&sphere.modes[0], fluid).outside.len(), 1);
@@ -156,8 +155,8 @@ fn real(set: &ParameterSet, name: &str) -> f64 {
     }
 }
 
-/// Checks omega_1^2 = g/l + k/m of the file for the FMU, as rho R^3 omega_1^2/sigma. Every value of the table must
-/// agree to its last digit; tanh(20 xi) is 1.
+/// Computes omega_1^2 = g/l + k/m from the file for the FMU, as rho R^3 omega_1^2/sigma. Every value of the table must
+/// agree to its last digit. The liquid is so deep that tanh(20 xi) is 1.
 #[test]
 fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     let sigma = 0.072;
@@ -176,9 +175,9 @@ fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     }
 }
 
-/// At 90 degrees the result is bit-identical to the flat surface. For Bo -> infinity it is xi^3 - 2 xi^2 cos(angle)
-/// over rho R^3/sigma (to 1e-9 at Bo = 1e12). Below about 23 degrees the file has 0 in its place and a warning. Without
-/// surface tension there is no stiffness.
+/// At 90 degrees the result is bit-identical to the flat surface. For Bo -> infinity the contribution to rho R^3
+/// omega^2/sigma is xi^3 - 2 xi^2 cos(angle) (to 1e-9 at Bo = 1e12). Below about 23 degrees it is negative, and the
+/// file has 0 instead and a warning. Without surface tension there is no stiffness.
 #[test]
 fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     let (xi, sigma) = (1.841_183_781_340_659_3f64, 0.072);
@@ -212,7 +211,7 @@ fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
 /// it rises steadily with the Bond number and with the angle, and for large Bond numbers the shift approaches its known
 /// limit.
 #[test]
-fn curved_meniscus_is_smooth_between_its_values() {
+fn the_frequency_with_a_curved_meniscus_is_smooth_between_the_values_of_the_table() {
     let xi = 1.841_183_781_340_659_3f64;
     for bond in [0.0, 0.5, 5.0, 70.0, 500.0] {
         let flat = xi * bond + xi.powi(3);
@@ -234,7 +233,7 @@ fn curved_meniscus_is_smooth_between_its_values() {
                 > low_gravity::cylinder_omega2(2.0, angle - 1.0)
         );
     }
-    // Straight on in the cosine beyond the last column, 5 degrees: an angle's sign does not matter, so at 0 nothing turns.
+    // Beyond the last column, 5 degrees, linear in the cosine: the frequency is symmetric in the angle.
     let cos = |angle: f64| f64::to_radians(angle).cos();
     for (bond, _) in MENISCUS {
         let [at_15, at_5, at_0] =
@@ -251,17 +250,17 @@ fn curved_meniscus_is_smooth_between_its_values() {
     }
     let mode = &solve(BENCH, 0.2, 1).modes[0];
     let fluid = Fluid { rho: 997.0, sigma: 0.072, g: 0.0 };
-    // Gravity and the spring together make the frequency, under any meniscus.
+    // Gravity and the spring together give the frequency, under any meniscus.
     for (angle, g) in [(90.0, 9.81), (60.0, 0.1), (30.0, 0.01), (5.0, 0.0)] {
         let found = low_gravity::cylinder(mode, 0.0815, 0.2, angle, Fluid { g, ..fluid });
         let together = g * mode.lambda + found.spring / mode.m;
         assert!((found.omega2 / together - 1.0).abs() < 1e-12, "{angle} {g}");
-        // and it is the deep cylinder's, rho R^3 omega^2/sigma of the Bond number, less tanh(xi h/R)
+        // In deep liquid, rho R^3 omega^2/sigma is that of the table at this Bond number; here it is reduced by tanh(xi h/R).
         let (r, bond) = (0.0815f64, 997.0 * g * 0.0815 * 0.0815 / 0.072);
         let deep = low_gravity::cylinder_omega2(bond, angle) * 0.072 / (997.0 * r.powi(3));
         assert!((found.omega2 / (deep * (xi * 0.2 / r).tanh()) - 1.0).abs() < 1e-12, "{angle} {g}");
     }
-    // What the meniscus changes goes down with the depth as tanh(xi h/R) does.
+    // The effect of the meniscus decreases with the depth as tanh(xi h/R).
     let [deep, shallow] = [0.5, 0.05].map(|fill| {
         let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", fill, 1).modes[0];
         let [curved, flat] = [30.0, 90.0]
@@ -326,7 +325,7 @@ fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
             "arc = [0.4, 0, 0.0635, -270, -80] }, { arc = [0.4, 0, 0.0635, -80, 90]".to_string(),
         ),
     ];
-    // In the range of the sphere's correlation, and far outside.
+    // specific forces inside the range of the sphere's correlation and far outside of it
     for (name, fill, shape, profile) in pairs {
         for (nu, gravity) in [(1e-6, 0.05), (1e-6, 9.81)] {
             let given = damped(&format!("shape = {{ {shape} }}"), fill, nu, gravity, None);
@@ -338,7 +337,7 @@ fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
             }
         }
     }
-    // A capsule filled above its lower hemisphere is no sphere.
+    // The wall of a capsule filled above its lower hemisphere is not a sphere.
     let capsule = "profile = [{ arc = [0, 0.5, 0.5, -90, 0] }, { line = [0.5, 0.5, 0.5, 0.502] }, { arc = [0, 0.502, 0.5, 0, 90] }]";
     let other = damped(capsule, 0.8, 1e-6, 0.05, None);
     assert_eq!((other.shape, other.correlation), ("other", None));
@@ -354,7 +353,8 @@ fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     for (mode, by_hand) in found.modes.iter().zip([2.98e-3, 1.06e-3, 0.56e-3]) {
         assert!((mode.zeta * 1.45 / 1.493 / by_hand - 1.0).abs() < 6e-3, "{}", mode.zeta);
     }
-    // The first one's correlation agrees with the layers: the scatter. The others' were not measured.
+    // For the first mode the correlation agrees with the layers, so that its interval is the scatter of measurements.
+    // Other modes were not measured.
     let [first, second] = [found.modes[0], found.modes[1]];
     assert!((first.interval[1] / first.interval[0] / (1.3 / 0.7) - 1.0).abs() < 1e-12);
     assert_eq!(second.interval[0], second.laminar);
@@ -373,7 +373,7 @@ fn a_cylinder_s_damping_names_its_source() {
     }
 }
 
-/// A tank outside the measurements of its shape's correlation says which, at the specific force of its frequency.
+/// A tank outside the measured ranges of its shape's correlation says which ranges it leaves, at the effective specific force.
 #[test]
 fn the_damping_ratio_of_a_tank_names_each_measured_range_that_the_tank_leaves() {
     let number = damping::sphere_number(0.5, 1e-6, 9.81);
@@ -423,7 +423,7 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
 /// Without gravity the frequency follows from surface tension only, and the damping stays finite. At a Bond number of 45
 /// the interval ends at the result of drop-tower tests.
 #[test]
-fn damping_follows_capillarity_where_gravity_vanishes() {
+fn damping_follows_from_capillarity_without_gravity() {
     let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
     let zeta = |g: f64| damped(shape, 0.6, 1e-6, g, Some(0.02)).modes[0].zeta;
     // omega^2 = sigma xi^3/(rho R^3) of a deep cylinder; Mikishev and Dorozhkin's 1.39 to 1.54 layers.
@@ -436,10 +436,10 @@ fn damping_follows_capillarity_where_gravity_vanishes() {
     assert!(low.modes[0].interval[1] > 1.8 * low.modes[0].zeta);
 }
 
-/// For a box of 0.8 m by 0.5 m the file names the length along which HubSlosh's modes move, and warns that rotary slosh
-/// also needs the modes along the other length.
+/// For a box of 0.8 m by 0.5 m the file states along which side HubSlosh's modes move, and warns that rotary slosh also
+/// needs the modes along the other side.
 #[test]
-fn a_box_with_two_lengths_says_along_which_its_modes_are() {
+fn the_file_of_a_box_states_along_which_side_its_modes_move() {
     let set = |lengths: &str| {
         let tank =
             Tank::parse(&format!("density = 1000.0\nbox = {lengths}"), Path::new("")).unwrap();
@@ -459,7 +459,7 @@ fn a_box_with_two_lengths_says_along_which_its_modes_are() {
     };
     assert!(two.values.contains(&("slosh.modes".into(), Value::Integer(2))), "one along each");
     assert_eq!(real("slosh.table.direction[2]"), std::f64::consts::FRAC_PI_2);
-    // m = 8 m_liq tanh(k h/a) a/(k^3 h), l = a/(k tanh(k h/a)) with k = pi, each with its own side: thesis 4.1.
+    // m = 8 m_liq tanh(k h/a) a/(k^3 h) and l = a/(k tanh(k h/a)) with k = pi, for each side a: section 4.1 of the thesis.
     for (n, a) in [(1, 0.8), (2, 0.5)] {
         let (k, h, m_liq) = (std::f64::consts::PI, 0.4, 1000.0 * 0.8 * 0.5 * 0.4);
         let tanh = (k * h / a).tanh();
@@ -472,7 +472,7 @@ fn a_box_with_two_lengths_says_along_which_its_modes_are() {
     assert!(square.iter().all(|(name, _)| !name.starts_with("slosh.table.direction")));
 }
 
-/// If the words on a correlation's damping name the other estimate, they state its number, to three digits at least.
+/// If the sentence on the damping names a second estimate, it states this estimate's value with at least three digits.
 #[test]
 fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
     let number = |taken: &str, before: &str| -> f64 {
@@ -496,7 +496,7 @@ fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
 /// The table of the curved meniscus holds for deep liquid. The warning appears if the surface is noticeably curved (low
 /// Bond number) and the liquid is less than a radius deep. Here Bo = 100 g.
 #[test]
-fn a_meniscus_warns_in_shallow_liquid_at_low_bond_numbers_and_outside_of_its_angles() {
+fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
     let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", 0.2, 1).modes[0];
     let outside = |fill: f64, angle: f64, g: f64| {
         let fluid = Fluid { rho: 1000.0, sigma: 0.1, g };
@@ -519,7 +519,7 @@ fn a_meniscus_warns_in_shallow_liquid_at_low_bond_numbers_and_outside_of_its_ang
         assert_eq!(omega2(angle), omega2(f64::from(taken)));
     }
     assert_eq!(outside(0.2, 30.0, -0.1), ["the Bond number -1.000e1 is below 0; 0 is taken"]);
-    // below 0 the meniscus is that without gravity
+    // For a negative specific force the meniscus is that of 0.
     let added = |g: f64| {
         let found = [30.0, 90.0].map(|angle| {
             low_gravity::cylinder(mode, 0.1, 0.2, angle, Fluid { rho: 1000.0, sigma: 0.1, g })
@@ -530,10 +530,10 @@ fn a_meniscus_warns_in_shallow_liquid_at_low_bond_numbers_and_outside_of_its_ang
     assert!((added(-0.1) / added(0.0) - 1.0).abs() < 1e-12);
 }
 
-/// The frequency is stated as unknown if surface tension changes it by more than a tenth of the effect of gravity, in a
-/// tank for which only a first-order formula exists: a half-full sphere with Bo = 1e4 g.
+/// The frequency counts as unknown if surface tension adds more than a tenth of the stiffness by gravity, in a tank for
+/// which only a first-order formula exists: a half-full sphere with Bo = 1e4 g.
 #[test]
-fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
+fn a_frequency_is_unknown_if_capillarity_adds_more_than_a_tenth_of_gravity() {
     let half = &solve("shape = { sphere = { radius = 1.0 } }", 1.0, 1).modes[0];
     let flat = |g: f64| low_gravity::flat(half, Fluid { rho: 1000.0, sigma: 0.1, g });
     let added = flat(1.0).omega2 - half.lambda;
@@ -548,9 +548,9 @@ fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
     );
 }
 
-/// In Spacecraft and SloshTank a box with two lengths has planar modes along both. Rigid liquid and slosh masses at rest
-/// together have the mass and the centre of the liquid, and about either axis its inertia under a lid, which is known in
-/// closed form.
+/// In Spacecraft and SloshTank a box with two lengths has planar modes along both sides. Rigid liquid and slosh masses
+/// at rest together have the mass and the centre of mass of the liquid, and about either axis the inertia of liquid
+/// under a lid, which is known in closed form.
 #[test]
 fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     let tank = Tank::parse("density = 1000.0\nbox = [0.8, 0.5]", Path::new("")).unwrap();
@@ -583,12 +583,12 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
         let sum = |of: fn(&[f64; 2]) -> f64| bobs.iter().map(of).sum::<f64>();
         assert!((sum(|[m, _]| *m) - 160.0).abs() < 1e-10);
         assert!((sum(|[m, z]| m * z) - 160.0 * 0.2).abs() < 1e-10);
-        // 0.2 m is the centre's height.
+        // 0.2 m is the height of the centre of mass.
         let about_x = value("I_0") + sum(|[m, z]| m * (z - 0.2).powi(2));
         for (inertia, axis) in [(about_x, &axes.y), (about_x + value("dI_y"), &axes.x)] {
             assert!((inertia / axis.i_eff_cg - 1.0).abs() < 1e-10, "{modes} {inertia}");
         }
-        // Waves along x are longer, and slower: l = 1/k coth k h, k = pi/a.
+        // Waves along x are longer and slower: l = 1/k coth k h, k = pi/a.
         for (n, (a, along)) in [(0.8, 1), (0.5, 2)].into_iter().enumerate() {
             let k = std::f64::consts::PI / a;
             let length = value(&format!("length[{}]", n + 1));
@@ -606,8 +606,9 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     }
 }
 
-/// The tank is a spheroid that is almost as high as it is wide. The distance of the spheroid from the sphere through bottom
-/// and contact line is up to a fifth of the difference. The test covers the sizes of a laboratory model and of a launcher.
+/// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere through bottom and
+/// contact line is up to a fifth of the difference between height and width. The sizes are those of a laboratory model
+/// and of a launcher.
 #[test]
 fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

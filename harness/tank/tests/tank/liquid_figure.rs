@@ -1,13 +1,13 @@
-//! The figure of HubSlosh's documentation on frequency and amplitude.
+//! Draws the figure of HubSlosh's documentation that shows how the frequency depends on the amplitude.
 
 use core::fmt::Write as _;
 
 use hubslosh_tank::picture::{COLOURS, FAINT, Frame, page, text};
 use hubslosh_tank::third_order::Overlaps;
 
-/// Draws the amplitude dependence of an upright cylinder's first frequency over the depth: planar and
-/// circular shifts of omega^2 per squared slosh angle, and those of a pendulum. The third order has poles at
-/// the secondary resonances. Points mark the bench's fills, 5 and 10 cm.
+/// Draws the amplitude dependence of the first frequency of an upright cylinder over the depth: shifts of omega^2 per
+/// squared slosh angle in planar and in circular motion, for the liquid and for a pendulum. The third order has poles
+/// at the secondary resonances. Points mark the fills of the bench, 5 and 10 cm.
 pub fn draw(overlaps: &Overlaps) -> String {
     let frame =
         Frame { left: 80.0, top: 96.0, width: 620.0, height: 360.0, x: [0.1, 2.0], y: [-1.0, 1.0] };
@@ -21,7 +21,7 @@ pub fn draw(overlaps: &Overlaps) -> String {
         let (x, y) = frame.place(depth, frame.y[1]);
         text(&mut svg, x, y - 6.0, "middle", &format!("({azimuth},{number})"));
     }
-    // Intervals between the poles, with points ever closer to them.
+    // intervals between the poles, with points that get denser towards them
     let mut ends = vec![frame.x[0]];
     ends.extend(
         resonances.iter().map(|(depth, _)| *depth).filter(|d| (frame.x[0]..frame.x[1]).contains(d)),
@@ -66,8 +66,8 @@ pub fn draw(overlaps: &Overlaps) -> String {
     page(720.0, frame.top + frame.height + 50.0, title, &svg)
 }
 
-/// Returns the depths, m, at which an excited mode has twice the frequency of the first, in ascending
-/// order, with the mode. Near these depths the third order is not valid.
+/// Returns the depths, m, at which an excited mode has twice the frequency of the first mode, ascending, each with the
+/// excited mode. Near these depths the third order is not valid.
 pub fn resonances(overlaps: &Overlaps) -> Vec<(f64, [usize; 2])> {
     let mut found = Vec::new();
     for mode in &overlaps.excited {

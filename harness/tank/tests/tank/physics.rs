@@ -3,9 +3,9 @@
 use crate::common::{reference, solve, tank, toml};
 use hubslosh_tank::closed_form;
 
-/// The hinge of every mode is at the centre of the sphere, because the wall does no work on the liquid if the sphere turns
-/// about its centre. The required accuracy is 1e-6 R. The height of a mode is computed as m h over m, so that its error is
-/// 1e-10 over the mass ratio.
+/// The hinge of every mode is at the centre of the sphere, because the wall does no work on the liquid if the sphere
+/// rotates about its centre. The required accuracy is 1e-6 R. The height of a mode is m h divided by m, so that its
+/// error is 1e-10 divided by the mass ratio.
 #[test]
 fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     for i in 1..20 {
@@ -14,8 +14,8 @@ fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
         for mode in data.modes.iter().filter(|m| m.m_ratio > 1e-4) {
             assert!((mode.hinge.unwrap() - 1.0).abs() < 1e-8, "{fill}: {:?}", mode.hinge);
         }
-        // m_liq z_cg = - sum m_n l_n and I_eff(centre) = sum m_n l_n^2 about the centre, with all
-        // modes; with some, what is missing has the right sign
+        // With all modes, m_liq z_cg = - sum m_n l_n and, about the centre of the sphere, I_eff = sum m_n l_n^2. With
+        // five modes the remainders must have the right sign.
         let first: f64 = data.modes.iter().map(|m| m.m * m.l).sum();
         let second: f64 = data.modes.iter().map(|m| m.m * m.l * m.l).sum();
         let lever = data.z_cg - 1.0;
@@ -65,8 +65,8 @@ fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     assert!((data.modes[0].m / (1000.0 * a.powi(3)) - 1.933).abs() < 0.01);
 }
 
-/// A shallow spherical dish leaves almost nothing after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
-/// I_0 is its own error. The fixed mass stands at the sphere's centre, 7 to 220 R above the liquid.
+/// A shallow spherical dish leaves almost no inertia after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
+/// the computed I_0 consists of its error. The fixed mass is at the sphere's centre, 7 to 220 R above the liquid.
 #[test]
 fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     for fill in [1e-2, 1e-3, 1e-4, 1e-5] {
@@ -74,7 +74,7 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
         let scale = data.m_liq * data.r_surface.unwrap().powi(2);
         let inertia = data.rest(5).inertia / scale;
         assert!(inertia.abs() < data.error_i_0, "{fill}: {inertia} {}", data.error_i_0);
-        // and no empty statement: the lever makes it (1 + 220)^2 of the other values' error at most
+        // The stated error is not just huge: the lever arm makes it at most (1 + 220)^2 times the error of the other values.
         assert!(data.error_i_0 < 1e5 * data.error);
     }
 }
@@ -83,7 +83,7 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
 /// 400 modes. In shallow liquid an earlier sum of 400 modes was wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for the
 /// annulus, although the stated error was 1e-11.
 #[test]
-fn closed_forms_keep_their_error_in_shallow_liquid() {
+fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     let xi = closed_form::zeros_of_j1_slope(20_000);
     let waves: Vec<f64> = (0..20_000).map(|n| (2 * n + 1) as f64 * core::f64::consts::PI).collect();
     for h in [1.0f64, 0.1, 1e-2, 1e-3, 1e-4] {
@@ -125,8 +125,8 @@ fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     }
 }
 
-/// The exact solution is phi_1 = r z: lambda_1 = 1/h, m_1 = 3/4 of the liquid, H_1 = 0.6 h, hinge at 1.6 h, wave h. All
-/// other modes carry no mass, and the fixed quarter of the liquid is above the liquid's centre.
+/// The exact solution is phi_1 = r z, with lambda_1 = 1/h, m_1 = 3/4 of the liquid, H_1 = 0.6 h, the hinge at 1.6 h,
+/// and the wave h. All other modes have no mass, and the fixed quarter of the liquid is above the liquid's centre.
 #[test]
 fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     for h in [0.3, 1.2] {
@@ -146,10 +146,10 @@ fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     }
 }
 
-/// The fixed mass is positive for any number of modes: it is the added mass with pressure 0 on the surface.
+/// The fixed mass is positive for any number of modes, because it is an added mass with pressure 0 on the surface.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn rigid_liquid_is_positive_for_any_number_of_modes() {
+fn the_fixed_mass_is_positive_for_any_number_of_modes() {
     for case in reference() {
         let data = tank(&toml(&case)).solve(case["fill"].as_f64().unwrap(), 20).unwrap();
         for modes in 0..=20 {
@@ -180,7 +180,7 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
         (closed_form::annulus(0.5, 1.0, 0.8, 1000.0, 5), solve(&ring(0.5, 1.0, 0.8), 0.8, 5)),
         (closed_form::annulus(0.1, 0.7, 0.3, 1000.0, 5), solve(&ring(0.1, 0.7, 0.3), 0.3, 5)),
     ];
-    // A shape that has a closed form is solved by it.
+    // A shape with a closed form is solved by the closed form.
     for shape in [
         "cylinder = { radius = 0.5, height = 3.0 }",
         "annulus = { inner_radius = 0.1, outer_radius = 0.7, height = 3.0 }",
@@ -217,12 +217,12 @@ fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     assert!((sum - 0.5 + 1.0 / (400.0 * 9.87)).abs() < 1e-6);
     let sum: f64 = xi.iter().map(|x| 1.0 / (x * x * (x * x - 1.0))).sum();
     assert!((sum - 0.125).abs() < 1e-9);
-    // a thin disc turns with its tank: m R^2/4; a long rod too: m h^2/12
+    // A thin disc rotates with its tank: m R^2/4; so does a long rod: m h^2/12.
     let disc = closed_form::cylinder(1.0, 1e-3, 1.0, 1);
     assert!((disc.i_eff_cg / (0.25 * disc.m_liq) - 1.0).abs() < 1e-2);
     let rod = closed_form::cylinder(1.0, 500.0, 1.0, 1);
     assert!((rod.i_eff_cg / (rod.m_liq * 500.0 * 500.0 / 12.0) - 1.0).abs() < 1e-4);
-    // a square box drags 0.1565 of the rigid inertia about the vertical axis
+    // A square box takes 0.1565 of the rigid inertia about the vertical axis along with it.
     let yaw = closed_form::box_yaw_inertia(1.0, 1.0, 0.3, 1000.0) / (300.0 / 6.0);
     assert!((yaw - 0.1565).abs() < 5e-5, "{yaw}");
     assert!(
@@ -322,7 +322,7 @@ fn compare_hinges_of_spheres(fills: &[f64]) {
         let data = solve("shape = { sphere = { radius = 1.0 } }", fill, 5);
         let r = data.r_surface.unwrap();
         for mode in &data.modes {
-            // m (hinge - 1) = 0; l is stated relative to itself
+            // m (hinge - 1) is 0. The error of l is relative to l.
             let moment =
                 (mode.m * (data.z_cg + mode.l - 1.0) + mode.m_h) / (data.m_liq * r.max(mode.l));
             assert!(moment.abs() < data.error, "{fill}: {moment:e} {:e}", data.error);
@@ -343,10 +343,9 @@ fn a_full_tank_s_error_does_not_depend_on_its_size() {
     assert_eq!([error(0.0625), error(16.0)], [error(1.0); 2]);
 }
 
-/// Liquids thin against the tank and details small against it cost no accuracy. A lens and a needle: where two
-/// discretisations differ by 2e-7, a third, finer one is taken. A knuckle of 2 % of the radius: panels are as short as the
-/// gap to its other end, and the error is a smooth tank's. A shelf 2 cm thick, 2 cm above the floor: 1e-6 needs finer
-/// panels, and more of them.
+/// Thin liquids and small details are solved as accurately as others. In a lens and in a needle two discretisations
+/// differ by 2e-7, so that a third, finer one is used. A knuckle of 2 % of the radius gets panels as short as the gap
+/// to its other end. A shelf 2 cm thick, 2 cm above the floor, needs shorter panels for an error of 1e-6.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn thin_liquids_and_small_details_are_solved_as_well_as_others() {
@@ -407,7 +406,7 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
         }
     }
     let thin = closed_form::annular_wave_numbers(0.99, 1.0, 3);
-    // The gap's half over the radius.
+    // half of the gap, relative to the radius
     assert!((thin[0] * 0.995 - 1.0).abs() < 1e-3, "{}", thin[0]);
     for (n, k) in thin[1..].iter().enumerate() {
         let plane = (n + 1) as f64 * core::f64::consts::PI / 0.01;

@@ -67,9 +67,9 @@ fn a_sweep_with_equal_values_at_all_fills_can_be_drawn() {
     let swept = sweep(&tank, &[0.5, 1.0, 2.0], 2).unwrap();
     let svg = picture::sweep(&tank, &swept, 0.0);
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
-    // ticks of 0.1 and 0.2 over a width of 1
+    // Ticks every 0.1 and 0.2 over a width of 1 are few texts.
     assert!(svg.matches("<text").count() < 80, "{}", svg.matches("<text").count());
-    // and every curve is in the picture
+    // Every curve lies inside the picture.
     let view = svg.split("viewBox=\"0 0 ").nth(1).unwrap().split('"').next().unwrap();
     let size: Vec<f64> = view.split(' ').map(|x| x.parse().unwrap()).collect();
     for line in curves(&svg) {
@@ -118,9 +118,9 @@ fn points(path: &str) -> Vec<[f64; 2]> {
     path.split(['M', 'L']).skip(1).map(place).collect()
 }
 
-/// Compares the area of the liquid to the right of the axis over the square of the distance from the axis to the tank's
-/// wall. Expected: for a cylinder fill over radius, for an annulus less its inside, for a bowl half its length times
-/// 2/3 of its depth, and so on. The tolerance is a hundredth of a pixel in some hundred.
+/// Compares the area of the liquid to the right of the axis, divided by the squared distance from the axis to the
+/// tank's wall, with its exact value: for example fill over radius for a cylinder. The tolerance is a hundredth of a
+/// pixel of some hundred pixels.
 #[test]
 fn the_drawn_liquid_has_the_area_of_the_wetted_section() {
     for (text, fill, area) in [
@@ -150,10 +150,10 @@ fn the_drawn_liquid_has_the_area_of_the_wetted_section() {
             let twice: f64 = closed.map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum();
             let found = 0.5 * twice.abs() / (radius * radius);
             assert!((found / area - 1.0).abs() < 1e-3, "{text}: {found} {area}");
-            // and none of it is on the other side
+            // no liquid is drawn on the other side of the axis
             assert!(side.iter().all(|p| (p[0] - axis) * (side[1][0] - axis) >= 0.0), "{text}");
         }
-        // a box, whose walls have no end, is drawn a quarter higher than its liquid
+        // A box has no upper end; it is drawn a quarter higher than its liquid.
         if text.starts_with("box") {
             let heights = |points: &[[f64; 2]]| {
                 let of =

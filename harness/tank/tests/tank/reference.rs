@@ -4,8 +4,8 @@ use crate::common::{number, reference, tank, toml};
 use hubslosh_tank::{Mode, Rest};
 use serde_json::Value;
 
-/// Returns the largest deviations of the modes and the fixed mass from the reference: lambda and l
-/// (relative), masses (of m_liq), m H (of m_liq R), inertias (of m_liq R^2), waves (of R).
+/// Returns the largest deviations of the modes and the fixed mass from the reference: of lambda and l (relative),
+/// masses (relative to m_liq), m H (to m_liq R), inertias (to m_liq R^2), and waves (to R).
 fn deviation(
     case: &Value,
     modes: &[Mode],
@@ -50,8 +50,8 @@ fn deviation(
     worst
 }
 
-/// The documentation promises 1e-6 for three modes and 1e-5 for five. The solver reaches 1e-9, which this test requires
-/// (1e-8 for waves, which are extrapolated to the contact line). The true error must not exceed the stated one.
+/// The documentation promises an error of 1e-6 for three modes and 1e-5 for five. This test requires 1e-9, which the
+/// solver reaches (1e-8 for waves, which are extrapolated to the contact line), and a true error below the stated error.
 #[test]
 fn every_reference_tank_is_reproduced_within_the_stated_error() {
     for case in reference().iter().filter(|case| case["kind"] == "revolution") {
@@ -60,7 +60,7 @@ fn every_reference_tank_is_reproduced_within_the_stated_error() {
         let (r, m_liq) = (number(&case["R_surface"]), number(&case["m_liq"]));
         assert!((data.r_surface.unwrap() - r).abs() < 1e-11, "{name}");
         assert!((data.r_inner.unwrap() - number(&case["R_inner"])).abs() < 1e-11, "{name}");
-        // boundary quadrature is exact to rounding; twelve digits are written
+        // The integrals along the boundary are exact to rounding; the reference has twelve digits.
         let geometry = [
             (data.m_liq - m_liq) / m_liq,
             (data.z_cg - number(&case["z_cg"])) / r,
@@ -72,7 +72,7 @@ fn every_reference_tank_is_reproduced_within_the_stated_error() {
         worst[3] =
             worst[3].max((data.i_eff_cg - number(&case["I_eff_cg"])).abs() / (m_liq * r * r));
         assert!(worst[..4].iter().all(|e| *e < 1e-9), "{name}: {worst:?}");
-        // the peak of a flat maximum is known to the root of that
+        // The position of a flat maximum is accurate to the root of the error of its value.
         assert!(worst[4] < 1e-7, "{name}: {worst:?}");
         assert!(
             worst[..4].iter().all(|e| *e <= data.error),
@@ -95,8 +95,8 @@ fn every_reference_tank_is_reproduced_within_the_stated_error() {
     }
 }
 
-/// A mode whose mass is below 1e-9 of the liquid has no defined height, but keeps its moment. The example is modes 2 to 5
-/// of a cone of 45 degrees.
+/// A mode whose mass is below 1e-9 of the liquid has no defined height, but a defined moment m h. The example is modes
+/// 2 to 5 of a cone of 45 degrees.
 #[test]
 fn massless_modes_have_no_height_and_keep_their_moment() {
     let cases = reference();
@@ -131,8 +131,7 @@ fn the_reference_box_is_reproduced_on_both_axes() {
     assert_eq!(data.modes, axes.x.modes);
 }
 
-/// Compares the closed form of the annular cylinder, with a sum of 100 terms and the estimated rest of the sum, to 1e-11 m
-/// R^2.
+/// Compares the closed form of the annular cylinder, which sums 100 terms and estimates the remainder, to 1e-11 m R^2.
 #[test]
 fn the_reference_annulus_is_reproduced_in_closed_form() {
     let cases = reference();
@@ -143,7 +142,7 @@ fn the_reference_annulus_is_reproduced_in_closed_form() {
     let m_liq = number(&case["m_liq"]);
     assert!((data.i_eff_cg - number(&case["I_eff_cg"])).abs() < 1e-11 * m_liq);
     let worst = deviation(case, &data.modes, &data.rest, 5, 1.0, m_liq);
-    // nine digits of the peak are written
+    // The reference gives nine digits of the largest elevation.
     assert!(worst[..4].iter().all(|e| *e < 1e-11) && worst[4] < 1e-9, "{worst:?}");
 }
 

@@ -1,4 +1,4 @@
-//! Liquid that turns with its tank.
+//! Liquid that rotates with its tank at a steady rate.
 
 use core::f64::consts::{PI, TAU};
 
@@ -10,8 +10,8 @@ use hubslosh_tank::{Fill, Tank};
 
 const RHO: f64 = 1000.0;
 
-/// Returns the liquid of a tank filled to a share of its volume, with g = 1 m/s² or 0 m/s² (`weightless`) and
-/// Omega^2 R/g = `flatness` for R = 1 m.
+/// Returns the volume and the rotating liquid of a tank that is filled to the fraction `share` of its volume, with g =
+/// 1 m/s², or 0 if `weightless` is true, and Omega^2 R/g = `flatness` for R = 1 m.
 fn turned(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Spin) {
     let tank = Tank::from_shape(shape, RHO).unwrap();
     let data = tank.solve(tank.fill_height(Fill::Share(share)).unwrap(), 1).unwrap();
@@ -23,8 +23,8 @@ fn close(found: f64, expected: f64, error: f64) {
     assert!((found - expected).abs() <= error, "{found} is not {expected} within {error}");
 }
 
-/// The free surface in an upright cylinder of radius 1 m is a paraboloid with closed forms, as long as it neither bares the
-/// floor nor reaches the lid.
+/// The free surface in an upright cylinder of radius 1 m is a paraboloid with closed forms, as long as the whole floor
+/// is wet and the surface stays below the lid.
 #[test]
 fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
@@ -53,8 +53,8 @@ fn weightless_liquid_lies_at_the_wall() {
     }
 }
 
-/// If both poles of the sphere are dry, the liquid is in equilibrium in the rotating frame: the wall pushes everywhere
-/// through the centre of the sphere, so that the centre of mass is at z_cg = -g/Omega^2 from the centre, for any fill.
+/// If both poles of the sphere are dry, the wall's pressure acts everywhere through the centre of the sphere. Equilibrium
+/// in the rotating frame therefore puts the centre of mass at z_cg = -g/Omega^2 from the centre, for any fill.
 #[test]
 fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     for (share, flatness) in [(0.25, 5.0), (0.25, 10.0), (0.5, 5.0), (0.5, 30.0)] {
@@ -64,9 +64,9 @@ fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     }
 }
 
-/// The expected values were computed to 8 digits by an independent program that integrates over the section: share of the
-/// volume, Omega^2 R/g, then z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), height of the apex and of the contact
-/// line.
+/// An independent program computed the expected values to 8 digits by integration over the section. Each row has the
+/// fraction of the volume, Omega^2 R/g, z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), and the heights of the
+/// apex and of the contact line.
 #[test]
 fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     let rows = [
@@ -106,8 +106,8 @@ fn a_slow_spin_changes_nothing() {
     }
 }
 
-/// The expected frequencies, from a solution for any spin rate, are those seen from the tank, in units of sqrt(g/R), for
-/// waves that run against the spin and with it.
+/// The expected frequencies come from a solution that is valid for any spin rate. They are seen from the tank, in units
+/// of sqrt(g/R), for waves that run against the spin and with the spin.
 #[test]
 fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liquid() {
     let rows = [
@@ -125,8 +125,8 @@ fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liqu
     }
 }
 
-/// A spinner of radius 0.3 m, filled 0.4 m, at 5 m/s² and 9 rad/s: the liquid at rest has 5.09 kg·m² about the axis, the spinning one
-/// 6.38 kg·m², and its surface touches a lid at 0.6 m.
+/// A spinner of radius 0.3 m, filled to 0.4 m, at 5 m/s² and 9 rad/s. The inertia about the axis is 5.09 kg·m² of the
+/// liquid at rest and 6.38 kg·m² of the rotating liquid, whose surface touches a lid at 0.6 m.
 #[test]
 fn a_spinner_beyond_the_model_is_out_of_range() {
     let tank = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
@@ -162,8 +162,7 @@ fn an_annulus_bares_its_floor_at_the_inner_wall() {
     close(found.z_wall, 1.5 * u, 1e-9);
 }
 
-/// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it would lie in two separate
-/// pools.
+/// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it would lie in two pools.
 #[test]
 fn liquid_in_two_pools_is_refused() {
     let hourglass = "density = 1000\nprofile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 0.5] }, \
@@ -191,7 +190,7 @@ fn spin_is_refused_for_boxes_full_tanks_and_invalid_rates() {
     assert!(spin(&sphere, &full, 1.0, 5.0, None).unwrap_err().to_string().contains("full"));
 }
 
-/// sqrt(nu Omega)/h of the floor; C_0 of an upright cylinder at h/R = 1 is 0.496.
+/// spin_decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright cylinder at h/R = 1 is 0.496.
 #[test]
 fn parameters_have_the_spin_of_the_liquid() {
     let of = |shape: Shape, nu: Option<f64>, target: Target| {

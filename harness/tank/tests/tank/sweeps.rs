@@ -10,7 +10,7 @@ fn fills(from: f64, to: f64, count: usize) -> Vec<f64> {
 }
 
 /// Without liquid, and without a free surface, there are no modes and no NaN. A liquid that fills a sphere does not
-/// rotate with it (I_eff = 0 of 2/5 m R^2).
+/// rotate with it: I_eff is 0, while the rigid liquid would have 2/5 m R^2.
 #[test]
 fn empty_and_full_tanks_have_no_modes() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -25,7 +25,7 @@ fn empty_and_full_tanks_have_no_modes() {
     assert!((full.m_liq / (4000.0 / 3.0 * core::f64::consts::PI) - 1.0).abs() < 1e-12);
     assert!(full.i_eff_cg.abs() < 1e-9 * full.i_frozen_cg, "{}", full.i_eff_cg);
     assert!((full.rest(0).height - 1.0).abs() < 1e-12);
-    // the limit of the fills below
+    // the limit of decreasing free surfaces
     let nearly = sphere.solve(1.9999, 1).unwrap();
     assert!(nearly.i_eff_cg < 1e-6 * nearly.i_frozen_cg);
     let csv = table.to_csv();
@@ -175,11 +175,11 @@ fn a_placed_table_states_the_errors_between_its_points() {
         found = std::array::from_fn(|k| found[k].max(off[k].abs()));
     }
     for (found, stated) in found.into_iter().zip(placed.between.error) {
-        // Sought at some hundred fills, the largest lies between two of them.
+        // The stated error was measured at the middles of the intervals, and the true largest error may lie beside a middle.
         assert!((0.95..1.1).contains(&(found / stated)), "{found:e} {stated:e}");
         assert!(stated < 5e-3);
     }
-    // What placing is for: twelve fills evenly apart are ten times as far off.
+    // Twelve evenly spaced fills have errors ten times as large as the placed fills.
     let even = sweep(&tank, &fills(0.03, 1.47, fill_table::POINTS - 1), 1).unwrap().rows;
     let x: Vec<f64> = even.iter().map(|row| row.m_liq).collect();
     let y: Vec<f64> = even.iter().map(|row| 1.0 / row.modes[0].l).collect();
@@ -248,8 +248,8 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     assert!(fill_table::place(&tank, 0.1, 1.0, 3).is_err());
 }
 
-/// In a cone of 45 degrees only the first mode carries liquid (phi_1 = r z); in a sphere all do, and a six-axis FMU keeps
-/// three of them.
+/// In a cone of 45 degrees only the first mode has mass (phi_1 = r z). In a sphere all modes have mass, and Spacecraft
+/// and SloshTank keep three of them.
 #[test]
 fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
     let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
@@ -272,8 +272,8 @@ fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
     }
 }
 
-/// The parameter set states the errors between the points of the table, which the test gives as fractions (0.001 is 0.1 %).
-/// If an error is above 0.5 %, a warning says that the table has too few points.
+/// The parameter set states the interpolation errors of the table as percentages, and the test has them as fractions
+/// (0.001 is 0.1 %). If an error is above 0.5 %, a warning says that the table has too few points.
 #[test]
 fn the_parameters_state_the_errors_between_a_table_s_points() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -291,11 +291,11 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         let set =
             fill_table::parameters(&tank, &table, between, Target::SloshTank, liquid).unwrap();
         let [frequency, mass, hinge] = error.map(|x| format!("{:.2} %", 100.0 * x));
-        let words = format!("frequency within {frequency}, mass {mass}, hinge {hinge}");
+        let words = format!("frequency {frequency}, mass {mass}, hinge {hinge}");
         assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);
         let warned = |words: &str| set.warnings.iter().any(|warning| warning.contains(words));
         assert_eq!(warned("3 points are too few for this tank"), few, "{:?}", set.warnings);
-        // the ratio of every fill
+        // the damping ratio of every fill
         for (i, row) in table.rows.iter().enumerate() {
             let ratio = tank_damping(&tank, row, 1e-6, liquid).unwrap().modes[0].zeta;
             let name = format!("tank.fill.zeta[1,{}]", i + 1);
@@ -303,7 +303,7 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         }
         assert!(!warned("stay those of the largest fill"), "{:?}", set.warnings);
     }
-    // and the stiffness that stays
+    // the warning about the stiffness, which stays that of the largest fill
     let wet = Liquid { sigma: Some(0.07), ..liquid };
     let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, wet).unwrap();
     assert!(set.warnings.iter().any(|why| why.contains("stiffnesses stay")), "{:?}", set.warnings);

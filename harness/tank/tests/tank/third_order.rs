@@ -7,8 +7,8 @@ use hubslosh_tank::third_order::Overlaps;
 /// modes leave an error of 1e-7.
 const COUNT: usize = 40;
 
-/// The tank is the bench's, R = 81.5 mm. The expected values have three digits and come from an independent derivation; the
-/// tolerance is half a unit of the last digit.
+/// The tank is that of the bench, R = 81.5 mm. The expected values come from an independent derivation and have three
+/// digits; the tolerance is half a unit of the last digit.
 #[test]
 fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     let all = Overlaps::new(COUNT);
@@ -23,8 +23,8 @@ fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     }
 }
 
-/// Compares the depth h/R at which planar motion begins to harden. With one excited mode of each azimuthal number the
-/// result is 0.5058, which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
+/// The depth h/R at which planar motion begins to harden. With one excited mode of each azimuthal number it is 0.5058,
+/// which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
 #[test]
 fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_with_all() {
     let begins = |count: usize| {
@@ -89,18 +89,18 @@ fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
         let [s, kappa] = all.equivalent(fill * length);
         assert_eq!((s, circular), (1.0, 0.0));
         assert!((0.375 * kappa - 0.5 - sigma).abs() < 1e-12 * (1.0 + sigma.abs()));
-        // at cos 2 k x = 1 and cos 2 w t = 1, with the wave 4/(a k^2) per angle
+        // elevation at cos 2 k x = 1 and cos 2 w t = 1, for a first-order wave of 4/(a k^2) per angle
         let second = k / 8.0 * (t + 1.0 / t + 3.0 / t.powi(3) - 1.0 / t) * all.amplitude.powi(2);
         let found = all.second_wave(fill * length);
         assert!((found / second - 1.0).abs() < 1e-12, "{fill} {found} {second}");
     }
 }
 
-/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel: its planar wave is the
-/// wave in a box of length pi R, and its circular wave is Stokes's wave with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k
-/// a)^2/(8 T^4)].
+/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel: its planar wave is
+/// that of a box of length pi R, and its circular wave is Stokes's wave with omega^2 = g k T [1 + (9 T^4 - 10 T^2 +
+/// 9) (k a)^2/(8 T^4)].
 #[test]
-fn annular_tanks_lie_between_a_circle_and_a_channel() {
+fn annular_tanks_have_the_limits_of_a_circle_and_of_a_channel() {
     let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
     for depth in [0.4, 0.7, 1.5] {
         for (a, b) in circle.equivalent(depth).iter().zip(ring.equivalent(depth)) {
@@ -110,7 +110,7 @@ fn annular_tanks_lie_between_a_circle_and_a_channel() {
     let ring = Overlaps::round(0.999, 1.0, 4);
     let channel = Overlaps::rectangle(std::f64::consts::PI);
     for depth in [0.3_f64, 1.0, 3.0] {
-        // psi^2 r dr has the integral 1: a wave at the wall of 1/sqrt(0.001) per a
+        // psi^2 r dr has the integral 1, so that psi at the wall is 1/sqrt(0.001) per unit of a
         let per_wave = |overlaps: &Overlaps, wave: f64| {
             overlaps.shifts(depth).map(|shift| shift / (overlaps.amplitude * wave).powi(2))
         };
