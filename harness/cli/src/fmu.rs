@@ -1,4 +1,4 @@
-//! Resolves `--fmu`: a file, or one of the project's FMUs by name.
+//! Finds the FMU of `--fmu`: a file, or one of the project's FMUs by name.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use pack::Fmi;
 
-/// Folders in which the project's FMUs may be, relative to the folder of the command: the same
-/// folder, the command's data folder, and the Python package in which the command was installed.
+/// Folders in which the project's FMUs may be, relative to the folder of the command: this folder itself, the command's
+/// data folder, and the Python package in which the command was installed.
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 
-/// Returns the file of an FMU. `name` is a file, or the name of one of this project's FMUs. The search order
-/// is `dist`, where `hubslosh pack` puts it, the folder of this command, then `dist` of the source that the
-/// command was built from. There the command packs the FMU if necessary.
+/// Returns the file of an FMU. `name` is a file, or the name of one of this project's FMUs. An FMU of this project is
+/// searched in the folder `dist`, to which `hubslosh pack` writes, then among the files installed with this command,
+/// then in `dist` of the source from which the command was built. If that source exists, a missing FMU is packed there.
 ///
 /// # Errors
 ///
-/// If there is none; the error says what to do.
+/// If the FMU is not found; the message says what to do.
 pub fn find(name: &Path) -> Result<PathBuf> {
     let Some((model, fmi)) = name.to_str().and_then(pack::named) else {
         let all: Vec<_> = pack::MODELS.iter().map(|model| model.name).collect();
@@ -44,7 +44,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
             all().iter().filter_map(|fmu| Some(fmu.file_stem()?.display().to_string())).collect();
         bail!(
             "{file} was not found in dist or in this command's folder ({}; FMUs: {}). In the project's source, with Rust, \
-             `cargo run --release -- pack` builds it; --fmu FILE takes a file",
+             `cargo run --release -- pack` builds it; --fmu FILE names a file elsewhere",
             places.join(", "),
             if there.is_empty() { "none".into() } else { there.join(", ") }
         );
@@ -58,8 +58,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     Ok(packed)
 }
 
-/// Lists the FMUs that [`find`] finds without building any: first the files in `dist`, then the files that were installed
-/// with this command.
+/// Lists the FMUs that [`find`] finds without building one: first the files in `dist`, then the files installed with
+/// this command.
 pub fn all() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for folder in ["dist".into()].into_iter().chain(folders()) {
@@ -77,7 +77,7 @@ pub fn installed(file: &str) -> Option<PathBuf> {
     folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
 }
 
-/// Returns a folder of the Python package that came with this command, such as `examples`.
+/// Returns a folder, such as `examples`, of the Python package in which this command was installed.
 pub fn shipped_folder(folder: &str) -> Option<PathBuf> {
     let packages = folders().into_iter().filter(|fmus| fmus.ends_with("hubslosh/fmus"));
     packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())
@@ -97,6 +97,6 @@ fn folders() -> Vec<PathBuf> {
         .collect();
     pythons.sort();
     let all = INSTALLED.iter().map(|place| own.join(place)).chain(pythons);
-    // Written without `..` if the folder exists, as a user would write it.
+    // Existing folders are written without `..`, as a user would write them.
     all.filter(|place| place.is_dir()).map(|place| place.canonicalize().unwrap_or(place)).collect()
 }

@@ -1,13 +1,13 @@
 //! The command line `hubslosh`.
 
-/// Prints a line to stdout. The macro of the standard library panics when its reader is gone (`hubslosh
-/// variables | head`); this one ends the program.
+/// Prints a line to stdout. If the reader of stdout has closed the pipe (`hubslosh variables | head`), this macro ends
+/// the program, whereas the macro of the standard library panics.
 macro_rules! println {
     () => { crate::terminal::print("\n".into()) };
     ($($arguments:tt)*) => { crate::terminal::print(format!("{}\n", format_args!($($arguments)*))) };
 }
 
-/// Prints a text without a line break to stdout, and ends the program when its reader is gone.
+/// Prints a text without a line break to stdout, and ends the program if the reader of stdout has closed the pipe.
 macro_rules! print {
     ($($arguments:tt)*) => { crate::terminal::print(format!($($arguments)*)) };
 }
@@ -53,7 +53,7 @@ struct Cli {
     /// Memory that an FMU may use in the commands run, campaign and analyse, MiB.
     #[arg(long, global = true, help_heading = GLOBAL, hide_short_help = true, value_name = "MIB", default_value_t = guard::MEMORY >> 20)]
     memory: u64,
-    /// Understands the command line, and does nothing: for the tests of examples.
+    /// Parses the command line and does nothing else; for tests of the examples in help and book.
     #[arg(long, hide = true)]
     parse_only: bool,
     /// Internal: runs FMUs for another process.
@@ -81,8 +81,8 @@ impl Cli {
         }
     }
 
-    /// Returns true if memory and files of the command are limited, because it simulates FMUs and little
-    /// else.
+    /// Returns true if the command's memory and files are limited. They are limited for commands that do little
+    /// else than simulate FMUs.
     fn has_memory_limit(&self) -> bool {
         matches!(
             self.command,
@@ -96,7 +96,7 @@ impl Cli {
             call.with_context(|| format!("--call-limit {} (allowed: above 0 s)", self.call_limit))?;
         let (memory, file) = match self.has_memory_limit() {
             true => (self.memory.saturating_mul(1 << 20), guard::FILE),
-            // Fits and records take what they need.
+            // Fits and Allan deviations of long recordings may need more.
             false => (1 << 40, 1 << 40),
         };
         Ok(Limits { call, total: None, memory, file })
@@ -118,7 +118,7 @@ enum Command {
     Campaign(campaign::CampaignArgs),
     Analyse(analyse::AnalyseArgs),
     Check(check::CheckArgs),
-    /// The calls of one rule of `check`, in a process of their own.
+    /// Internal: makes the calls of one rule of `check` in a separate process.
     #[command(hide = true)]
     CheckCalls(check::CheckCallsArgs),
     Scale(scale::ScaleArgs),
@@ -135,8 +135,8 @@ enum Command {
     Book(book::BookArgs),
 }
 
-/// Returns the command line parser. It takes `-1` in `--fill -1` as a value, so that the message can say what
-/// is allowed.
+/// Returns the command line parser. It accepts negative numbers such as `-1` in `--fill -1` as values, so that the
+/// error message can state the allowed range.
 fn command_line() -> clap::Command {
     fn with_negative_numbers(command: clap::Command) -> clap::Command {
         let of = |arg: clap::Arg| match arg.get_action().takes_values() {
@@ -148,8 +148,8 @@ fn command_line() -> clap::Command {
     with_negative_numbers(Cli::command()).color(terminal::color_of_arguments())
 }
 
-/// Makes SIGINT and SIGTERM end the guarded processes and remove temporary files before they end the program.
-/// SIGHUP is unchanged, for nohup.
+/// Makes SIGINT and SIGTERM end the guarded processes and remove temporary files before they end this program. SIGHUP
+/// is left alone, so that nohup works.
 #[cfg(unix)]
 fn clean_up_on_signals() {
     use signal_hook::consts::{SIGINT, SIGTERM};
@@ -214,7 +214,7 @@ fn is_run_by_cargo() -> bool {
 }
 
 fn guarded(cli: &Cli) -> Result<u8> {
-    // Before the guard, because what is built must not be built within its limits.
+    // The FMU is built before the guard starts, because the guard's limits are not meant for a compiler.
     match cli.fmu() {
         Some(name) => drop(fmu::find(name)?),
         None if fmu::installed("HubSlosh.fmu").is_none() && ::pack::has_source() => {

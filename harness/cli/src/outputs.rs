@@ -1,4 +1,4 @@
-//! Outputs never overwrite inputs: checked here for every command, before it reads or writes anything.
+//! Ensures, for every command and before it reads or writes anything, that its outputs do not overwrite inputs.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -9,8 +9,8 @@ use clap::parser::ValueSource;
 use files::input;
 use files::output::{self, Destination};
 
-/// Options whose values are files or directories that a command writes: command, option, and the endings of
-/// files that it writes there. Every other value that names a file is an input.
+/// Options whose values are files or directories that a command writes: command, option, and the endings of the files
+/// that it writes. All other values that name a file are inputs.
 const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
@@ -38,8 +38,8 @@ const OUTPUTS: [(&str, &str, &[&str]); 22] = [
 
 const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat", "json", "svg"];
 
-/// Protects the inputs that the command line names, and refuses outputs that would replace one of them, that
-/// are probably meant as inputs, or that are one file twice.
+/// Protects the inputs that the command line names. Refuses an output that would replace one of them, that looks like
+/// an input, or that is the same file as another output.
 ///
 /// # Errors
 ///
@@ -47,7 +47,7 @@ const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat",
 pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let Some(command) = command.find_subcommand(name) else { return Ok(()) };
-    // The kinds of recordings of `identify` have its options.
+    // The subcommands of `identify` have its options.
     let (command, matches) = match matches.subcommand() {
         Some((kind, matches)) => (command.find_subcommand(kind).unwrap_or(command), matches),
         None => (command, matches),
@@ -76,13 +76,13 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
         let is_input = INPUTS.contains(&&*ending) && !endings.contains(&&*ending);
         ensure!(
             !(is_input && path.is_file()),
-            "--{option} would replace {}, an existing .{ending} file, which is probably an input (allowed: a name that ends \
-             in {}, or a file that does not exist yet)",
+            "--{option} would replace {}, an existing .{ending} file, which is probably an input (allowed: {}, \
+             or a file that does not exist yet)",
             path.display(),
             if endings.is_empty() {
-                "no such ending".into()
+                "a name without such an ending".into()
             } else {
-                format!(".{}", endings.join(" or ."))
+                format!("a name that ends in .{}", endings.join(" or ."))
             }
         );
         let file = place(path);
@@ -124,8 +124,8 @@ fn protect(path: &Path) {
     }
 }
 
-/// Lists the paths that a value may name: itself, and what follows a colon or a sign of equality, as in
-/// `2:fuel.toml` and `file:path=torque.csv,hold=true`.
+/// Lists the paths that a value may name: the value itself, and the text after each colon or sign of equality, as
+/// in `2:fuel.toml` and `file:path=torque.csv,hold=true`.
 fn files_in(value: &OsStr) -> Vec<PathBuf> {
     let mut paths = vec![PathBuf::from(value)];
     let text = value.to_str().unwrap_or_default();
@@ -137,8 +137,8 @@ fn files_in(value: &OsStr) -> Vec<PathBuf> {
     paths
 }
 
-/// Returns the file to which a path leads after following links, whether or not the file exists; `None` for a device or a
-/// pipe, to which several outputs may be written.
+/// Returns the file to which a path leads after its links are followed; the file need not exist. `None` for a device or
+/// a pipe, to which several outputs may be written.
 fn place(path: &Path) -> Option<PathBuf> {
     let Ok(Destination::File(file)) = output::destination(path) else { return None };
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());

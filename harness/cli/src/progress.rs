@@ -28,7 +28,7 @@ pub fn search_spinner() -> Result<ProgressBar> {
 }
 
 pub fn show_line(bar: &ProgressBar, line: &str) {
-    // Where no bar is drawn, indicatif would lose the line.
+    // If the bar is hidden, indicatif would drop the line.
     if bar.is_hidden() {
         terminal::note(line);
     } else {
@@ -57,8 +57,8 @@ fn bar(template: &str) -> Result<ProgressBar> {
     Ok(bar)
 }
 
-/// A terminal with a single line. Each line that the progress bar draws is sent as a message to the program that started
-/// this one.
+/// A terminal with a single line, for [`TermLike`]. It sends each line that the progress bar draws as a message to the
+/// program that started this one.
 #[derive(Debug, Default)]
 struct Messages {
     line: Mutex<String>,
@@ -94,7 +94,7 @@ impl TermLike for Messages {
 
     fn write_line(&self, text: &str) -> io::Result<()> {
         self.change(|line| {
-            // The rest of a line is filled with spaces.
+            // indicatif pads the line with spaces.
             if !text.trim().is_empty() {
                 *line = text.trim().into();
             }
@@ -126,7 +126,7 @@ pub fn show(bar: &ProgressBar, news: Progress) {
             bar.set_message(format!("{runs} runs"));
         }
         Progress::Steps(steps) => bar.inc(steps),
-        // Where no bar is drawn, indicatif would lose the line.
+        // If the bar is hidden, indicatif would drop the line.
         Progress::Note(line) if bar.is_hidden() => terminal::note(line),
         Progress::Note(line) => bar.println(line),
     }

@@ -6,16 +6,15 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 use host::parameter_set::ParameterSet;
 
-/// Returns the description of the FMU for which the parameters are meant; the description is needed to convert units to the
-/// FMU's.
+/// A function that returns the description of the FMU for which the parameters are meant. It is needed to convert units
+/// to those of the FMU.
 pub type Describe<'a> = &'a dyn Fn() -> Result<ModelDescription>;
 
-/// Reads names and values from a file of parameters, in its order. Numbers are converted to the units of the
-/// FMU.
+/// Reads names and values from a file of parameters, in the order of the file. Numbers are converted to the units of the FMU.
 ///
 /// # Errors
 ///
-/// If the file or the FMU's description cannot be read, or a unit does not fit.
+/// If the file or the FMU's description cannot be read, or a unit does not belong to its variable.
 pub fn read(path: &Path, description: Describe) -> Result<Vec<(String, String)>> {
     let found = ParameterSet::read(path)?;
     for warning in found.warnings {

@@ -1,4 +1,4 @@
-//! Output of the command: results on stdout, all else on stderr.
+//! Output of the command: results to stdout, everything else to stderr.
 
 use std::io::{ErrorKind, Write};
 use std::sync::OnceLock;
@@ -56,7 +56,7 @@ pub fn has_reader() -> bool {
 
 /// Sends a message to the program that started this one. `value` is JSON and may have several lines.
 pub fn message(name: &str, value: &str) {
-    // A line break within a string is escaped, so the others only lay out the JSON.
+    // Line breaks inside a string are escaped, so that all line breaks are layout and can be removed.
     let value: String = value.lines().map(str::trim).collect();
     print(format!("\u{1e}{{{name:?}:{value}}}\n"));
 }
@@ -86,7 +86,7 @@ pub fn warn(text: impl std::fmt::Display) {
     complain(format!("{} {text}\n", with_style("warning:", style)));
 }
 
-/// Prints progress and results of work to stderr; `--quiet` suppresses it.
+/// Prints a line about progress to stderr; `--quiet` suppresses it.
 pub fn note(text: impl std::fmt::Display) {
     if !is_quiet() {
         complain(format!("{text}\n"));
@@ -117,7 +117,7 @@ fn with_style(word: &str, style: Style) -> String {
 }
 
 /// Decides whether messages have colours. In a guarded process the decision depends on the stderr of the
-/// program behind it.
+/// program that started it.
 fn choice() -> anstream::ColorChoice {
     let auto = || match guard::streams() {
         Some((_, stderr)) => AutoStream::choice(stderr),
@@ -137,7 +137,7 @@ pub fn print(text: String) {
     }
 }
 
-/// Prints a value as JSON. Lines about written files that follow go to stderr, so that stdout is the JSON alone.
+/// Prints a value as JSON. Afterwards [`done`] writes to stderr, so that stdout contains only the JSON.
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print_text_as_json(serde_json::to_string_pretty(value)? + "\n");
     Ok(())
@@ -148,7 +148,7 @@ pub fn print_text_as_json(text: String) {
     print(text);
 }
 
-/// Prints a line that names a written file, unless the command is quiet: to stdout, or to stderr after JSON.
+/// Prints a line that names a written file, unless `--quiet` is given: to stdout, or to stderr if JSON was printed.
 pub fn done(text: std::fmt::Arguments) {
     match JSON.load(Ordering::Relaxed) {
         _ if is_quiet() => {}
@@ -157,7 +157,7 @@ pub fn done(text: std::fmt::Arguments) {
     }
 }
 
-/// Returns the program's stdout, which a guarded FMU cannot write to.
+/// Returns the original stdout of the program, which a guarded FMU cannot write to.
 pub fn stdout() -> Box<dyn Write> {
     match guard::streams() {
         Some((stdout, _)) => Box::new(stdout),
@@ -175,7 +175,7 @@ fn complain(text: String) {
     };
 }
 
-/// Ends the program on purpose, so that the guard does not report a crash.
+/// Ends the program intentionally: the guard is informed, so that it does not report a crash.
 fn exit(code: u8) -> ! {
     guard::done(code);
     std::process::exit(code.into())

@@ -60,7 +60,7 @@ impl AnalyseArgs {
         }
         let first =
             self.plan.as_ref().map(Path::new).or(self.recordings.first().map(PathBuf::as_path));
-        let stem = first.and_then(Path::file_stem).context("no recording")?;
+        let stem = first.and_then(Path::file_stem).context("no recording is given")?;
         let out = self.out.clone().unwrap_or_else(|| Path::new("dist").join(stem));
         let mut plan = match &self.plan {
             Some(file) => Plan::read(file)?,
@@ -77,14 +77,14 @@ impl AnalyseArgs {
         let store = campaign.take()?;
         ensure!(
             !campaign.holds_another() || self.out.is_some(),
-            "{} holds the results of another plan: --out DIRECTORY puts these elsewhere",
+            "{} contains the results of another plan: --out DIRECTORY writes the new results to another directory",
             campaign.out.display()
         );
         campaign::drive(&fmu, &campaign, store, Vec::new())
     }
 
-    /// Writes the plan that the command line describes: every recording is a run with the amplitude of its
-    /// own torque, and is simulated with every model.
+    /// Returns the plan that the command line describes: every recording is a run with the amplitude of its own torque,
+    /// and is simulated with every slosh model.
     fn draft(&self) -> Result<Draft> {
         let profile: Written = self.profile.parse()?;
         let torque = profile.torque()?;
@@ -98,7 +98,7 @@ impl AnalyseArgs {
         for path in &self.recordings {
             let (name, columns) = (path.display(), self.columns.clone());
             let recorded = Recorded { path: path.clone(), columns };
-            // The analysis of the recording prints what was changed.
+            // Changes to the recording are not printed here, because its analysis prints them.
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
             ensure!(
                 each >= 1e-6,
@@ -113,7 +113,7 @@ impl AnalyseArgs {
                 "{name}: the torque tau_cmd is 0 N·m in every row, so there is no response to analyse (--columns names the \
                  column of the torque)"
             );
-            // Four digits, because the command was meant to be a round number.
+            // The amplitude is rounded to four digits, because the commanded amplitude is probably a round number.
             let digits = 10f64.powi(3 - amplitude.log10().floor() as i32);
             let amplitude = (amplitude * digits).round() / digits;
             runs.push(Draft::run(&recorded, [(AMPLITUDE, amplitude.into())]));

@@ -1,4 +1,4 @@
-//! `hubslosh identify --free …` and `hubslosh design --free …`: identification of any FMU.
+//! `hubslosh identify fmu` and `hubslosh design --free …`: identification of any FMU.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ pub struct AnyFmuArgs {
     solver: Stepped,
 }
 
-/// A solver with which the FMU is stepped, and the relative tolerance of the FMU's own solver.
+/// The solver that simulates the FMU, and the relative tolerance of the FMU's own solver.
 #[derive(Clone, Copy)]
 struct Stepped {
     solver: Solver,
@@ -125,8 +125,8 @@ pub struct Request<'a> {
     pub json: bool,
 }
 
-/// Parses the items of a flag that may be given several times, with commas between items. Items that are
-/// wrong go to `problems`, so that one message can list them all.
+/// Parses the items of a flag that may be given several times, with commas between items. A wrong item adds its error
+/// to `problems`, so that one message can list all of them.
 fn read<T: std::str::FromStr<Err = anyhow::Error>>(
     flags: &[String],
     problems: &mut Vec<String>,
@@ -145,7 +145,7 @@ impl Request<'_> {
 }
 
 impl AnyFmuArgs {
-    /// Returns true if `--free` names unknowns, so that any FMU is fitted in place of the bench.
+    /// Returns true if `--free` names unknowns, so that any FMU is fitted instead of the bench model.
     pub fn is_asked(&self) -> bool {
         !self.free.is_empty()
     }
@@ -177,7 +177,7 @@ impl AnyFmuArgs {
             outputs: names(&self.outputs),
             sensors: self.sensors.clone(),
             biases: read(&self.bias, &mut problems),
-            // The name of a triad has commas before its sign of equality.
+            // The name of a triad, which precedes its sign of equality, contains commas.
             triads: parsed(self.triad.iter().map(|text| text.parse()), &mut problems),
             drift: self.drift,
             solver: self.solver.solver,
@@ -313,7 +313,7 @@ fn print_predicted(bounds: &[Bound]) {
             value => format!("{:.3}", (100.0 * b.std / value).abs()),
         };
         let with = match &b.with {
-            _ if b.decided_by_solver => "(the errors of the solver decide)".into(),
+            _ if b.decided_by_solver => "(hidden by errors of the solver)".into(),
             _ if !b.inseparable_from.is_empty() => {
                 format!("(cannot be separated from {})", b.inseparable_from.join(", "))
             }
@@ -331,14 +331,14 @@ fn print_predicted(bounds: &[Bound]) {
         bounds.iter().filter(|b| b.decided_by_solver).map(|b| b.name.as_str()).collect();
     if !decided.is_empty() {
         println!(
-            "No bound is given for {}: the errors of the FMU's solver decide. A smaller tolerance, --solver own:TOLERANCE, makes \
-             them smaller. So does --solver host, unless an output follows the slope of an input.",
+            "No bound is given for {}: errors of the FMU's solver hide its effect on the outputs. A smaller tolerance, --solver \
+             own:TOLERANCE, reduces these errors. So does --solver host, unless an output depends on the slope of an input.",
             decided.join(", ")
         );
     }
     let untold = bounds.iter().filter(|b| b.is_parameter && b.not_determined);
     let untold: Vec<&str> = untold.map(|b| b.name.as_str()).collect();
     if !untold.is_empty() {
-        println!("Nothing will be known of {} from these inputs.", untold.join(", "));
+        println!("These inputs do not determine {}.", untold.join(", "));
     }
 }

@@ -68,8 +68,7 @@ pub struct CampaignArgs {
     replace: bool,
 }
 
-/// Longest name of a default results directory, bytes. If the flags would make the name longer, it contains a hash of the
-/// flags instead.
+/// Longest name of a default results directory, bytes. A longer name is replaced by one with a hash of the flags.
 const LONGEST: usize = 100;
 
 /// Growth of the frequency of `campaign`'s sweep.
@@ -107,11 +106,15 @@ impl CampaignArgs {
         }
         if let Some(other) = &campaign.compare {
             let table = other.join("runs.csv");
-            ensure!(table.is_file(), "--compare {}: it has no runs.csv", other.display());
+            ensure!(
+                table.is_file(),
+                "--compare {}: the directory has no file runs.csv, so it is not a campaign",
+                other.display()
+            );
         }
-        campaign.plan.cases(fmu.description())?; // a wrong plan replaces nothing
+        campaign.plan.cases(fmu.description())?; // fails for a wrong plan before anything is replaced
         let store = campaign.take()?;
-        // the directory without flags belongs to the campaign without flags
+        // The default directory belongs to the campaign without flags, which may replace its contents.
         let own = campaign.out == Path::new(DEFAULT_CAMPAIGN);
         if campaign.holds_another() && !own && !self.replace {
             let (out, file) = (campaign.out.display(), campaign.plan_file());
@@ -161,7 +164,7 @@ impl CampaignArgs {
         for (name, _) in &self.settings {
             ensure!(
                 ![slosh::MODEL, tank::H, TAU_CMD].contains(&name.as_str()),
-                "{name} is what the campaign varies; use --model, --fills, --amplitudes"
+                "--set {name}: the campaign varies this quantity itself; use --model, --fills or --amplitudes"
             );
         }
         let kind = match self.sweep {
@@ -195,7 +198,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter
         fmu.description().variables.iter().filter(|v| v.causality == Causality::Output).count();
     let jobs = budget::jobs(campaign.jobs, 0)?;
     let largest = rows.iter().max().copied().unwrap_or(0) * (columns + 20) * 8;
-    // tables and the spectra made of them; what the report keeps of each run
+    // memory for tables and their spectra, and for the data of each run that the report needs
     let kept = rows.len().min(CURVES) * (4 << 20) + rows.len() * (64 << 10);
     let jobs = jobs.min(rows.len());
     guard::allow((jobs * largest * 4 + kept) as u64 + jobs as u64 * courses);

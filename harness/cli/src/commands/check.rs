@@ -100,7 +100,7 @@ impl CheckArgs {
             output::atomically(path, |file| sarif::write(&report, file))?;
         }
         if let warnings @ 1.. = report.count_findings(Severity::Warning) {
-            terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));
+            terminal::warn(format_args!("{} has {warnings} warnings", fmu.display()));
         }
         if let Some(bug) = &report.bug {
             bail!("{bug}");

@@ -33,9 +33,8 @@ pub struct DesignArgs {
     /// profiles.
     #[arg(long, value_name = "PROFILE", conflicts_with_all = ["multisine", "free"])]
     profile: Option<String>,
-    /// Plans a multisine with random phases whose largest torque is this peak, N·m. It contains only odd multiples of
-    /// the frequency 1/period. Some odd multiples are left out, because a response at these frequencies shows
-    /// nonlinearity.
+    /// Plans a multisine with random phases whose largest torque is PEAK, N·m. It contains only odd multiples of the
+    /// frequency 1/period. Some odd multiples are left out, so that a response at them reveals nonlinearity.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
     /// Desired signal-to-noise ratio of the gyro's samples, dB. The command prints the torque amplitude of a sine that
@@ -53,9 +52,9 @@ pub struct DesignArgs {
     /// Lowest and highest frequency of the multisine, or of the sine for --snr, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
-    /// Distributes the power of the multisine over its lines so that it determines the parameters of the expected bench
-    /// best (D-optimal); a quarter of the power stays spread over all lines. The command then compares the multisine with a
-    /// linear sweep of the same peak, band and length, and recommends the better of the two.
+    /// Distributes the power of the multisine over its frequencies so that it determines the parameters of the expected
+    /// bench best (D-optimal); a quarter of the power stays spread over all frequencies. The command then compares the
+    /// multisine with a linear sweep of the same peak, band and length, and recommends the better one.
     #[arg(long, requires = "multisine")]
     optimal: bool,
     /// Largest slosh angle, rad; a torque that would exceed it is scaled down. Linear theory holds up to 0.18 rad, where
@@ -106,8 +105,7 @@ const STEP: f64 = 0.02;
 /// Slosh angle, rad, at which the wave at the wall, 2 α R/(ξ² − 1) with the slosh angle α, the
 /// tank's radius R and the zero ξ = 1.841 of J₁', reaches 0.15 R. Linear theory ends there.
 const LINEAR: f64 = 0.18;
-/// Number of columns of the table from which the Cramér–Rao bound is computed, for an estimate of
-/// the memory that the table takes.
+/// Number of columns of the table from which the Cramér–Rao bound is computed; with it the memory for the table is estimated.
 const COLUMNS: usize = 20;
 
 impl DesignArgs {
@@ -217,8 +215,8 @@ impl DesignArgs {
         Ok((time, tau, factor))
     }
 
-    /// Computes the information from a plain sweep with the peak `peak`, N·m, which the limits of the wheel
-    /// and of the slosh angle may reduce further.
+    /// Computes the bounds for a linear sweep with the peak `peak`, N·m, which is reduced if the slosh angle
+    /// would exceed its limit.
     fn sweep(&self, bench: &Bench, time: &[f64], peak: f64) -> Result<Sweep> {
         let (f0, f1) = (self.band[0], self.band[1]);
         let written = |peak: f64| {
@@ -235,12 +233,11 @@ impl DesignArgs {
     }
 }
 
-/// Checks that straight lines between the rows `time` (s) and `tau` (N·m) reproduce the torque between the
-/// rows.
+/// Checks that straight lines between the rows `time` (s) and `tau` (N·m) reproduce the torque between the rows.
 ///
 /// # Errors
 ///
-/// If they do not; a smaller step or a held torque helps.
+/// If they do not; a torque with slower changes, or with edges at the rows, helps.
 fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     let history = torque.history(STEP, time[time.len() - 1], false)?;
     let lines = History::new(time.to_vec(), tau.to_vec(), None, false)?;
@@ -267,7 +264,7 @@ struct Bench<'f> {
     fmu: &'f Fmu,
     /// Settings of the FMU, with the damping ratio that the user set or, without one, the ratio of the correlation.
     setup: Setup,
-    /// True if delay, gyro bias and friction asymmetry are also predicted.
+    /// True if delay, gyro bias and friction asymmetry are also unknown.
     sensor_errors: bool,
     noise: Noise,
     /// Largest slosh angle that `--slosh-angle` allows, rad.
@@ -314,8 +311,8 @@ impl<'f> Bench<'f> {
     }
 }
 
-/// Returns the standard deviation of the gyro's white noise in one sample, rad/s: the angle random walk times
-/// the root of the sampling rate.
+/// Returns the standard deviation of the gyro's white noise in one sample, rad/s: the angle random walk times the
+/// square root of the sampling rate.
 fn white_noise(real: &mut dyn FnMut(&str) -> Result<f64>) -> Result<f64> {
     let white = real(imu::ARW)? * real(imu::RATE)?.sqrt();
     ensure!(
@@ -340,7 +337,7 @@ struct Plan {
     peak: f64,
     /// Largest slosh angle that the planned torque causes, rad.
     angle: f64,
-    /// Least and largest speed of the reaction wheel, rad/s.
+    /// Lowest and highest speed of the reaction wheel, rad/s.
     speeds: (f64, f64),
     bounds: Bounds,
     sweep: Option<Sweep>,
@@ -381,7 +378,7 @@ impl Plan {
     fn print(&self, wheel: &Wheel, limit: Option<f64>) {
         if self.factor < 1.0 {
             println!(
-                "torques times {:.4}, within the wheel's limits{}",
+                "all torques are multiplied by {:.4}, to stay within the wheel's limits{}",
                 self.factor,
                 match limit {
                     Some(limit) => format!(" and {limit} rad of slosh"),
@@ -424,9 +421,9 @@ impl Plan {
             );
         }
         println!(
-            "No interval follows from these bounds: they are of the gyro's noise alone, for a friction curve of known shape. The standard \
-             deviations of identify also hold the tolerances of torque, clock and bench and the Stribeck curve, and are up to a \
-             hundred times larger."
+            "These bounds are not the intervals of a fit: they contain only the gyro's noise, and the shape of the friction curve is taken \
+             as known. The standard deviations of identify also contain the tolerances of torque, clock and bench and the unknown \
+             Stribeck curve, and are up to a hundred times larger."
         );
         if let Some(Sweep { profile, angle, bounds }) = &self.sweep {
             println!(
@@ -446,9 +443,9 @@ impl Plan {
 }
 
 impl DesignArgs {
-    /// Prints the torque amplitude of a sine for which the rate has the signal-to-noise ratio `snr`, dB, in
-    /// the gyro's samples: on the band, at resonance and antiresonance, and for a rigid hub. `limit` is the
-    /// largest torque of the wheel, N·m (thesis 8.6.1).
+    /// Prints the torque amplitude of a sine for which the gyro's samples have the signal-to-noise ratio `snr`, dB: at
+    /// both ends of the band, at resonance and antiresonance, and for a rigid hub. `limit` is the largest torque of the
+    /// wheel, N·m (thesis 8.6.1).
     fn torque_for(
         &self,
         snr: f64,
@@ -462,7 +459,7 @@ impl DesignArgs {
         let sigma = white_noise(real)?;
         let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
         let dry = real(friction::C)? + real(friction::D)?;
-        // Describing function of the dry friction at that rate.
+        // describing function of the dry friction at this rate
         let mut bench = expected(real, 1.0)?;
         bench.friction =
             real(friction::B)? + real(hub::C)? + 4.0 * dry / (std::f64::consts::PI * rate);
@@ -500,8 +497,8 @@ impl DesignArgs {
     }
 }
 
-/// Returns the expected linear bench. Its viscous friction takes the same power as the dry friction, at the
-/// rate of a torque with this peak (crest factor 3) far from resonance.
+/// Returns the expected bench as a linear model. Its viscous friction dissipates the same power as the dry friction, at
+/// the rate that a torque with this peak (crest factor 3) causes far from resonance.
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
     let arm = real(tank::R)?;
     let mode = Mode {

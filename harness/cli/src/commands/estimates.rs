@@ -31,8 +31,8 @@ impl Out<'_> {
         found
     }
 
-    /// Writes a result to its file, and sends it to the program that started this one, if there is one (the
-    /// Python package reads it there). `text` is JSON.
+    /// Writes a result, JSON, to the result file. If another program (the Python package) has started this one to read
+    /// its messages, also sends the result to it.
     ///
     /// # Errors
     ///
@@ -47,8 +47,8 @@ impl Out<'_> {
         }
     }
 
-    /// Saves a result, prints it as JSON or by `tables`, and writes the report. A result that cannot be
-    /// trusted is also a warning, which `--strict` makes an error.
+    /// Saves the JSON `text` of a result, prints its tables by `tables`, and writes its report. If the result cannot be
+    /// trusted, prints a warning, which `--strict` makes an error.
     ///
     /// # Errors
     ///
@@ -88,8 +88,8 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     }
 }
 
-/// Formats a predicted standard deviation for a table. NaN is written as "not told": the inputs carry no information about
-/// this unknown.
+/// Formats a predicted standard deviation for a table. An infinite one or NaN is written as "unknown", because the
+/// inputs carry no information about this parameter.
 pub(super) fn deviation(std: f64) -> String {
-    if std.is_finite() { format!("{std:.2e}") } else { "not told".into() }
+    if std.is_finite() { format!("{std:.2e}") } else { "unknown".into() }
 }

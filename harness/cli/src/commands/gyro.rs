@@ -111,14 +111,14 @@ impl GyroArgs {
         let seconds = step * omega.len() as f64;
         ensure!(
             self.chunk > 0.0 && seconds > LEAST_CHUNKS * self.chunk && self.chunk > 10.0 * step,
-            "{}: it lasts {seconds:.0} s, in chunks of {} s (allowed: at least {LEAST_CHUNKS} chunks of at least 10 rows; \
-             --chunk SECONDS makes them shorter)",
+            "{}: the recording lasts {seconds:.0} s, in chunks of {} s (allowed: at least {LEAST_CHUNKS} chunks of at least 10 rows; \
+             --chunk SECONDS sets their length)",
             path.display(),
             self.chunk
         );
         ensure!(
             omega.iter().any(|w| *w != omega[0]),
-            "{}: omega is constant, {} rad/s: the gyro is off, or coarser than its noise",
+            "{}: omega is constant, {} rad/s: the gyro is off, or its resolution is coarser than its noise",
             path.display(),
             omega[0]
         );
@@ -172,8 +172,8 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     ]
 }
 
-/// Lists the noise parameters of a recording with their confidence intervals, and whether they describe its
-/// Allan deviation, as pairs of name and value.
+/// Lists the noise parameters of a recording with their confidence intervals, and a verdict on the fit of its Allan
+/// deviation, as pairs of name and text.
 pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     let stated = |Estimate { value, low, high, .. }: &Estimate, unit: &str| match (*low, *high) {
         (low, high) if low.is_nan() || high.is_nan() => {
@@ -205,10 +205,13 @@ pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     let (chi_squared, degrees) = fit.chi_squared;
     let chi_squared = format!("chi-squared {chi_squared:.1}, {degrees} degrees of freedom");
     let verdict = match fit.fits {
-        true => format!("these terms describe it from {:.3} s on ({chi_squared})", fit.from),
+        true => format!(
+            "the terms above describe the Allan deviation from {:.3} s on ({chi_squared})",
+            fit.from
+        ),
         false => format!(
-            "does not fit: at {:.3} s it lies {:.0} % {} these terms ({chi_squared}); a Gauss-Markov bias, a ramp or a filter do \
-             not explain it. Look for temperature, vibration, steps of the bias",
+            "does not fit: at {:.3} s the Allan deviation is {:.0} % {} the sum of the terms ({chi_squared}); a Gauss-Markov bias, a \
+             ramp or a filter do not explain it. Possible causes: changes of temperature, vibration, steps of the bias",
             fit.worst.tau,
             100.0 * (fit.worst.ratio - 1.0).abs(),
             if fit.worst.ratio > 1.0 { "above" } else { "below" }
@@ -226,7 +229,7 @@ fn rows(rest: &Rest) -> Vec<(String, String)> {
     row("length", format!("{} samples in {hours:.2} h", rest.count));
     row("mean (bias)", format!("{:.4e} rad/s", rest.mean));
     row("trend", format!("{:.4e} rad/s per hour", rest.trend * 3600.0));
-    row("standard deviation without it", format!("{:.4e} rad/s", rest.deviation));
+    row("standard deviation without trend", format!("{:.4e} rad/s", rest.deviation));
     row("smallest change of a reading", format!("{:.4e} rad/s", rest.quantum));
     row(
         "noise over quantisation (QNR)",
@@ -243,7 +246,7 @@ fn rows(rest: &Rest) -> Vec<(String, String)> {
     row(
         "Kolmogorov and Smirnov's test",
         format!(
-            "{read} of {chunks} chunks are not normal as they are read, {between} between the levels of the readings (by chance: \
+            "{read} of {chunks} chunks are not normal, {between} if quantisation is taken into account (expected by chance: \
              {:.1})",
             0.05 * chunks as f64
         ),

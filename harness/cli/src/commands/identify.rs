@@ -116,8 +116,8 @@ struct KnownArgs {
     /// if given, is the standard deviation of prior knowledge about the value.
     #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = started)]
     starts: Vec<(String, f64, Option<f64>)>,
-    /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as of a sampled controller)
-    /// or smooth (band-limited, as of a sampled recording of a smooth torque) [default: the one that fits best].
+    /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as by a sampled controller)
+    /// or smooth (band-limited, as in a sampled recording of a smooth torque) [default: the behaviour that fits best].
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
     /// Uses only the rows from the first to the second of these times, s.
@@ -207,22 +207,22 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
-/// Options of older versions that were removed, and values of `--method`, with what replaces each.
+/// Options of older versions and values of `--method` that were removed, each with its replacement.
 const REMOVED: &str = include_str!("removed.txt");
 
-/// Adds the kind of recording to `identify DATA`, which names none: `fmu` if `--free` is there, otherwise
-/// `bench`. Other command lines stay as they are.
+/// Adds the kind of recording to `identify DATA`, which names no kind: `fmu` if `--free` is given, otherwise `bench`.
+/// Returns other command lines unchanged.
 ///
 /// # Errors
 ///
-/// If the command line has a removed option; the message says what replaces it.
+/// If the command line has a removed option; the message names its replacement.
 pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     const KINDS: [&str; 7] = ["bench", "fmu", "decay", "friction", "help", "--help", "-h"];
     const FLAGS: [&str; 4] = ["--messages", "--quiet", "-q", "--strict"];
     let Some(place) = arguments.iter().position(|argument| argument == "identify") else {
         return Ok(arguments);
     };
-    // Options of the program may stand before the command, other commands may not.
+    // Only options of the program may precede the command; otherwise `identify` is not the command.
     let is_value = |k: usize| arguments[k - 1].to_string_lossy().starts_with("--");
     let before = (1..place).all(|k| arguments[k].to_string_lossy().starts_with('-') || is_value(k));
     if !before {
@@ -363,7 +363,7 @@ impl FrictionArgs {
 }
 
 impl DecayArgs {
-    /// Reads free decays and fits frequency and damping. All must be recordings of the same signal.
+    /// Reads free decays, which must be recordings of the same signal, and fits frequency and damping.
     fn run(&self) -> Result<()> {
         self.data.check()?;
         let source = self.data.source(trim(&self.trim)?)?;
@@ -389,7 +389,7 @@ impl DecayArgs {
 }
 
 impl KnownArgs {
-    /// Collects what the options state about the bench. The names of the FMU's parameters are used.
+    /// Collects the properties of the bench that the options state, under the names of the FMU's parameters.
     fn options(&self) -> Result<Options> {
         let (tolerances, gyro_scale) = tolerances(&self.tolerances)?;
         let (known, starts): (Vec<_>, Vec<_>) =

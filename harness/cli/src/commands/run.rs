@@ -36,7 +36,7 @@ pub struct RunArgs {
     /// tau_slope is the derivative of tau_cmd until the next row.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// Ignores columns of --input that are no inputs of the FMU. Without this flag they are an error.
+    /// Ignores columns of --input that do not name an input of the FMU. Without this flag such a column is an error.
     #[arg(long, requires = "input")]
     ignore_columns: bool,
     /// File of parameters, which are set before the parameters given by --set: TOML with lines `"name" = value`, .ssv
@@ -105,14 +105,14 @@ impl RunArgs {
         let description = fmu.description();
         if description.co_simulation.is_none() {
             terminal::note(
-                "the FMU has Model Exchange alone: the host integrates it (Dormand and Prince, order 5)",
+                "the FMU offers only Model Exchange: this command integrates it (Dormand and Prince, order 5)",
             );
         }
         let clocks = description.variables.iter().filter(|v| v.kind() == Type::Clock);
         let clocks: Vec<&str> = clocks.map(|clock| clock.name.as_str()).collect();
         if !clocks.is_empty() {
             terminal::warn(format_args!(
-                "the FMU has clocks, and none ticks in this run: what they activate keeps its start values ({})",
+                "the FMU has clocks ({}), and none ticks in this run: variables that a clock activates keep their start values",
                 clocks.join(", ")
             ));
         }
@@ -152,22 +152,22 @@ impl RunArgs {
         }
         let named: Vec<String> =
             run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
-        // The bench is at rest, except for what the settings say.
+        // The bench starts at rest, unless a setting changes this.
         let rest = rest::moving_starts(description).into_iter().map(|name| (name, "0".into()));
         let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
         let parameters = run::parameters(description, &settings, &named);
         let columns = match self.columns.is_empty() {
-            // Driven inputs are in the table anyway.
+            // The table contains driven inputs in any case.
             true => default_columns(description, &parameters),
             false => whole_names(self.columns),
         };
         if let Some(i) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
             bail!("--columns names {} twice", columns[i]);
         }
-        // Time and driven inputs are in the table anyway.
+        // The table contains time and driven inputs in any case.
         let columns = run.columns_with(&[], columns.iter().map(String::as_str));
         let asked = columns.len();
-        // Also recorded, to say at the end whether the model stayed within its range of validity.
+        // These variables are also recorded, so that the run can report at its end if the model left its range of validity.
         let range = Range::read(description, &mut instance)?;
         let tanks = Tanks::read(description, &mut instance, self.tension.unwrap_or(WATER_TENSION))?;
         if self.tension.is_some() && tanks.is_none() {
@@ -184,7 +184,7 @@ impl RunArgs {
             &columns,
             needs.chain(limits.required_columns()).chain(sensors.required_variables()),
         );
-        // Memory for the table, its copy for `--columns`, and what is written: 25 characters for a number.
+        // memory for the table, for its copy with `--columns`, and for the output: 25 characters for a number
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());
         let bar = progress::steps_bar()?;
@@ -226,9 +226,9 @@ impl RunArgs {
     }
 }
 
-/// Returns the columns to record by default. For the bench these are four signals; for another FMU all
-/// numeric outputs and the slosh angles, as in a campaign. `hubslosh view` also needs the states of the
-/// bench's modes after the first, and the liquid left in draining tanks.
+/// Returns the columns to record by default: four signals for the bench; all numeric outputs and the slosh angles for
+/// another FMU, as in a campaign. `hubslosh view` also needs the states of the bench's modes after the first, and the
+/// liquid left in draining tanks.
 fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -243,8 +243,7 @@ fn default_columns(
     names
 }
 
-/// Joins the parts of a text that was split at commas where a comma belongs to an index, as in
-/// `inertia[1,2]`.
+/// Joins parts of a text that was split at commas, where the comma belongs to an index, as in `inertia[1,2]`.
 fn whole_names(parts: Vec<String>) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for part in parts {

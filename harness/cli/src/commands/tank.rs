@@ -80,20 +80,19 @@ pub struct TankArgs {
     /// the centring stiffness of the first mode then include the meniscus at --gravity and --sigma.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
-    /// Rate at which tank and liquid turn about the axis of the tank, rad/s. The command then computes the surface, the
-    /// centre of mass and the inertias of the turning liquid. It also states the error of the modes, which are computed for
-    /// liquid at rest. With --parameters of SloshTank and Spacecraft it writes the spin of the liquid. The thrust along the
-    /// axis is --gravity.
+    /// Rate at which tank and liquid rotate about the axis of the tank, rad/s. The command then computes the surface,
+    /// the centre of mass and the inertias of the rotating liquid, and states the error of the modes, which are
+    /// computed for liquid at rest. With --parameters for SloshTank and Spacecraft it writes the spin of the liquid.
+    /// The acceleration along the axis is --gravity.
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     spin: Option<f64>,
-    /// Computes four coefficients of the first mode from fully nonlinear potential flow in this tank, in about 10 s.
-    /// With these coefficients the pendulum of SloshTank and Spacecraft has the same energy as waves of large amplitude.
-    /// Without this option the coefficients come from tables, which exist only for spheres and upright cylinders and for
-    /// a range of fills.
+    /// Computes coefficients of the first mode from fully nonlinear potential flow in this tank, in about 10 s. With
+    /// these coefficients the pendulum of SloshTank and Spacecraft has the same energy as waves of large amplitude.
+    /// Without this option the coefficients come from tables, which exist only for spheres and upright cylinders and
+    /// for a range of fills.
     #[arg(long, conflicts_with = "sweep")]
     large_waves: bool,
-    /// Writes the file of --parameters even if the formula for the stiffness by surface tension is used far outside its
-    /// range.
+    /// Writes the file of --parameters even if the formula for the stiffness by surface tension is far outside its range.
     #[arg(long, requires = "parameters")]
     force: bool,
 }
@@ -126,7 +125,7 @@ impl TankArgs {
                 if self.large_waves {
                     finite_amplitude::add_large_waves(&tank, &mut data);
                 }
-                // The table is for a given surface tension, and `--parameters` has its own warning.
+                // The printed table states the warnings of a given surface tension itself, and `--parameters` prints its own.
                 let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
                 if self.parameters.is_none() && !has_table {
                     let found = parameters::surface_tension_warnings(&data, self.liquid());
@@ -191,8 +190,8 @@ impl TankArgs {
         }
     }
 
-    /// Returns the path of `--parameters` with the text of the file, in the format of its ending; `None`
-    /// without the option. `make` computes the parameters for a target FMU.
+    /// Returns the path of `--parameters` and the text of the file, in the format of the path's ending; `None` without
+    /// the option. `make` computes the parameters for a target FMU.
     fn set_file(
         &self,
         make: impl Fn(Target, Liquid) -> Result<ParameterSet, Problems>,

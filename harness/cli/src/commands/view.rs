@@ -47,8 +47,8 @@ pub struct ViewArgs {
     /// Sets a parameter of the run, if the file of the run does not contain it.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// FMU of the run: a file, or the name of an FMU of this project [default: the FMU that the file of the run names, or
-    /// the one that has its columns as variables].
+    /// FMU of the run: a file, or the name of an FMU of this project [default: the FMU that the file of the run names,
+    /// or an FMU of this project whose variables are the columns of the file].
     #[arg(long, value_name = "FILE|NAME")]
     fmu: Option<PathBuf>,
 }
@@ -169,7 +169,7 @@ fn find_model(columns: &[String]) -> Option<PathBuf> {
 fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     let time = table.column("time").unwrap_or_default();
     let (from, to) = (from.unwrap_or(f64::NEG_INFINITY), to.unwrap_or(f64::INFINITY));
-    // The limit may have been written with fewer digits than the time in the table.
+    // The limit may have fewer digits than the time in the table.
     let kept: Vec<usize> =
         (0..time.len()).filter(|k| time[*k] >= from - 1e-9 && time[*k] <= to + 1e-9).collect();
     if kept.len() < 2 && time.len() > 1 {
@@ -190,7 +190,7 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
 /// Number of points on a segment of a drawn contour, and of masses at which the surface's height is computed.
 const POINTS: usize = 24;
 
-/// Number of radial steps at which the surface of a mode is given.
+/// Number of steps of the radius at which the surface of a mode is given.
 const STEPS: usize = 80;
 
 fn drawing(text: &str) -> Result<(usize, Drawing)> {
@@ -238,8 +238,8 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
     })
 }
 
-/// Interpolates a mode's surface elevation to equal steps of the radius, divided by the elevation at the
-/// outer wall. `shape` has pairs of radius and elevation.
+/// Interpolates the surface elevation of a mode at equal steps of the radius, divided by the elevation at the outer
+/// wall. `shape` has pairs of radius and elevation.
 fn equally_spaced(shape: &[[f64; 2]]) -> Vec<f64> {
     let (first, last) = (shape[0], shape[shape.len() - 1]);
     let at = |i: usize| {

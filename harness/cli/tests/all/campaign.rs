@@ -1,4 +1,4 @@
-//! A small campaign from outside: its files, its results, its second start.
+//! Runs small campaigns as processes: their files, their results, and a second start with the same plan.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -33,13 +33,13 @@ fn with_viscous_friction_the_antiresonance_equals_that_of_the_exact_transfer_fun
             &["--set", "friction.model=viscous", "--amplitudes", "0.1", "--sweep", sweep],
         );
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        // minima of |H| to 12 digits, from the roots of d log|H|/df in 60-digit arithmetic; 2 mHz
-        // is a seventh of the half-power width
+        // minima of |H| to 12 digits, from the roots of d log|H|/df in 60-digit arithmetic; the tolerance of 2 mHz is a
+        // seventh of the half-power width
         for (row, f_dip) in features(directory).iter().zip([2.1329468, 2.3431981]) {
             let number = |name: &str| row[name].parse::<f64>().unwrap();
             assert!((number("f_dip_hz") - f_dip).abs() < 0.002, "{row:?}");
             assert!(number("f_res_hz") > number("f_dip_hz"), "{row:?}");
-            // the acceptance figure for a whole sweep
+            // the required accuracy of a whole sweep
             assert!(number("max_energy_residual") < 1e-8, "{row:?}");
             assert_eq!(number("stuck_s"), 0.0);
         }
@@ -57,10 +57,10 @@ fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 
     let text = std::fs::read_to_string(directory.join("c/features.csv")).unwrap();
-    // these columns first, others may follow
+    // The header begins with these columns; others may follow.
     assert!(text.lines().next().unwrap().starts_with(HEADER));
     for row in features(directory) {
-        // the thesis's sticking bearing at 10 cm: ranges of the acceptance check
+        // The bearing of the thesis sticks at 10 cm: ranges that the acceptance check requires.
         let number = |name: &str| row[name].parse::<f64>().unwrap();
         assert!((number("f_dip_hz") - 2.344).abs() < 0.004, "{row:?}");
         assert!((2.45..2.48).contains(&number("f_res_hz")), "{row:?}");
@@ -71,14 +71,14 @@ fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     assert_eq!(table.rows(), 135_001);
     assert_eq!(table.column("time").unwrap()[135_000], 2700.0);
 
-    // the page needs nothing from elsewhere
+    // The page loads nothing from the network.
     let page = std::fs::read_to_string(directory.join("c/report.html")).unwrap();
     assert!(page.contains("Why the swept resonance lies above the exact one"));
     for word in [" src=\"", "<link", "@import", "url(http"] {
         assert!(!page.contains(word), "{word} is in the report");
     }
 
-    // a second start makes only what is missing, broken, or of another recipe
+    // A second start simulates only runs that are missing, damaged, or that have other parameters.
     let made = || std::fs::metadata(&run).unwrap().modified().unwrap();
     let first = made();
     assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("2 reused"));
@@ -174,14 +174,15 @@ fn runs_of_a_plan_with_sensors_contain_the_readings_and_are_reused() {
         let [load, force] = ["load", "F_tangential"].map(|name| table.column(name).unwrap());
         load.iter().zip(force).map(|(y, x)| y - x).collect::<Vec<f64>>()
     });
-    // one seed, but the runs' noise is not the same
+    // The seeds are equal, but the noise of the two runs is not.
     let alike = loads[0].iter().zip(&loads[1]).filter(|(a, b)| (*a - *b).abs() < 1e-6).count();
     assert!(alike < 5, "{alike} of {}", loads[0].len());
     let again = run("c", &[]);
     let text = String::from_utf8_lossy(&again.stderr);
     assert!(again.status.success() && !text.contains("re-running"), "{text}");
 
-    // another program makes the runs of the list, without readings: they are made when its files are taken
+    // Another program simulates the runs of the list without readings of sensors; the campaign computes the readings
+    // when it reads these files.
     let listed = run("other", &["--list"]);
     let listed: serde_json::Value = serde_json::from_slice(&listed.stdout).unwrap();
     let columns: Vec<&str> =

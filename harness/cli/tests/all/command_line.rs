@@ -28,8 +28,8 @@ fn files(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Asserts that a command fails with one line that contains all of `words`, and leaves the
-/// directory unchanged. A line that lists the columns in use may come before.
+/// Asserts that a command fails with a line that contains all of `words`, and leaves the directory unchanged. Another
+/// line, which lists the columns in use, may come before.
 fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     let before = files(directory);
     let output = output();
@@ -88,7 +88,7 @@ fn a_run_writes_the_requested_columns() {
     .unwrap();
     assert_eq!(table.rows(), 11);
     assert_eq!(table.column("time").unwrap()[10], 0.2);
-    // at rest, held by the bearing until the torque exceeds 5.9 mN·m
+    // At rest, the bearing holds the hub until the torque exceeds 5.9 mN·m.
     assert_eq!(table.column("stuck").unwrap()[0], 1.0);
     assert!(table.column("omega").unwrap()[10] > 0.0);
     assert_eq!(files(directory.path()), ["out.csv"]);
@@ -148,7 +148,7 @@ fn a_value_of_the_wrong_kind_is_refused() {
 
 /// A depth of 0, a negative depth and NaN: the command fails with the FMU's message, which names tank.h.
 #[test]
-fn a_tank_without_liquid_is_refused_in_the_fmus_own_words() {
+fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     for height in ["tank.h=0", "tank.h=-0.1", "tank.h=NaN"] {
@@ -178,7 +178,7 @@ fn runs_beyond_any_memory_are_refused() {
         ),
         (&["gyro", "--fmu", fmu, "--records", "99999999999", "--out", "g"], &["1 to 10000"]),
         (&["scale", "froude", "--lambda", "1e308"], &["lambda = 1e308"]),
-        // a negative number is a value, not a flag
+        // A negative number counts as a value, not as a flag.
         (&["scale", "froude", "--lambda", "-1"], &["lambda = -1", "positive"]),
         (
             &["run", "--fmu", fmu, "--profile", "zero", "--step", "-0.1", "--out", "x.csv"],
@@ -273,7 +273,7 @@ fn an_experiment_without_information_is_refused() {
         let arguments = [&["design", "--fmu", fmu, "--profile"], plan].concat();
         refuses(directory.path(), || hubslosh(directory.path(), &arguments), words);
     }
-    // a flag of the multisine
+    // --duration belongs to the multisine.
     let done = hubslosh(directory.path(), &["design", "--profile", "sine", "--duration", "0.02"]);
     let said = String::from_utf8_lossy(&done.stderr);
     assert!(said.contains("cannot be used with '--duration"), "{said}");
@@ -428,7 +428,7 @@ fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_ref
         short_run(directory, &[&columns[..], &set, more].concat())
     };
     let read = |names: &[&str]| Table::read(&directory.join("out.csv"), names).unwrap();
-    // tau_ext alone turns the hub as tau_cmd does: theta = tau t²/2 over the same inertia
+    // tau_ext without tau_cmd turns the hub in the same way as tau_cmd does: theta = tau t²/2 divided by the same inertia.
     let done = run("time,tau_ext,g_axial\n0,0.1,2\n0.2,0.1,4\n", &[]);
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let both = read(&["time", "tau_ext", "g_axial", "theta"]);
@@ -436,17 +436,17 @@ fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_ref
     assert!(run("time,tau_cmd\n0,0.1\n0.2,0.1\n", &[]).status.success());
     let (ext, cmd) =
         (both.column("theta").unwrap()[10], read(&["theta"]).column("theta").unwrap()[10]);
-    // one torque, two ways in: the same to rounding
+    // The same torque through either input gives the same angle, to rounding.
     assert!((ext / cmd - 1.0).abs() < 1e-12 && ext > 1e-3, "{ext} {cmd}");
 
-    // the slope makes an edge an edge: 0.1 N·m for 0.1 s, then none; joined by lines it would
-    // fall during a step
+    // With its slope, an edge is an edge: 0.1 N·m for 0.1 s, then 0. If lines joined the rows, the torque would
+    // fall during a step.
     let edge = "time,tau_cmd,tau_slope\n0,0.1,0\n0.1,0,0\n0.2,0,0\n";
     assert!(run(edge, &[]).status.success());
     let table = read(&["theta", "tau_cmd"]);
     assert_eq!(table.column("tau_cmd").unwrap()[4..6], [0.1, 0.0]);
     let (theta, steady) = (table.column("theta").unwrap()[10], cmd);
-    // tau/I (t1²/2 + t1 t1) against tau/I (2 t1)²/2
+    // tau/I (t1²/2 + t1 t1), compared with tau/I (2 t1)²/2 of a constant torque
     assert!((theta / steady - 0.75).abs() < 1e-9, "{theta} {steady}");
 
     refuses(
@@ -522,7 +522,7 @@ fn shells_get_completions_with_every_command() {
 }
 
 #[test]
-fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
+fn exit_codes_distinguish_a_failure_from_a_wrong_command_line() {
     for (arguments, code) in [
         (&["variables", "--fmu", "none.fmu"][..], 1),
         (&["run", "--no-such-flag"], 2),
@@ -562,7 +562,7 @@ fn messages_are_coloured_on_request_and_not_by_default_in_files() {
     );
     assert!(run("--color=auto").starts_with("error: there is no FMU"));
     assert!(run("--color=never").starts_with("error: there is no FMU"));
-    // also what clap says of the command line itself
+    // Messages of the parser of the command line are coloured, too.
     let wrong = hubslosh(Path::new("."), &["--color", "always", "nothing"]);
     assert!(String::from_utf8(wrong.stderr).unwrap().contains("\u{1b}[31merror:"));
 }
@@ -577,7 +577,7 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     assert_eq!(text(&loud.stdout), "11 rows in out.csv\n");
     let quiet = short_run(directory, &["--profile", "zero", "--quiet", "--strict"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
-    // no stiffness: the FMU warns, and the run says which force rules the liquid and where the model ends
+    // no stiffness: the FMU warns, and at the end the run says which force dominates and that the model's range ended
     let weightless = ["--profile", "zero", "--set", "g_axial=0", "--quiet"];
     let warned = short_run(directory, &weightless);
     assert!(warned.status.success() && text(&warned.stderr).starts_with("warning: "));
@@ -653,7 +653,7 @@ fn an_installed_command_finds_the_fmus_that_came_with_it() {
     };
     let package = place("lib/python3.12/site-packages/hubslosh").canonicalize().unwrap();
     assert_eq!(Path::new(&said(&["fmus"])), package.join("fmus/HubSlosh.fmu"));
-    // the book is not in the package
+    // The Python package does not contain the book.
     let address = said(&["book"]);
     assert!(address.starts_with("https://") && address.ends_with("/book/index.md"), "{address}");
     let copy = Command::new(&command).args(["book", "--out", "copy"]).output().unwrap();
@@ -666,7 +666,7 @@ fn an_installed_command_finds_the_fmus_that_came_with_it() {
 fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
     let directory = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
-    // cargo sets it for the programs that it runs, tests too
+    // cargo sets this variable for tests, too.
     command.env_remove("CARGO_MANIFEST_DIR").current_dir(directory.path());
     let done = command.output().unwrap();
     let said = String::from_utf8_lossy(&done.stdout);

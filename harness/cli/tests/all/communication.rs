@@ -1,5 +1,5 @@
-//! The answer of a command does not depend on the step of its rows: inputs and profiles are followed between the rows, or the command
-//! refuses and says which step it needs.
+//! The result of a command does not depend on the interval of its rows: the FMU follows inputs and profiles between the
+//! rows, or the command refuses the run and says which interval it needs.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -18,8 +18,8 @@ fn refused(directory: &Path, arguments: &[&str]) -> String {
     String::from_utf8(done.stderr).unwrap()
 }
 
-/// A hub that turns without friction and with rigid liquid: its rate is the integral of the torque over the
-/// inertia, so that only the rounding errors of a sum remain.
+/// Settings of a hub that turns without friction and with rigid liquid. Its rate is the integral of the torque divided
+/// by the inertia, so that only the rounding errors of a sum remain.
 const FREE: [&str; 4] = ["--set", "slosh.model=frozen", "--set", "friction.model=none"];
 
 fn run(directory: &Path, arguments: &[&str]) -> [Vec<f64>; 3] {
@@ -51,7 +51,7 @@ fn follows(directory: &Path, source: &[&str], integral: &dyn Fn(f64) -> f64, wit
                 omega * inertia
             );
         }
-        // the same at shared times
+        // The values are equal at times that occur in both tables.
         let [times, torques, rates] = first.get_or_insert_with(|| found.clone());
         let mut shared = 0;
         for (k, t) in time.iter().enumerate() {
@@ -77,7 +77,7 @@ fn write(directory: &Path, rows: impl Iterator<Item = (f64, f64)>) {
 fn a_torque_file_has_the_same_impulse_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    // 30 ms of 1 N·m every 0.25 s on rows 5 ms apart; lines make ramps of a row at both ends
+    // 30 ms of 1 N·m every 0.25 s in rows 5 ms apart; lines between the rows make ramps of 5 ms at both ends
     let pulse = |k: u32| if (7..13).contains(&(k % 50)) { 1.0 } else { 0.0 };
     write(folder, (0..=400).map(|k| (0.005 * f64::from(k), pulse(k))));
     let integral = |t: f64| {
@@ -87,7 +87,7 @@ fn a_torque_file_has_the_same_impulse_with_any_output_step() {
         whole + rest * (pulse(k) + (pulse(k + 1) - pulse(k)) * rest / 0.01)
     };
     follows(folder, &["--input", "in.csv"], &integral, 1e-9);
-    // held, each row counts for 5 ms
+    // With zero-order hold each row acts for 5 ms.
     let held = |t: f64| {
         let k = (t / 0.005 + 1e-9) as u32;
         let rest = t - 0.005 * f64::from(k);
@@ -103,7 +103,7 @@ fn a_torque_file_has_the_same_impulse_with_any_output_step() {
         _ => f64::NAN,
     };
     let integral = |t: f64| match ramp(t) {
-        // half of it, while it acts
+        // half of the torque's integral, while the torque acts
         value if value.is_nan() => 0.0005 + (t - 0.303).clamp(0.0, 0.007),
         value => value,
     };
@@ -116,7 +116,7 @@ fn a_torque_file_has_the_same_impulse_with_any_output_step() {
 /// The hub's rate is the integral of the torque, ∫ sin 2πft = (1 − cos 2πft)/2πf. Straight lines between rows h = 1 ms
 /// apart give (π f h)²/3 = 0.8 % less at 49 Hz.
 #[test]
-fn a_sine_of_49_hz_in_a_file_acts_with_any_step() {
+fn a_sine_of_49_hz_in_a_file_has_the_same_impulse_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
     let w = std::f64::consts::TAU * 49.0;
     write(folder.path(), (0..=2000).map(|k| 0.001 * f64::from(k)).map(|t| (t, (w * t).sin())));
@@ -133,7 +133,7 @@ fn a_profile_has_the_same_impulse_with_any_output_step() {
         follows(folder.path(), &["--profile", profile], integral, within);
     };
     for f in [50.0, 24.9, 333.0] {
-        // a line between 70 commands for a period is at most 0.1 % off
+        // A straight line between 70 torque values per period differs by at most 0.1 %.
         let w = std::f64::consts::TAU * f;
         let profile = format!("sine:amplitude=1,frequency={f},duration=1");
         follows(&profile, &|t| (1.0 - (w * t).cos()) / w, 1.5e-3 / w);
@@ -145,7 +145,7 @@ fn a_profile_has_the_same_impulse_with_any_output_step() {
     };
     let profile = "bang-stop-bang:amplitude=0.1,start=0.103,bang=0.0071,stop=0.0333,duration=1";
     follows(profile, &back, 1e-12);
-    // an upward sweep through 50 Hz: its integral is that of 10,000 midpoints
+    // an upward sweep through 50 Hz, whose integral is computed from 10,000 midpoints
     let sweep = |t: f64| (std::f64::consts::TAU * (t + 59.0 / 4.0 * t * t)).sin();
     let integral = |t: f64| {
         let h = t / 1e4;
@@ -154,8 +154,7 @@ fn a_profile_has_the_same_impulse_with_any_output_step() {
     follows("lin-sweep:amplitude=1,f0=1,f1=60,duration=2", &integral, 1e-4);
 }
 
-/// The torque is always the same line from command to command; `--sample` only changes how close the commands
-/// are.
+/// The torque always follows straight lines between its values; `--sample` only changes the distance of the values.
 #[test]
 fn the_option_sample_only_changes_the_interval_between_commands() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,8 +215,7 @@ fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     assert!(said.contains("commands until 2700 s") && said.contains("is possible"), "{said}");
 }
 
-/// A campaign's rows must be close enough to show the torque; between them the torque is followed as by
-/// `run`.
+/// The rows of a campaign must be close enough to show the torque; between the rows the FMU follows the torque as in `run`.
 #[test]
 fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     let folder = tempfile::tempdir().unwrap();
@@ -284,8 +282,8 @@ fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     assert!(said.contains("commands until 2700 s"), "{said}");
 }
 
-/// If a line were held over each step, it would be late by half a step, and a row would pair an input with
-/// the response to the previous one.
+/// If the input were held at the start of a line over each step, it would be late by half a step, and a row would pair
+/// an input with the response to the previous input.
 #[test]
 fn an_fmu_that_cannot_interpolate_has_inputs_that_are_constant_between_rows() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Promises of README and of the scripts for other hosts.
+//! Checks statements of the README, and the scripts for other hosts.
 
 use host::causality::Causality;
 use host::description::ModelDescription;
@@ -7,9 +7,8 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(pack::root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// The first screen leads a newcomer to a first plot, to the tools with which the FMUs were tested, and to
-/// the commands of the source. Each of the two commands of the source stands alone on its line, ready to
-/// copy.
+/// The first 40 lines lead a newcomer to a first plot, to the tools with which the FMUs were tested, and to the
+/// commands for building from source. Each of these two commands stands on a line of its own, ready to copy.
 #[test]
 fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
     let readme = read("README.md");

@@ -1,4 +1,4 @@
-//! A campaign's directory from outside: damaged runs, two campaigns at once, kills, full disks.
+//! The directory of a campaign: damaged runs, two campaigns at the same time, killed campaigns, full disks.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
 fn is_consistent(directory: &Path) {
     let folder = directory.join("c");
     let manifest = std::fs::read_to_string(folder.join(MANIFEST)).unwrap();
-    // the last line of a name counts
+    // If a name has several lines, the last one counts.
     let sums: BTreeMap<&str, &str> =
         manifest.lines().map(|line| line.split_once("  ").unwrap()).map(|(s, n)| (n, s)).collect();
     for (name, sum) in sums {
@@ -86,7 +86,7 @@ fn every_flipped_bit_in_a_stored_run_is_noticed() {
     let whole: Vec<Vec<u8>> = runs.iter().map(|run| std::fs::read(run).unwrap()).collect();
     let mut random = Random::new(1, 0);
     let mut draw = |below: usize| (random.uniform() * below as f64) as usize;
-    // 200 bits
+    // 200 flipped bits
     for _ in 0..4 {
         for (run, bytes) in runs.iter().zip(&whole) {
             let mut bytes = bytes.clone();
@@ -127,7 +127,7 @@ fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
     let whole = std::fs::read(&run).unwrap();
     let mut flipped = whole.clone();
     flipped[100] ^= 1;
-    // a line is lost: its run is simulated again, and the command says so
+    // If a line of the manifest is lost, its run is simulated again, and the command says so.
     let without: String = text.split_inclusive('\n').filter(|line| !line.contains(&name)).collect();
     for damaged in [without, String::new()] {
         std::fs::write(&run, &flipped).unwrap();
@@ -137,11 +137,11 @@ fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
         assert!(std::fs::read(&run).unwrap() == whole);
         assert!(published(directory) == before);
     }
-    // a file is lost
+    // a lost file
     std::fs::remove_file(&run).unwrap();
     let (_, error) = successful(campaign(directory, plan));
     assert!(error.contains(": the file of the run is missing"), "{error}");
-    // the manifest is lost
+    // a lost manifest
     std::fs::write(&run, &flipped).unwrap();
     std::fs::remove_file(&manifest).unwrap();
     let done = campaign(directory, plan).output().unwrap();
@@ -153,7 +153,7 @@ fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
     assert!(published(directory) == before);
 }
 
-/// A campaign has more runs than the report draws curves of; runs.csv has a row for every run.
+/// A campaign has more runs than the report draws curves for; runs.csv has a row for every run.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
@@ -170,10 +170,10 @@ fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
     let all = rows("runs.csv");
     assert_eq!(all.len(), RUNS);
     let report = std::fs::read_to_string(directory.join("c/report.html")).unwrap();
-    // every second run and the last
+    // The report draws every second run and the last one.
     let words = format!("drawn of {} of the {RUNS} runs", RUNS / 2 + 1);
     assert!(report.contains(&words), "{words}");
-    // a run without curves has the numbers that it has alone
+    // A run without curves has the same numbers as in a campaign of this run only.
     let alone = format!("profile = \"sine:duration=0.06\"\n[vary]\nhub.I = [{:?}]\n", inertias[1]);
     successful(campaign(directory, &alone));
     let [one] = &rows("runs.csv")[..] else { panic!() };
@@ -221,7 +221,7 @@ fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() 
         let before = published(directory);
         let mut other = campaign(directory, INTERRUPTED);
         let mut child = other.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        // it stands in the manifest and under its name
+        // until the run is in the manifest and has its final name
         while !directory.join("c/runs/sine.parquet").exists() {
             assert!(child.try_wait().unwrap().is_none(), "it ended before its first run");
             std::thread::sleep(std::time::Duration::from_millis(1));
@@ -241,7 +241,7 @@ fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() 
             assert_eq!(names(&directory.join("tmp")), [""; 0], "SIG{signal}");
             assert!(!directory.join("c/.unfinished").exists(), "SIG{signal}");
         }
-        // the next start sweeps, and reuses what was finished
+        // The next start removes temporary files, and reuses the completed runs.
         successful(campaign(directory, plan));
         assert_eq!(names(&directory.join("tmp")), [""; 0], "SIG{signal}");
         assert!(!directory.join("c/.unfinished").exists(), "SIG{signal}");
@@ -256,7 +256,7 @@ fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() 
 #[cfg(unix)]
 fn limited(command: &Command, blocks: usize) -> Command {
     let mut shell = Command::new("sh");
-    // POSIX counts such blocks; with the signal ignored, a write beyond fails as on a full disk
+    // POSIX counts blocks of 512 bytes. With the signal ignored, a write beyond the limit fails as on a full disk.
     shell.args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"")]);
     shell.arg(command.get_program()).args(command.get_args());
     shell.current_dir(command.get_current_dir().unwrap());

@@ -1,4 +1,4 @@
-//! `hubslosh run` with an FMU of others: the FMU 3.0 of the tests of `check`.
+//! `hubslosh run` with an FMU of another project: the FMU 3.0 of the tests of `check`.
 
 use std::path::Path;
 use std::process::Command;
@@ -31,8 +31,8 @@ fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     pack::archive::write(&files, path).unwrap();
 }
 
-/// Runs the model with an input along straight lines, which intermediateUpdate sets, and compares its outputs
-/// with the closed solution. Mutant 35 passes its instance instead of the environment to the callbacks.
+/// Runs the model with an input that follows straight lines, which the callback intermediateUpdate sets, and compares its
+/// outputs with the exact solution. Mutant 35 of the model passes its instance to the callbacks instead of the environment.
 #[test]
 fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     for mutant in [0, 35] {
@@ -43,8 +43,7 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     }
 }
 
-/// Without Co-Simulation the host integrates. The clock, which the host does not activate, is named in a
-/// message.
+/// Without Co-Simulation the command integrates the FMU. A message names the clock, because the command does not activate it.
 #[test]
 fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
     let folder = tempfile::tempdir().unwrap();
@@ -60,11 +59,8 @@ fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
     changed_model(&path, 0, &[(element, ""), ("</ModelVariables>", clock)]);
     // the default experiment's tolerance is 1e-6
     let said = follows_its_closed_solution(&path, folder.path(), 2e-5);
-    assert!(said.contains("the host integrates it"), "{said}");
-    assert!(
-        said.contains("has clocks, and none ticks in this run") && said.contains("(tick)"),
-        "{said}"
-    );
+    assert!(said.contains("this command integrates it"), "{said}");
+    assert!(said.contains("has clocks (tick), and none ticks in this run"), "{said}");
 }
 
 fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> String {
@@ -88,10 +84,10 @@ fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> Strin
     let mut rows = 0;
     for line in lines {
         let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
-        // x' = -k (x - s t), x(0) = 1: x = s t - s/k + (1 + s/k) exp(-k t)
+        // exact solution of x' = -k (x - s t), x(0) = 1: x = s t - s/k + (1 + s/k) exp(-k t)
         let (t, k, s) = (row[0], 2.0, 0.5);
         let x = s * t - s / k + (1.0 + s / k) * (-k * t).exp();
-        // 100 steps, in Co-Simulation each exact to rounding
+        // 100 steps, each of which is exact to rounding in Co-Simulation
         assert!((row[2] - 2.0 * x).abs() < within, "{line}: {x}");
         assert_eq!(row[3], (t / 0.25 + 1e-6).floor(), "{line}");
         assert_eq!(row[4..], [1.0, 7.0, 0.0], "{line}");
@@ -101,7 +97,7 @@ fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> Strin
     String::from_utf8(done.stderr).unwrap()
 }
 
-/// The counter of this model is 100 while its Boolean is true.
+/// The output `counter` of this model is 100 while its Boolean is true.
 #[test]
 fn booleans_are_driven_from_a_file_and_held() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,7 +124,7 @@ fn booleans_are_driven_from_a_file_and_held() {
         if done.status.success() { Ok(out) } else { Err(error) }
     };
     let out = run("0,0,0\n0.95,0,1\n1.45,0,0\n2,0,0\n").unwrap();
-    // as pandas and as spreadsheets write them
+    // spellings of pandas and of spreadsheets
     for words in [["True", "False"], ["TRUE", "FALSE"], ["true", "false"]] {
         let [on, off] = words;
         let same = run(&format!("0,0,{off}\n0.95,0,{on}\n1.45,0,{off}\n2,0,{off}\n"));
@@ -137,7 +133,7 @@ fn booleans_are_driven_from_a_file_and_held() {
     let mut high = 0;
     for line in out.lines().skip(1) {
         let row: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
-        // the FMU steps to the row of the input, between two rows of the result
+        // The FMU steps to the row of the input, although it lies between two rows of the result.
         let on = (0.95..1.45).contains(&row[0]);
         assert_eq!(row[3] == 100.0, on, "{line}");
         high += usize::from(on);
@@ -153,7 +149,7 @@ fn booleans_are_driven_from_a_file_and_held() {
     let error = run("0,0,true\n1,true,true\n2,0,true\n").unwrap_err();
     assert!(error.contains("line 3, column u: \"true\" is not a number"), "{error}");
     assert_eq!(run("0,0,0\r2,0,0\r").unwrap(), run("0,0,0\n2,0,0\n").unwrap());
-    // the date changes, and nothing shows whether days or months come first
+    // The date changes at midnight, and nothing shows if the day or the month comes first.
     let error = run("01/02/2026 23:59:59,0,0\n02/02/2026 00:00:01,0,0\n").unwrap_err();
     assert!(
         error.contains("line 3, column time: \"02/02/2026 00:00:01\" may have the day first"),

@@ -44,7 +44,7 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     let asked =
         ["identify", "data.csv", "--model", "frozen", "--also", "none", "--out", "result.json"];
     let said = hubslosh(folder, &asked).unwrap();
-    // the liquid's part of the inertia is what the tank says
+    // The inertia of the liquid follows from the tank.
     assert!(said.contains("the interval is valid only for this liquid"), "{said}");
     let asked = ["run", "--parameters", "result.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--columns", "omega", "--out", "twin.csv"]].concat()).unwrap();
@@ -54,7 +54,8 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     };
     let (clean, twin) = (column("clean.csv"), column("twin.csv"));
     let off: f64 = clean.iter().zip(&twin).map(|(a, b)| (a - b).powi(2)).sum();
-    // rows of noise of 4e-4 rad/s and some parameters: far below one row's noise, and far below the 0.03 rad/s that
+    // The outputs of the run differ from the clean ones by far less than the noise of one row, 4e-4 rad/s, and by far
+    // less than the 0.03 rad/s that another inertia would cause.
     // another inertia would make
     assert!((off / clean.len() as f64).sqrt() < 1e-4, "{off}");
 }
@@ -81,14 +82,14 @@ fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
     let said = asked("identify", "hub.I=0.1:0.1:0.12", &fitted);
     assert!(said.contains("hub.I is at its upper bound, 0.12"), "{said}");
     let said = asked("design", "hub.I=0.5", &["--noise", "omega=1e-4"]);
-    assert!(said.contains("Nothing will be known of hub.I from these inputs"), "{said}");
-    assert!(said.contains("not told") && !said.contains("NaN") && !said.contains("inf"), "{said}");
+    assert!(said.contains("These inputs do not determine hub.I"), "{said}");
+    assert!(said.contains("unknown") && !said.contains("NaN") && !said.contains("inf"), "{said}");
     let json = asked("design", "hub.I=0.5", &["--noise", "omega=1e-4", "--json"]);
     let bounds: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert!(bounds[0]["std"].is_null() && bounds[0]["not_determined"] == true, "{json}");
 }
 
-/// The names of written files used to follow the JSON, so that programs could not parse the output.
+/// Lines that name written files go to stderr, so that programs can parse stdout as JSON.
 #[test]
 fn printed_json_is_the_only_content_of_stdout() {
     let folder = tempfile::tempdir().unwrap();
@@ -111,7 +112,7 @@ fn outputs_that_cannot_be_written_are_refused_before_the_search() {
         let error = hubslosh(folder, &[&["identify", "data.csv"], flags].concat()).unwrap_err();
         assert!(error.contains(word), "{error}");
     }
-    // a model that does not fit its recording says so when it is used, also in files of older versions
+    // The result of a model that does not fit its recording says so when it is used, also in files of older versions.
     for key in ["fits", "described"] {
         let result = r#"{"KEY":false,"settings":{},"parameters":{"hub.I":{"value":0.4}}}"#;
         std::fs::write(folder.join("poor.json"), result.replace("KEY", key)).unwrap();
@@ -137,25 +138,25 @@ fn hubslosh_run_accepts_the_friction_that_identify_friction_has_estimated() {
     hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
 }
 
-/// A multisine with a peak of 0.5 N·m is asked for; the plan has a peak of 0.26 N·m, the wheel's torque limit.
+/// The requested multisine has a peak of 0.5 N·m; the plan has a peak of 0.26 N·m, the limit of the wheel's torque.
 #[test]
 fn a_designed_multisine_is_within_the_wheels_limits() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let asked = ["design", "--multisine", "0.5", "--duration", "400", "--optimal"];
     let said = hubslosh(folder, &[&asked[..], &["--out", "torque.csv"]].concat()).unwrap();
-    // 0.5 N·m is more than the wheel's 0.26
+    // 0.5 N·m is more than the 0.26 N·m of the wheel.
     assert!(
         said.contains("within the wheel's limits") && said.contains("peak 0.260 N·m"),
         "{said}"
     );
-    // and compared with a linear sweep, which is recommended where it gives more information
+    // The command compares the multisine with a linear sweep, and recommends the sweep if it gives more information.
     let mean = said.lines().find(|line| line.starts_with("Mean standard deviation")).unwrap();
     let numbers: Vec<f64> = mean.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let recommended =
         if numbers[0] <= numbers[1] { "the multisine" } else { "the sweep, --profile lin-sweep" };
     assert!(said.contains(&format!("Recommended: {recommended}")), "{said}");
-    // less torque where the liquid must stay linear
+    // The torque is reduced if the liquid must stay linear.
     let asked = [
         "design",
         "--profile",
@@ -204,7 +205,7 @@ fn no_kind_of_recording_has_more_than_15_options() {
             lines.filter(|line| line.starts_with('-')).filter_map(word).collect()
         };
         let (of_every, own) = (named(&every), named(&said));
-        // a line of an example may begin with one, too
+        // A line of an example may begin with an option, too.
         let own: BTreeSet<&String> =
             own.iter().filter(|option| !of_every.contains(option)).collect();
         assert!(!own.is_empty() && own.len() <= 15, "{kind}: {own:?}");
@@ -229,7 +230,7 @@ fn identify_without_a_kind_means_bench() {
         all.insert(place, "-q");
         assert!(parsed(&all).is_ok(), "{place}");
     }
-    // an option of another kind of recording is refused
+    // An option that belongs to another kind of recording is refused.
     let error = parsed(&["friction", "a.csv", "--model", "linear"]).unwrap_err();
     assert!(error.contains("unexpected argument '--model'"), "{error}");
 }
@@ -243,12 +244,12 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
     let json = with(&["--set", "slosh.zeta=0.01", "--json"]);
     let found: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
-    // a correlation that is asked for is kept
+    // A correlation that --set requests is kept.
     let both = ["--set", "slosh.zeta=0.01", "--set", "slosh.zeta_from_correlation=true", "--json"];
     let json = with(&both);
     let found: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_ne!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
-    // by which the ratio has no effect, of which the FMU warns
+    // With the correlation the damping ratio has no effect, and the FMU warns.
     record(folder.path(), "data.csv", &[]);
     let identify = ["identify", "friction", "data.csv", "--out", "a.json"];
     for command in [&asked[..], &identify] {
@@ -270,9 +271,9 @@ fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let asked = ["design", "--snr", "20", "--band", "1.25,20"];
-    // A linear bench: 7500 samples have the noise to 0.8 %, 0.07 dB; four of that. Dry friction takes a quarter of the torque at
-    // the lower end and more than half at the resonance. Viscous friction with the same first harmonic is right within a
-    // twentieth.
+    // In a linear bench 7500 samples determine the noise to 0.8 %, 0.07 dB; the tolerance is four times this. Dry
+    // friction takes a quarter of the torque at the lower end of the band, and more than half at the resonance. Viscous
+    // friction with the same first harmonic is accurate to a twentieth.
     let linear = ["friction.c=0", "friction.d=0"];
     for (set, most) in [(&linear[..], 0.3), (&[], 0.5)] {
         let set: Vec<&str> = set.iter().flat_map(|one| ["--set", one]).collect();
@@ -285,13 +286,14 @@ fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
                 "sine:amplitude={},frequency={},duration=300",
                 row["torque"], row["frequency"]
             );
-            // lines between rows are the sine to (2π 20 Hz 1 ms)²/12 = 0.13 %
+            // Straight lines between rows 1 ms apart reproduce the sine to (2π 20 Hz 1 ms)²/12 = 0.13 %.
             let flags = ["--step", "0.001", "--set", "imu.enabled=true", "--set", "imu.rate=50"];
             let out = ["--columns", "omega,omega_imu", "--out", "twin.parquet"];
             let run = ["run", "--profile", &profile];
             hubslosh(folder, &[&run[..], &flags, &out, &set].concat()).unwrap();
             let table = Table::read(&folder.join("twin.parquet"), &["omega", "omega_imu"]).unwrap();
-            // at the gyro's instants, once the liquid's own oscillation has decayed by exp(−0.003 · 2π 2.4 · 150) = e⁻⁷
+            // at the gyro's sampling times, after the liquid's own oscillation has decayed by exp(−0.003 · 2π 2.4
+            // · 150) = e⁻⁷
             let taken = |name: &str| -> Vec<f64> {
                 table.column(name).unwrap()[150_000..].iter().copied().step_by(20).collect()
             };

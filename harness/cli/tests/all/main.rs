@@ -1,4 +1,4 @@
-//! Tests that run the program `hubslosh` in a process of its own.
+//! Tests that run the program `hubslosh` in a separate process.
 
 mod campaign;
 mod check;

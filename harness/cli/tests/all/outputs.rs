@@ -126,7 +126,7 @@ fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     helps(&[], &mut texts);
     let (mut found, mut unknown) = (0, Vec::new());
     for (command, text) in &texts {
-        // kinds of recordings of identify share its files
+        // The kinds of recordings of `identify` have its input and output options.
         let command = command.split(' ').next().unwrap();
         for line in text.lines().filter(|line| line.trim_start().starts_with('-')) {
             let Some(option) = line.split_whitespace().find(|word| word.starts_with("--")) else {
@@ -148,8 +148,8 @@ fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     assert!(unknown.is_empty(), "neither in INPUTS here nor in OUTPUTS of outputs.rs: {unknown:?}");
 }
 
-/// Returns the examples in a help text. Continued lines are joined; text after a pipe or a redirection is
-/// left out.
+/// Returns the examples in a help text. Continued lines are joined; the rest of a line after a pipe or a
+/// redirection is left out.
 fn examples(text: &str) -> Vec<String> {
     let joined = text.replace("\\\n", " ");
     let lines = joined.lines().filter(|line| line.starts_with("  hubslosh "));
@@ -161,7 +161,7 @@ fn examples(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Beginnings of examples that run in at most a second each, in a folder with the files that they name.
+/// Beginnings of those examples that take at most a second each, and run in a folder with the files that they name.
 const CHEAP: [&str; 7] = [
     "hubslosh scale",
     "hubslosh tank",
@@ -245,9 +245,9 @@ fn a_draining_tank_gets_the_damping_of_every_fill() {
         std::fs::read_to_string(at("draining.toml")).unwrap()
     };
     let text = written(&["--nu", "1e-6"]);
-    // the table replaces it
+    // The column of the fill table replaces this parameter.
     assert!(!text.contains("\"tank.zeta[1]\""), "{text}");
-    // a clean wall of this size: some 0.1 %
+    // the expected damping of a clean wall of this size: some 0.1 %
     for point in 1..=3 {
         assert!(text.contains(&format!("\"tank.fill.zeta[1,{point}]\" = 0.00")), "{text}");
     }
@@ -329,7 +329,7 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
         std::os::unix::fs::symlink(&far, at(&link)).unwrap();
         run(&link);
         assert!(at(&link).is_symlink(), "{arguments}");
-        // a picture and a result may differ in nothing, a Parquet file in its metadata
+        // Pictures and results are equal; Parquet files may differ in their metadata.
         let ends = |bytes: &[u8]| (bytes[..16].to_vec(), bytes[bytes.len() - 6..].to_vec());
         let is_same = |found: &[u8]| ends(found) == ends(&expected);
         assert!(is_same(&std::fs::read(at(&far)).unwrap()), "{arguments}");
@@ -344,7 +344,7 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
             std::fs::remove_file(at(name)).unwrap();
         }
     }
-    // three reports of one check
+    // three reports of the same check
     let reports = ["a.json", "a.xml", "a.sarif"];
     for name in reports {
         std::os::unix::fs::symlink(format!("far/{name}"), at(name)).unwrap();
@@ -400,7 +400,7 @@ fn units_of_a_parameter_set_are_converted_or_refused() {
     };
     let (_, expected, _) = run(&ssv("tank.h", "<ssv:Real value=\"0.05\"/>", ""));
     for text in [
-        // by the FMU's own unit, by one of its display units, and by units that the file defines
+        // units: the FMU's own, one of its display units, and units that the file defines
         ssv("tank.h", "<ssv:Real value=\"0.05\" unit=\"m\"/>", ""),
         ssv("tank.h", "<ssv:Real value=\"50\" unit=\"mm\"/>", ""),
         ssv(

@@ -51,7 +51,7 @@ fn a_killed_campaign_continues_with_its_stored_runs() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = SWEEPS.replace("DURATION", "300");
-    // one run at a time: the others are still to do when the first is there
+    // With one run at a time the other runs are not done when the first run is stored.
     let mut child = campaign(directory, &plan, "killed", &["--jobs", "1"])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -101,7 +101,7 @@ fn runs_by_another_importer_give_the_same_tables() {
     let runs = list["runs"].as_array().unwrap();
     assert_eq!(runs.len(), 24);
 
-    // another importer: knows only the list, `hubslosh torque` and FMI
+    // stands for another importer, which knows only the list, `hubslosh torque` and FMI
     let fmu = Fmu::open(list["fmu"]["path"].as_str().unwrap()).unwrap();
     let columns: Vec<String> = serde_json::from_value(list["columns"].clone()).unwrap();
     std::fs::create_dir_all(directory.join("theirs/runs")).unwrap();
@@ -171,11 +171,11 @@ fn a_stored_run_with_other_parameters_is_simulated_again_with_a_reason() {
         String::from_utf8_lossy(&done.stderr),
         "c held the campaign of another plan; its tables and report are replaced\nre-running a: hub.I was 0.3, is 0.4\n"
     );
-    // the FMU's own value, written in another way: the same run
+    // The same values in another notation are the same run.
     let same = changed.replace("hub.I = 0.4\n", "hub.I = 4e-1\ntank.h = 0.100\n");
     let done = successful(campaign(directory, &same, "c", &[]));
     assert!(String::from_utf8_lossy(&done.stdout).contains("0 runs simulated, 1 reused"));
-    // without its columns for the tables it does not count either
+    // A stored run that lacks the columns for the tables is simulated again, too.
     let run = directory.join("c/runs/a.parquet");
     let notes = signals::table::metadata(&run).unwrap();
     Table::read(&run, &["time", "omega"]).unwrap().write(&run, &notes).unwrap();
@@ -198,7 +198,7 @@ fn features_that_the_torque_does_not_excite_stay_empty() {
         for column in ["f_res_hz", "f_dip_hz", "delta_f_hz", "notch_db", "rotary_from_hz"] {
             assert_eq!(row[column], "", "{column} of {}", row["name"]);
         }
-        // planar slosh: none of these torques excites rotary slosh
+        // Planar slosh: none of these torques excites rotary slosh.
         assert_eq!(row["swirl"].parse(), Ok(0.0), "{row:?}");
         // only noise has a spectrum that a model can be fitted to
         assert_eq!(row["fit_freq_pct"].is_empty(), row["name"] != "noise", "{row:?}");
@@ -295,7 +295,7 @@ fn a_runs_name_may_be_any_text_that_is_not_empty_or_too_long_for_a_file_name() {
         assert!(!done.status.success() && said.contains("must have 1 to 200 bytes"), "{said}");
     }
     assert!(!directory.join("d").exists());
-    // a name that is put together is cut
+    // A name that is composed from several parts is cut if it is too long.
     let long = "long".repeat(50);
     let plan = format!(
         "profile = \"sine:duration=0.2\"\n[[run]]\nname = \"{long}\"\n[vary]\nhub.I = [0.3, 0.4]\n"
@@ -317,7 +317,7 @@ fn the_command_in_the_report_makes_the_same_tables_again() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
-    // flags leave a plan too
+    // A campaign that was started with flags also writes a plan.
     successful(hubslosh(
         directory,
         &[
@@ -375,7 +375,7 @@ fn hubslosh_torque_writes_the_slope_of_each_row() {
 
 #[test]
 fn an_fmu_that_is_not_the_bench_is_driven_and_stored_without_analysis() {
-    // the bench under another name for one output that its analysis needs
+    // the bench with another name for one of the outputs that its analysis needs
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let unpacked = directory.join("unpacked");

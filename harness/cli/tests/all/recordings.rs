@@ -1,5 +1,5 @@
-//! Recordings through the program. A twin in any file format gives the result of the run that it was made from. Further cases are
-//! a gyro at rest, a free decay and an empty tank.
+//! Analyses recordings with the program. A simulated run that is written in any file format gives the results of the
+//! run itself. Further cases are a gyro at rest, a free decay and an empty tank.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -62,7 +62,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     let directory = directory.path();
     let fmu = packed_for_tests();
     let fmu = fmu.to_str().unwrap();
-    // a sixth of the thesis's sweep: a second each
+    // The profile is a sixth of the thesis's sweep, so that each run takes a second.
     let profile = "exp-sweep:f0=1.25,f1=3.5,duration=450";
     let plan = format!(
         "profile = \"{profile},amplitude=0.1\"\n[set]\nimu.enabled = true\nimu.seed = 3\n[vary]\nslosh.model = [\"linear\"]\n"
@@ -75,7 +75,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     let [time, torque, rate] =
         ["time", "tau_cmd", "omega_imu"].map(|name| run.column(name).unwrap().to_vec());
 
-    // a hub that tilts with a tenth and a fifth of its rate
+    // The hub tilts at a tenth and at a fifth of its rate.
     let names = ["time", "tau_cmd", "omega", "omega_x", "omega_y"].map(String::from).to_vec();
     let part = |factor: f64| rate.iter().map(|w| factor * w).collect::<Vec<f64>>();
     let twin =
@@ -97,11 +97,11 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
         let [of, from] = ["found", "run"].map(|folder| rows(&directory.join(folder).join(table)));
         for name in SAME {
             assert_eq!(of[0][name], from[0][name], "{table}: {name}");
-            // and the model it is compared with is the run itself
+            // The model with which the recording is compared is the run itself.
             assert_eq!(of[1][name], from[0][name], "{table}: {name} of the model");
         }
     }
-    // the same with a gyro's bias on each axis, the largest of them 20 times the largest rate about that axis
+    // The same recording with a gyro bias on each axis, of which the largest is 20 times the largest rate about its axis.
     let with = |values: &[f64], bias: f64| -> Vec<f64> {
         values.iter().map(|w| w + f64::to_radians(bias)).collect()
     };
@@ -132,10 +132,10 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     ] {
         let [with, without] =
             [&of_biased[0], &found[0]].map(|row| row[name].parse::<f64>().unwrap());
-        // rounding of a bias 20 times the rate is 1e-13; a search for a fit ends within 1e-8
+        // A bias of 20 times the rate causes rounding errors of 1e-13, and a fit ends within 1e-8.
         assert!((with / without - 1.0).abs() < 1e-6, "{name}: {with} for {without}");
     }
-    // CEF of rates in proportion: (0.01 + 0.04)/1.05; leakage √0.05
+    // CEF of proportional rates is (0.01 + 0.04)/1.05, the leakage √0.05
     let number = |row: &HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
     assert!((number(recording, "off_axis_median") - 0.05 / 1.05).abs() < 1e-12);
     assert!((number(recording, "leakage") - 0.05f64.sqrt()).abs() < 1e-9);
@@ -154,7 +154,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
         assert!(page.contains(words), "{words}");
     }
 
-    // as a logger writes it: semicolons, decimal commas, milliseconds, degrees, a lead-in of 5 s, rows lost
+    // the format of a data logger: semicolons, decimal commas, milliseconds, degrees, 5 s before the start, lost rows
     let mut random = Random::new(4, 0);
     let mut text = String::from("# bench\nt;T_cmd;gyro z\nms;mNm;deg/s\n");
     for k in -250..time.len() as i64 {
@@ -171,7 +171,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     let columns = ["--columns", "time=t,tau_cmd=T_cmd,omega=gyro z"];
     let (found, said) = analyse("logger.csv", &columns);
     assert!(said.contains("the torque begins at 7.00 s of the recording"), "{said}");
-    // a row in 500 on a line between its neighbours: of a 2.4 Hz sine at 50 Hz, 4.5 % of its size too little
+    // One lost row in 500 lies on a line between its neighbours, which is 4.5 % too low for a 2.4 Hz sine at 50 Hz.
     for (name, most) in
         [("f_res_hz", 2e-4), ("f_dip_hz", 2e-4), ("notch_db", 0.3), ("fit_time_pct", 0.5)]
     {
@@ -179,7 +179,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
         assert!(off.abs() < most, "{name}: {off}");
     }
 
-    // another torque is refused, and so is a plan without recordings
+    // A recording with another torque is refused, and so is a plan without recordings.
     let wrong = [
         "analyse",
         "twin.csv",
@@ -205,7 +205,7 @@ fn a_recorded_gyro_at_rest_is_characterised() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let mut random = Random::new(1, 0);
-    // 4e-4 rad/s at 50 Hz: N = 4e-4/√50
+    // noise of 4e-4 rad/s at 50 Hz: N = 4e-4/√50
     let mut text = String::from("t,w\n");
     for k in 0..50_000 {
         let _ = writeln!(text, "{},{}", 20 * k, (4e-4 * random.normal()).to_degrees());
@@ -219,7 +219,7 @@ fn a_recorded_gyro_at_rest_is_characterised() {
     .unwrap();
     let line = said.lines().find(|line| line.starts_with("angle random walk N")).unwrap();
     let walk: f64 = line.split_whitespace().nth(4).unwrap().parse().unwrap();
-    // 50,000 samples: 0.5 %
+    // 50,000 samples determine the noise to 0.5 %.
     assert!((walk / (4e-4 / 50f64.sqrt()) - 1.0).abs() < 0.03, "{line}");
     let page = std::fs::read_to_string(directory.join("g.html")).unwrap();
     assert_eq!(page.matches("<svg ").count(), 6 + 6, "six charts, each with a nested one");
@@ -230,7 +230,7 @@ fn a_recorded_gyro_at_rest_is_characterised() {
                 && directory.join(format!("g/{name}.csv")).is_file()
         );
     }
-    // the unit in the name, and what no unit means
+    // a unit in the name of the column, and a text that is no unit
     let text = std::fs::read_to_string(directory.join("rest.csv")).unwrap();
     let named = |head: &str| std::fs::write(directory.join("named.csv"), text.replace("t,w", head));
     let characterise = |columns: &str| {
@@ -264,7 +264,8 @@ fn a_recorded_gyro_at_rest_is_characterised() {
     assert!(error.contains("column gyro_deg: \"deg\" is not a unit of a rate"), "{error}");
     let error = hubslosh(directory, &[&of[..], &["--out", "g"]].concat()).unwrap_err();
     assert!(
-        error.contains("it lasts 1000 s, in chunks of 900 s (allowed: at least 3 chunks"),
+        error
+            .contains("the recording lasts 1000 s, in chunks of 900 s (allowed: at least 3 chunks"),
         "{error}"
     );
 }
@@ -299,11 +300,11 @@ fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
     {
         let estimate = &found["measurement"][name];
         let (value, std) = (estimate["value"].as_f64().unwrap(), estimate["std"].as_f64().unwrap());
-        // one draw of the noise: four standard deviations
+        // one draw of the noise; the tolerance is four standard deviations
         assert!((value - truth).abs() < 4.0 * std && std < 0.05 * truth, "{name}: {estimate}");
         assert_eq!(estimate["unit"], unit);
     }
-    // times of other units without one, and whole seconds, of which 50 rows have each
+    // times in another unit that is not stated, and times in whole seconds, which 50 rows share
     let probe = text.lines().skip(2).map(|line| line.split_once('\t').unwrap());
     let rows: Vec<(f64, String)> =
         probe.map(|(t, wave)| (t.parse().unwrap(), wave.to_string())).collect();
@@ -374,6 +375,6 @@ fn with_an_empty_tank_all_inertia_is_attributed_to_the_hub() {
     let found: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(directory.join("e.json")).unwrap()).unwrap();
     let inertia = found["parameters"]["hub.I"]["value"].as_f64().unwrap();
-    // with --set tank.h=0.1 2.09 kg of water, a quarter of it, would be taken off
+    // With --set tank.h=0.1 a quarter of the 2.09 kg of water would be subtracted.
     assert!((inertia / 0.322414 - 1.0).abs() < 1e-3, "{inertia}");
 }

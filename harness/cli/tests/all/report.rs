@@ -1,4 +1,4 @@
-//! The thesis's sweeps with a linear and a spherical liquid, and the page about them.
+//! The thesis's sweeps with a linear and with a spherical slosh model, and the report about them.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -34,7 +34,7 @@ const SWEEPS: &str = "title = \"Sweeps & <models>\"\n\
     [set]\nimu.enabled = true\n\
     [count]\nimu.seed = 1\n";
 
-/// Results of ten sweeps of the thesis (10 cm, gyro noise on), made once for all tests in this file.
+/// Results of ten sweeps of the thesis (10 cm, gyro noise on), computed once for all tests in this file.
 static TEN: LazyLock<(String, Rows, Rows)> = LazyLock::new(|| {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -62,7 +62,7 @@ fn a_linear_liquid_keeps_antiresonance_and_resonance_from_0_05_newton_metres_on(
     for table in [swept, spa] {
         for name in ["f_dip_hz", "f_res_hz"] {
             let values = figure(table, "linear", name);
-            // the acceptance figure; noise moves the antiresonance by 2 mHz at 0.05
+            // the required accuracy; noise moves the antiresonance by 2 mHz at 0.05 N·m
             assert!(spread(&values[1..]) < 4e-3, "{name}: {values:?}");
         }
     }
@@ -79,7 +79,7 @@ fn a_spherical_liquid_softens_in_planar_slosh_and_becomes_rotary_from_0_15_newto
     let (_, swept, spa) = &*TEN;
     let of = |name| figure(swept, "spherical", name);
     let resonance = of("f_res_hz");
-    // 2.473, 2.465, 2.446: the planar pendulum's -A²/16, far above the estimator's 1 mHz
+    // 2.473, 2.465, 2.446 Hz: the planar pendulum's shift of -A²/16, far above the estimator's error of 1 mHz
     assert!(
         resonance[0] - resonance[1] > 5e-3 && resonance[1] - resonance[2] > 10e-3,
         "{resonance:?}"
@@ -88,7 +88,7 @@ fn a_spherical_liquid_softens_in_planar_slosh_and_becomes_rotary_from_0_15_newto
     assert_eq!(turning[..3], [0.0; 3], "planar up to 0.1");
     assert!(turning[3] > 60.0 && turning[4] > turning[3], "{turning:?}");
     assert!(of("swirl")[3].abs() > 0.9);
-    // once it turns, the resonance follows the sweep by tenths of a hertz, in both estimates
+    // Once the motion is rotary, the resonance moves with the sweep by tenths of a hertz, in both estimates.
     for table in [swept, spa] {
         let delta = figure(table, "spherical", "delta_f_hz");
         assert!(delta[3] > 0.25 && delta[4] > delta[3] + 0.2 && delta[2] < 0.12, "{delta:?}");
@@ -114,14 +114,14 @@ fn the_fit_of_one_linear_model_to_a_spherical_liquid_falls_with_the_torque() {
     let (_, swept, _) = &*TEN;
     let of = |name| figure(swept, "spherical", name);
     let (fit, coherence) = (of("fit_freq_pct"), of("coherence"));
-    // from about 90 to about 40 points; 0.0125 N·m is the bearing's
+    // The fit falls from about 90 to about 40 points; at 0.0125 N·m the friction of the bearing reduces it.
     assert!(fit[1] > 80.0 && fit[2] < 60.0 && (30.0..45.0).contains(&fit[4]), "{fit:?}");
-    // the bench's 0.45 to 0.7 at large torque, and rising
+    // The bench has 0.45 to 0.7 at large torque, rising with the torque.
     assert!(coherence[1] < 0.2 && coherence[3] > coherence[1] + 0.1, "{coherence:?}");
     assert!((0.45..0.7).contains(&coherence[4]), "{coherence:?}");
     let (fit, coherence) =
         (figure(swept, "linear", "fit_freq_pct"), figure(swept, "linear", "coherence"));
-    // dry friction alone: its share falls with torque
+    // Only dry friction reduces this fit, and its share falls with the torque.
     assert!(fit.is_sorted() && fit[0] < 70.0 && fit[4] > 98.0, "{fit:?}");
     assert!(coherence[0] > 0.5 && (0.15..0.35).contains(&coherence[4]), "{coherence:?}");
 }
@@ -142,7 +142,7 @@ fn agrees(page: &str, quantity: &str, column: usize) -> bool {
 fn the_page_is_well_formed_and_has_every_figure() {
     let (page, ..) = &*TEN;
     well_formed(page);
-    // the result first, warnings later
+    // The result comes first, warnings come later.
     let result = "From 150 mN·m on the liquid swirls and the resonance moves up to 3.10 Hz; below, the linear model holds within ";
     let [result, warnings, figure] = [result, "class=\"warning\"", "id=\"figure-1\""]
         .map(|words| page.find(words).unwrap_or_else(|| panic!("{words} is not in the page")));
@@ -167,14 +167,14 @@ fn the_page_is_well_formed_and_has_every_figure() {
         assert!(figures(page).contains(words), "\"{words}\" is in no figure");
     }
     assert!(figures(page).contains("onset of rotary slosh, 150 mN·m"));
-    // nothing is fetched from elsewhere
+    // The page loads nothing from the network.
     for word in ["NaN", "src=", "<link", "@import", "http://", "https://"] {
         assert!(!text_of(page).contains(word), "{word} is in the page");
     }
     assert!(!figures(page).contains("NaN"));
-    // the whole campaign may have 3 MB
+    // The page of the whole campaign may have 3 MB.
     assert!(page.len() < 2_300_000, "{} bytes", page.len());
-    // every figure's place has its specification
+    // Every place for a figure has the specification of a figure.
     let places = page.matches("class=\"plot\"").count();
     assert!(places > 10 && figures(page).matches("\"traces\":").count() == places, "{places}");
 }
@@ -201,7 +201,7 @@ fn text_of(page: &str) -> String {
 fn numbers_of_the_thesis_are_compared_with_the_runs() {
     let (page, swept, _) = &*TEN;
     let (linear, spherical) = (0, 1);
-    // 2.21 rad/s² measured, more than twice that here
+    // 2.21 rad/s² were measured; the model has more than twice as much
     let peak = "bench: largest acceleration of the hub at 0.25 N·m, rad/s²";
     assert!(!agrees(page, peak, linear) && !agrees(page, peak, spherical));
     let coherence = "bench: mean residual coherence from 0.15 N·m up";
@@ -209,7 +209,7 @@ fn numbers_of_the_thesis_are_compared_with_the_runs() {
     let of = figure(swept, "spherical", "coherence");
     let mean = (of[3] + of[4]) / 2.0;
     assert_eq!(agrees(page, coherence, spherical), (0.45..=0.65).contains(&mean), "{mean}");
-    // the synthetic data have a linear liquid: other models have no value in their rows
+    // The synthetic data have a linear liquid, so that other models have no value in these rows.
     let synthetic = row_of(page, "synthetic data: fit in time at 0.25 N·m, %");
     assert!(!synthetic[3 + linear].contains('–') && synthetic[3 + spherical].contains('–'));
 }
@@ -223,7 +223,7 @@ fn without_dry_friction_a_linear_model_fits_a_linear_liquid() {
     let plan = plan.replace("[count]\nimu.seed = 1\n", "[vary]\nslosh.model = [\"linear\"]\n");
     let plan = format!("{plan}profile.amplitude = [0.0125, 0.05]\n");
     campaign(directory, &plan);
-    // what is missing to 100 is the lag window of spa
+    // The difference to 100 is caused by the lag window of spa.
     let fit = figure(&rows(directory, "features.csv"), "linear", "fit_freq_pct");
     assert!(fit.iter().all(|fit| *fit > 98.5), "{fit:?}: dry friction is all that does not fit");
 }
@@ -243,22 +243,22 @@ fn a_report_of_random_draws_has_histograms_and_scatter_plots() {
         assert!(page.contains(words), "{words}");
     }
     assert!(!text_of(&page).contains("NaN"));
-    // more inertia, lower resonance; the antiresonance is the tank's own. Bars: antiresonance, then
-    // resonance
+    // More inertia lowers the resonance, whereas the antiresonance belongs to the tank. The bars are antiresonance and
+    // resonance.
     let bars = figures(&page).split("ρ = ").skip(1);
     let rho: Vec<f64> = bars.map(|rest| rest.split('"').next().unwrap().parse().unwrap()).collect();
     assert!(rho.len() == 2 && rho[1] < -0.95, "{rho:?}");
 }
 
-/// Asserts that every element that is opened is closed in order, that attributes are quoted, and that there
-/// is no stray markup.
+/// Asserts that all elements of the page are closed in the order of their nesting, that attributes are quoted, and that
+/// no text contains unescaped markup.
 fn well_formed(page: &str) {
     let page = &text_of(page);
     let mut open = Vec::new();
     let body = page.strip_prefix("<!DOCTYPE html>").expect("a doctype");
     for piece in body.split('<').skip(1) {
         let (tag, text) = piece.split_once('>').unwrap_or_else(|| panic!("unclosed: <{piece}"));
-        // the style sheet's selectors may have this sign, text may not
+        // Selectors of the style sheet may contain this sign, text may not.
         assert!(open.last() == Some(&"style") || !text.contains('>'), "{text}");
         assert_eq!(tag.matches('"').count() % 2, 0, "<{tag}>");
         if let Some(name) = tag.strip_prefix('/') {
@@ -277,9 +277,9 @@ fn well_formed(page: &str) {
 fn a_spacecraft_under_low_thrust_gets_its_antiresonance_and_resonance_to_a_hundredth() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
-    // 800 kg·m², 0.02 m/s²: poles and zeros of the linear plant at 0.0438 and 0.0450 Hz. A sweep of
-    // three quarters of an hour resolves 0.4 mHz, one of six hours enough; both are too fast for the
-    // response while they pass
+    // 800 kg·m², 0.02 m/s²: the linear plant has its zeros at 0.0438 Hz and its poles at 0.0450 Hz. A sweep of three
+    // quarters of an hour resolves 0.4 mHz, one of six hours resolves enough; both pass the resonance faster than
+    // the response builds up.
     let plan = "profile = \"exp-sweep:amplitude=0.1,f0=0.01,f1=0.3\"\nstep = 0.2\n\
         [set]\nhub.I = 800\ng_axial = 0.02\ntank.d = 0.96\ntank.h = 0.66\ntank.r = 0.568\n\
         friction.model = \"none\"\n[vary]\nprofile.duration = [2700, 20000]\n";
@@ -292,7 +292,7 @@ fn a_spacecraft_under_low_thrust_gets_its_antiresonance_and_resonance_to_a_hundr
         }
         assert_eq!(row["estimator"], estimator);
     }
-    // over the whole record, a record that is too short gives no number but a reason
+    // Estimated over the whole record, a record that is too short gives a reason instead of a number.
     let spa = rows(directory, "features_spa.csv");
     assert_eq!(
         (spa[0]["f_dip_hz"].as_str(), spa[0]["not_trusted"].as_str()),
@@ -373,7 +373,7 @@ fn all_curves_in_a_figure_of_a_spacecraft_campaign_look_different() {
         assert_eq!(looks.len(), traces.len(), "{looks:?}");
         most = most.max(traces.len());
     }
-    // more series than colours
+    // The figure has more series than there are colours.
     assert!(most > 8, "{most}");
 }
 
@@ -401,14 +401,14 @@ fn two_campaigns_are_compared_run_by_run() {
     assert!(
         page.contains("This campaign minus the other") && page.contains("<code>heavier</code>")
     );
-    // less inertia: a higher resonance
+    // less inertia, so a higher resonance
     let largest = page.split("resonance / mHz: +").count();
     assert!(largest > 1, "the resonance rises");
 }
 
 #[test]
 fn a_browser_hovers_zooms_and_switches_what_it_shows() {
-    // `.ci/browser` gets what this needs
+    // `.ci/browser` installs what this test needs.
     let target = std::env::var_os("CARGO_TARGET_DIR").map(std::path::PathBuf::from);
     let target = target.unwrap_or_else(|| pack::root().join("target"));
     let python = target.join("python/browser/bin/python");

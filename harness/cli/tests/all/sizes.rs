@@ -1,5 +1,5 @@
-//! Sizes 0 and 1 of everything that a command takes: rows, inputs, outputs, unknowns, steps, fills,
-//! files. Each command ends with a result or with one error, and never with a panic or with NaN.
+//! Inputs of size 0 and 1: rows, inputs, outputs, unknowns, steps, fills, files. Each command ends with a result or
+//! with one error, and never with a panic or with NaN.
 
 use std::path::Path;
 use std::process::{Command, Output};

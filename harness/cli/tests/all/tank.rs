@@ -12,8 +12,8 @@ fn tank(arguments: &[&str]) -> (bool, String, String) {
     (done.status.success(), text(done.stdout), text(done.stderr))
 }
 
-/// Compares half a sphere with lambda_1 R and m_1/m_liq of Budiansky (1960); all hinges are at the sphere's
-/// centre.
+/// The sphere is half full. lambda_1 R and m_1/m_liq are compared with Budiansky (1960); all hinges are at the
+/// centre of the sphere.
 #[test]
 fn a_half_full_sphere_has_its_published_first_mode() {
     let folder = tempfile::tempdir().unwrap();
@@ -43,10 +43,10 @@ fn an_invalid_tank_is_refused_in_a_sentence_without_a_file() {
     assert!(!out.exists());
 }
 
-/// The bench's cylinder moves in the same way from a drawing (through a set file and an SSV) and from its
-/// dimensions. Masses and lengths agree to 1e-11; 1e-9 rad/s is about 1e-8 of the rates.
+/// The bench's cylinder moves in the same way if its parameters come from a drawing (through a TOML and an SSV file) or
+/// from its dimensions. Masses and lengths agree to 1e-11; 1e-9 rad/s is about 1e-8 of the rates.
 #[test]
-fn a_tanks_parameters_drive_the_fmu_as_its_dimensions_do() {
+fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let text = "density = 1000\nshape = { cylinder = { radius = 0.0815, height = 0.3 } }\n";
@@ -86,7 +86,7 @@ fn a_tanks_parameters_drive_the_fmu_as_its_dimensions_do() {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{column}");
         assert_eq!(b, c, "{column}: both files hold the same numbers");
     }
-    // What --set says comes after the file.
+    // A value of --set replaces the value in the file.
     let other = run(&["--set-file", &path("set.toml"), "--set", "slosh.table.m_liq=3"]);
     assert_ne!(other.column("omega").unwrap(), toml.column("omega").unwrap());
 }
@@ -138,11 +138,11 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
     }
 }
 
-/// The file reproduces Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (the table's value) in the frequency
-/// that the FMU computes. On the bench the same wetting liquid softens the surface (a negative stiffness),
-/// and the command says that the FMU cannot model this.
+/// The FMU, with the file, computes the frequency that belongs to Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (a
+/// value of the meniscus table). On the bench this wetting liquid has a negative stiffness, which the FMU does not
+/// accept, and the command says so.
 #[test]
-fn a_curved_meniscus_reaches_the_fmu_and_values_that_it_cannot_take_are_reported() {
+fn the_fmu_has_the_frequency_of_a_curved_meniscus_and_negative_stiffnesses_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let text = "density = 1000\nshape = { cylinder = { radius = 0.1, height = 3 } }\n";
@@ -195,7 +195,7 @@ fn a_curved_meniscus_reaches_the_fmu_and_values_that_it_cannot_take_are_reported
     }
 }
 
-/// Half a sphere of 1 m is half of its volume and 2094.395 kg of water; --sweep takes all three forms.
+/// Half a sphere of 1 m is 1 m of height, 50 % of the volume, and 2094.395 kg of water; --sweep accepts metres and per cent.
 #[test]
 fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     let folder = tempfile::tempdir().unwrap();
@@ -225,10 +225,10 @@ fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     }
 }
 
-/// Without gravity the table's frequencies are 0. A file has only the stiffness by capillarity, and no
-/// damping ratio, because there is no specific force at which it would hold.
+/// Without gravity the frequencies in the table are 0. A parameter file has the stiffness by capillarity, but no
+/// damping ratios, because there is no specific force at which they would hold.
 #[test]
-fn without_gravity_only_surface_tension_restores() {
+fn without_gravity_only_surface_tension_restores_the_liquid() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let text = "density = 1000\nshape = { cylinder = { radius = 0.1, height = 3 } }\n";
@@ -256,8 +256,8 @@ fn without_gravity_only_surface_tension_restores() {
     }
 }
 
-/// In a sphere of 1 m at 1e-6 m/s² the first-order effect of capillarity is a multiple of the value that it
-/// corrects, so the file is written only with --force.
+/// In a sphere of 1 m at 1e-6 m/s² the first-order correction by capillarity is larger than the value that it corrects,
+/// so that the file is written only with --force.
 #[test]
 fn a_stiffness_far_outside_its_formula_is_written_only_with_the_option_force() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,7 +318,7 @@ fn invalid_parameter_files_are_refused_in_a_sentence() {
 /// meniscus table) in table, picture and JSON; gravity alone gives 6.6. For a sphere there is no formula: the
 /// frequency is stated as unknown, and is null in JSON.
 #[test]
-fn frequencies_include_surface_tension_where_it_is_given() {
+fn frequencies_include_the_surface_tension_if_it_is_given() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let shape = |shape: &str| {

@@ -41,7 +41,7 @@ fn a_run_with_default_columns_becomes_a_page_with_the_run_s_parameters() {
     let run = drawn(directory, "run.html");
     assert_eq!(run["time"]["count"], 251);
     assert_eq!(run["scene"]["geometry"]["tanks"][0]["shape"]["contour"][1][0], 0.1);
-    // data that a CSV file cannot hold is given on the command line, or the command asks for it
+    // A CSV file cannot hold the parameters; they are given on the command line, or the command asks for them.
     assert!(hubslosh(directory, &[&RUN[..], &["--out", "run.csv"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "run.csv", "--out", "csv.html"]);
     assert!(said(&done).contains("does not contain the parameters"), "{}", said(&done));
@@ -81,8 +81,7 @@ fn column(run: &serde_json::Value, name: &str) -> Vec<f64> {
     bytes.chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
 }
 
-/// Every slosh model is shaken with three modes by a sweep over the first two. The page stores numbers of 32
-/// bits.
+/// With each slosh model, a sweep excites three modes over the first two frequencies. The page stores numbers with 32 bits.
 #[test]
 fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -128,7 +127,7 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
             );
         }
     }
-    // recorded by default; without the states of the higher modes the page draws the first one and says so
+    // the columns recorded by default; without the states of the higher modes the page draws the first mode and says so
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--set", "slosh.modes=3"];
     assert!(hubslosh(directory, &[&run[..], &["--out", "all.parquet"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "all.parquet"]);
@@ -145,8 +144,9 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 1);
 }
 
-/// Liquid that stands higher on one side has its centre of mass there: rho int eta r cos^2 dA = m l per angle. This holds for
-/// every mode and every tank, exactly in linear theory. A cylinder's surface in this sphere misses by a tenth of the size.
+/// Liquid that stands higher on one side has its centre of mass on this side: rho int eta r cos^2 dA = m l per angle.
+/// In linear theory this holds exactly for every mode and every tank. The surface of a cylinder, drawn in this sphere,
+/// would differ by a tenth.
 #[test]
 fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum_does() {
     let directory = tempfile::tempdir().unwrap();
@@ -188,15 +188,16 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
         };
         let all = 1004.0 * std::f64::consts::PI * of("wave") * radius.powi(3);
         let moved = all * integral(&|s| s);
-        // of higher modes most cancels; straight lines between 80 steps cost their part of what does not
+        // In the integrals of higher modes positive and negative parts nearly cancel; the error of straight lines
+        // between 80 steps is relative to the parts.
         let size = all * integral(&f64::abs);
         let pendulum = of("mass") * of("length");
         assert!((moved - pendulum).abs() < 1e-3 * size, "{moved} kg m, not {pendulum} of {size}");
     }
 }
 
-/// In HubSlosh's parameters `hubslosh tank` puts the modes along a box's first length in the tangential
-/// direction, the y of the tank.
+/// `hubslosh tank` writes HubSlosh's parameters so that the modes along a box's first side move in the tangential
+/// direction, the y axis of the tank.
 #[test]
 fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     let directory = tempfile::tempdir().unwrap();

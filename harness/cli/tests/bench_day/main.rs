@@ -1,5 +1,5 @@
-//! A day of logs from the bench that is not the FMU, with bias on three axes, a tilting platform and the thesis's noise, through
-//! `hubslosh analyse --bench-day`.
+//! Recordings of one day at a simulated bench that differs from the FMU: gyro bias on three axes, a tilting platform
+//! and the thesis's noise. `hubslosh analyse --bench-day` analyses them.
 
 #[path = "../../../identify/examples/twins/bench.rs"]
 #[allow(dead_code, reason = "the twins use the rest of it")]
@@ -68,7 +68,7 @@ fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals(
     assert!([" 5.11.</figcaption>", " 5.12.</figcaption>"].iter().all(|end| !page.contains(end)));
     assert!(!page.contains("No usable recordings"));
 
-    // friction and inertia
+    // the fit of friction and inertia
     let bearing = std::fs::read_to_string(folder.join("out/friction.json")).unwrap();
     let bearing: serde_json::Value = serde_json::from_str(&bearing).unwrap();
     let truth = Bench::default();
@@ -89,14 +89,14 @@ fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals(
         println!("{name}: {low:.5e} to {high:.5e}, truth {truth:.5e}");
         assert!((low..=high).contains(&truth), "{name}: {truth} is not in {found}");
     }
-    // the gyro: N = σ/√50 with the quantisation's variance
+    // the gyro's noise: N = σ/√50, including the variance of the quantisation
     let walk = (GYRO.0.powi(2) + GYRO.1.powi(2) / 12.0).sqrt() * 0.02f64.sqrt();
     let found = page.split("angle random walk N: ").nth(1).unwrap().split(' ').next().unwrap();
     let found: f64 = found.parse().unwrap();
-    // 30,000 samples: 0.4 %
+    // 30,000 samples determine the noise to 0.4 %.
     assert!((found / walk - 1.0).abs() < 0.02, "N = {found} for {walk}");
 
-    // antiresonance and resonance of each recording and of the model under the same torque
+    // antiresonance and resonance of each recording, and of the model under the same torque
     let rows = features(folder);
     let (recorded, simulated): (Vec<_>, Vec<_>) =
         rows.iter().partition(|row| row["model"] == "recording");
@@ -115,13 +115,13 @@ fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals(
             off.push((a - b) / s.hypot(t));
         }
     }
-    // the sum of squares of 12 is larger than 26.2 in 1 % of days (χ²); more than two are beyond 1.96 in 2 %
+    // On 1 % of days the sum of 12 squares is larger than 26.2 (χ²); on 2 % of days more than two values exceed 1.96.
     let squares: f64 = off.iter().map(|off| off * off).sum();
     assert!(squares < 26.2 && off.iter().all(|off| off.abs() < 3.0), "{squares}: {off:?}");
     let outside = off.iter().filter(|off| off.abs() > 1.96).count();
     assert!(outside <= 2, "{off:?}");
 
-    // figure 7.15: noise dominates at the small torque; and the biases change nothing
+    // Figure 7.15: noise dominates at the small torque. The biases change nothing.
     let plain = tempfile::tempdir().unwrap();
     let plain = plain.path();
     Day { bias: [0.0; 3], rest: 0.0, friction: false, ..SHORT }.write(plain).unwrap();
@@ -175,18 +175,18 @@ fn bench_day_reports_a_missing_log_file_in_its_chapter() {
     let page = std::fs::read_to_string(folder.join("out/report.html")).unwrap();
     assert!(page.contains("The messages of the command say which recordings could not be used"));
 
-    // a sweep without its fill
+    // a sweep whose fill is not given
     std::fs::write(&manifest, list.replace("fill = 0.1\n", "")).unwrap();
     let said = text(&analyse(folder).stderr);
     assert!(said.contains("[[recording]] 1") && said.contains("fill is missing"), "{said}");
-    // and no list
+    // a directory without the list
     std::fs::remove_file(&manifest).unwrap();
     let said = text(&analyse(folder).stderr);
     assert!(said.contains("day.toml is needed"), "{said}");
 }
 
-/// Earlier versions refused a clock that was wrong by 50 ppm as "another profile, or the torque's sign", and 3 % of
-/// lost rows were too many.
+/// A clock that is wrong by 300 ppm, and 3 % lost rows, are not mistaken for another profile or for a torque of the
+/// wrong sign.
 #[test]
 fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {
     let folder = tempfile::tempdir().unwrap();
@@ -217,7 +217,7 @@ fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {
         println!("{name}: {a:.5} ± {s:.1e} Hz, model {b:.5} ± {t:.1e} Hz");
         assert!((a - b).abs() < 3.0 * s.hypot(t), "{name}: {a} ± {s}, {b} ± {t}");
     }
-    // the sign is named where it is the sign
+    // A torque of the wrong sign is reported as such.
     let manifest = folder.join("day.toml");
     let list = std::fs::read_to_string(&manifest).unwrap();
     std::fs::write(&manifest, list.replace("amplitude = 0.1", "amplitude = -0.1")).unwrap();

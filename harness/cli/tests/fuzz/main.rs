@@ -1,16 +1,17 @@
-//! Fuzzing of the readers: recordings and tables (CSV, Parquet), parameter sets (SSV), plans, tanks and the data
-//! of a run's page. Inputs are valid files with random changes. None may panic, take more than 10 s, or 1 GB of memory.
+//! Fuzzing of the readers: recordings and tables (CSV, Parquet), parameter sets (SSV), plans, tanks and the data of a
+//! run's page. Inputs are valid files with random changes. No input may cause a panic, take more than 10 s, or more
+//! than 1 GB of memory.
 //!
-//! A plain loop, not libFuzzer: every reader takes whole files and spends its time in other crates, which would all have to
-//! be compiled once more with coverage. `.ci/fuzz-readers 1000000` makes a million inputs for each; the tests here some
-//! hundred. `HUBSLOSH_FUZZ_SEED` names another seed.
+//! The fuzzer is a plain loop and not libFuzzer, because every reader processes whole files mostly in other crates, all
+//! of which would have to be compiled again with coverage. `.ci/fuzz-readers 1000000` makes a million inputs for each
+//! reader; the tests here make some hundred. `HUBSLOSH_FUZZ_SEED` sets another seed.
 
-// the command's own module, which reads parameter sets
+// the module of the command that reads parameter sets
 #[allow(dead_code)]
 #[path = "../../src/set_file.rs"]
 mod set_file;
 
-/// Takes the place of the command's terminal, to which `set_file` writes warnings.
+/// Replaces the terminal of the command, to which `set_file` writes warnings.
 mod terminal {
     pub fn warn(_: impl std::fmt::Display) {}
 }
@@ -118,11 +119,11 @@ fn fuzz(
 ) {
     let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());
     let mut dice = Rng::with_seed(seed.unwrap_or(1));
-    // those that a reader catches itself are errors, and not worth a backtrace each
+    // Panics that a reader catches itself become errors, which need no backtrace each.
     files::bug::keep_panics();
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(format!("input.{ending}"));
-    // the input that is being read, for the thread that looks at the clock
+    // the start time and the present input, for the thread that checks the time limit
     let (began, now) = (Instant::now(), Arc::new((AtomicU64::new(0), Mutex::new(Vec::new()))));
     let watched = now.clone();
     std::thread::spawn(move || {
@@ -138,7 +139,7 @@ fn fuzz(
     });
     for _ in 0..count {
         let bytes = mutated(seeds, &mut dice);
-        // a new file: some file systems write what replaces an old one to the disk at once
+        // A new file is created, because some file systems write a replaced file to the disk immediately.
         let _ = std::fs::remove_file(&path);
         std::fs::write(&path, &bytes).unwrap();
         now.1.lock().unwrap().clone_from(&bytes);
@@ -291,8 +292,8 @@ macro_rules! targets {
         }
     )*
 
-        /// Fuzzes the readers that HUBSLOSH_FUZZ_TARGETS names, or all of them, with as many inputs
-        /// as HUBSLOSH_FUZZ_INPUTS says.
+        /// Fuzzes the readers that HUBSLOSH_FUZZ_TARGETS names, or all of them. HUBSLOSH_FUZZ_INPUTS is the number of
+        /// inputs for each reader.
         #[test]
         #[ignore = "takes long: .ci/fuzz-readers"]
         fn fuzz_campaign() {

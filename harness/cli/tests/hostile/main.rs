@@ -1,6 +1,6 @@
-//! FMUs that harm who opens or runs them: archives and descriptions that ask for more than a machine
-//! has, binaries that end, block, fill or leave the process. Each ends with a message, within 500 MB
-//! of memory and 100 MB of temporary files, and no process is left.
+//! FMUs that harm the programs that open or run them: archives and descriptions that need more memory than a machine
+//! has, and binaries that end or block the process, or fill memory or disk. Each command ends with a message, within
+//! 500 MB of memory and 100 MB of temporary files, and no process is left.
 
 #![cfg(target_os = "linux")]
 
@@ -16,7 +16,7 @@ use zip::write::SimpleFileOptions;
 const MEMORY: i64 = 500 << 20;
 const DISK: u64 = 100 << 20;
 
-/// Runs the program in a folder of its own, with a folder for temporary files.
+/// Runs the program in a separate folder, with another folder for temporary files.
 struct Sandbox {
     directory: tempfile::TempDir,
 }
@@ -165,7 +165,7 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
          </TypeDefinitions>"
     );
     let entities = "<!DOCTYPE a [<!ENTITY b \"bbbbbbbbbb\"><!ENTITY c \"&b;&b;&b;\">]>";
-    // only bombs need to be large, and zeros compress to a thousandth
+    // Only bombs need to be large. Zeros compress to a thousandth.
     let mut set: Vec<(&str, Vec<u8>, &str)> = vec![
         ("an empty file", Vec::new(), "archive"),
         ("no archive", b"PK\x05\x06 and no more".to_vec(), "archive"),
@@ -222,7 +222,7 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
             "modelIdentifier",
         ),
     ];
-    // what `check` takes, for it names the fault and goes on
+    // archives that `check` opens, because it reports the fault and continues
     let taken_by_check =
         ["a variable of 70,000 bytes", "100,000 items", "variables without anything"];
     set.push((
@@ -334,7 +334,7 @@ fn ends_its_own_process(when: &str) {
         let output = sandbox.hubslosh(&["variables", "--fmu", &fmu]);
         assert!(output.status.success(), "{what}: a description is not a binary");
         if *name == LOUD {
-            // a gigabyte through a pipe may take longer than the limit of the others
+            // Printing a gigabyte through a pipe may take longer than the limit of the other cases.
             let patient: Vec<&str> =
                 run.iter().copied().filter(|a| !matches!(*a, "--call-limit" | "0.5")).collect();
             let output = sandbox.hubslosh(&patient);
@@ -348,7 +348,7 @@ fn ends_its_own_process(when: &str) {
                 assert!(told, "{what}: {said}");
             }
         }
-        // the rules that see it; all of them would make every step of every rule wait
+        // Only rules that notice the fault are checked; with all rules, every step of every rule would wait for it.
         let only = if when == "AT_LOAD" { "load" } else { "load,host.silent,steps.run" };
         let output = sandbox.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -396,7 +396,7 @@ fn forged_messages_of_an_fmu_are_refused() {
 
 /// An FMU fills temporary files, memfd or mapped memory beyond `--memory 48`; the run ends with an error.
 #[test]
-fn temporary_files_and_shared_memory_count_against_the_budget() {
+fn temporary_files_and_shared_memory_count_against_the_memory_limit() {
     const FIRST: u32 = 15;
     let sandbox = Sandbox::new();
     for (harm, what) in (FIRST..).zip(["files", "unlinked files", "memfd", "mapped memory"]) {
@@ -425,7 +425,7 @@ fn changes_of_the_process_by_loading_an_fmu_are_reported() {
 }
 
 #[test]
-fn a_call_that_reads_a_value_without_end_fails_the_run_at_the_call_limit() {
+fn a_call_that_never_returns_fails_the_run_at_the_call_limit() {
     const LOOP: u32 = 4;
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("a.fmu"), harmful(LOOP, "AT_GET")).unwrap();

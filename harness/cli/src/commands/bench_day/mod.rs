@@ -1,8 +1,7 @@
-//! `hubslosh analyse --bench-day`: the recordings of a day at the bench as one report.
+//! `hubslosh analyse --bench-day`: analyses the recordings of one day at the bench and writes one report.
 //!
-//! The sine sweeps become a plan whose runs are recordings, so a campaign analyses them and simulates the
-//! models under the same torque. Friction runs, free decays and the gyro at rest become chapters of the
-//! campaign's page.
+//! The sine sweeps become a plan whose runs are recordings, so that a campaign analyses them and simulates the slosh
+//! models under the same torque. Friction runs, free decays and the gyro at rest become chapters of the campaign's page.
 
 mod chapters;
 
@@ -30,7 +29,7 @@ enum Kind {
     Friction,
     /// A push and the free decay after it with the tank empty and an encoder (thesis 5.4).
     Decay,
-    /// The gyro of a hub that stands still (thesis 5.5).
+    /// A recording of the gyro while the hub stands still (thesis 5.5).
     Rest,
     /// A sine sweep with liquid (thesis 6 and 7).
     Sweep,
@@ -153,8 +152,8 @@ impl Day {
         self.items.iter().filter(move |item| item.kind == kind)
     }
 
-    /// Writes the sweeps as a plan for a campaign, each as a recording that is simulated with every model.
-    /// `found` are parameters from the friction runs, which the simulations use.
+    /// Returns a plan for a campaign, in which each sweep is a recording that is simulated with every slosh model.
+    /// `found` are parameters from the friction runs; the simulations use them unless day.toml sets them.
     fn plan(self, found: Vec<(String, String)>) -> Result<Plan> {
         let read = |item: &Item| recorded::read(&item.recorded, &mut |_| {}).ok();
         let Some((step, _)) = self.items_of_kind(Kind::Sweep).find_map(read) else {
@@ -178,8 +177,8 @@ impl Day {
     }
 }
 
-/// Lists the values of nested tables under dotted names, as parameters of the FMU are named: `[tank] h =
-/// 0.08` becomes `tank.h`.
+/// Appends the values of nested tables to `values` under dotted names, as the FMU names its parameters: `[tank] h
+/// = 0.08` becomes `tank.h`.
 fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>) {
     for (key, value) in table {
         let name = format!("{prefix}{key}");
@@ -191,8 +190,8 @@ fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>
     }
 }
 
-/// Analyses the day in `directory` and writes its tables and report into `out` (default: a folder in dist
-/// named after the day).
+/// Analyses the day in `directory`, and writes its tables and report to `out` (default: a folder in dist with
+/// the name of `directory`).
 pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> Result<()> {
     let day = Day::read(directory)?;
     let fmu = open(fmu)?;
