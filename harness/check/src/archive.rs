@@ -25,8 +25,7 @@ pub struct Entry {
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
-    /// Bytes of the file, if rules need its content ([`is_read`] is true for its name); otherwise
-    /// empty.
+    /// Bytes of the file if rules need its content ([`is_read`] is true for its name), otherwise empty.
     content: Vec<u8>,
     fault: Option<String>,
 }
@@ -45,9 +44,9 @@ fn is_read(name: &str) -> bool {
 const INDEX: &str = "documentation/index.html";
 
 impl Archive {
-    /// Reads the archive of an FMU and unpacks into a temporary folder what a host would find
-    /// there. Links and names that lead out of the folder are left out, because other rules report
-    /// them. A damaged entry is noted in `fault`, so that all the other entries are still checked.
+    /// Reads the archive of an FMU, and unpacks the files that a host would find into a temporary folder. Links and
+    /// names that lead out of the folder are skipped, because other rules report them. A damaged entry is noted in its
+    /// `fault`, so that the other entries are still checked.
     pub fn read(path: &Path) -> Result<Archive> {
         let from = host::archive::Archive::open(path)?;
         let directory = temporary::Folder::new()?;
@@ -77,9 +76,8 @@ impl Archive {
         Ok(archive)
     }
 
-    /// Unpacks one entry to its place in the folder. Every entry is decompressed to its end, even if nothing
-    /// needs its content, because only then a wrong size or checksum shows. `content` receives the bytes if a
-    /// rule reads this file.
+    /// Unpacks one entry to its place in the folder. Every entry is decompressed completely, even if nothing needs its
+    /// content, because a wrong size or checksum shows only then. `content` receives the bytes if a rule reads this file.
     fn unpack(
         &self,
         from: &host::archive::Archive,
@@ -92,9 +90,9 @@ impl Archive {
         let is_placed = !entry.link && !entry.is_folder() && name_faults(&entry.name).is_empty();
         let path = self.directory.path().join(&entry.name);
         let folder = path.parent().unwrap_or(self.directory.path());
-        // A file whose name another entry uses as a folder cannot be unpacked by a host either.
+        // If another entry uses the name of this file as a folder, a host cannot unpack the file either.
         let place = match is_placed && std::fs::create_dir_all(folder).is_ok() {
-            // Of two entries for the same file the first one is kept, because rules read the first one too.
+            // Of two entries for the same file the first is kept, because rules also read the first.
             true => File::create_new(&path).ok(),
             false => None,
         };
@@ -142,7 +140,7 @@ fn name_faults(name: &str) -> Vec<&'static str> {
     if name.split(['/', '\\']).any(|part| part == "..") {
         faults.push("leads out of the archive by \"..\"");
     }
-    // Some tools write an entry for the folder itself; every unpacker accepts it.
+    // Some tools write an entry for the folder itself, which every unpacker accepts.
     if name != "./"
         && name.trim_end_matches('/').split('/').any(|part| part.is_empty() || part == ".")
     {
@@ -211,7 +209,7 @@ pub fn links(archive: &Archive, findings: &mut Findings) {
 pub fn duplicates(archive: &Archive, findings: &mut Findings) {
     let mut seen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for name in archive.entries.iter().map(|entry| entry.name.as_str()) {
-        // An entry that is a file and another that is a folder of the same name break a rule of their own.
+        // A file and a folder of the same name break another rule, zip.file_and_folder.
         let folder = if name.ends_with('/') { "/" } else { "" };
         let names = seen.entry(host::archive::place(name) + folder).or_default();
         // A repeated entry for a folder hides no content.

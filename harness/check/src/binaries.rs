@@ -6,9 +6,8 @@ use host::fmi2::{Fmu, PLATFORM};
 use host::fmi3;
 use host::xml::Element;
 
-/// Folders under `binaries/` in FMI 2.0, the file ending of the binary in each, and the format that this
-/// check can read (`None`: not read). Names with 32 and 64 are for x86; other processors have platform tuples
-/// as in FMI 3.0.
+/// Folders under `binaries/` in FMI 2.0, the file ending of the binary in each, and the format of the binary (`None` if
+/// this check cannot read it). Names with 32 and 64 are for x86; other processors have platform tuples as in FMI 3.0.
 pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("win32", ".dll", None),
     ("win64", ".dll", Some(Kind::Windows)),
@@ -27,8 +26,8 @@ const ARCHITECTURES: [&str; 8] =
 /// File ending of the binaries in a folder, and their format if this check can read it.
 type Form = (&'static str, Option<Kind>);
 
-/// Returns the file ending of the binary in `folder` and its readable format, or `None` for a folder whose
-/// name a vendor has invented.
+/// Returns the file ending of the binary in `folder` and its format, or `None` if the folder has a name that the
+/// standard does not define.
 fn platform(folder: &str) -> Option<Form> {
     let known = PLATFORMS.iter().find(|(known, ..)| *known == folder);
     known.map(|(_, ending, kind)| (*ending, *kind)).or_else(|| tuple(folder))
@@ -72,11 +71,10 @@ struct Placed {
 
 pub struct Binaries {
     placed: Vec<Placed>,
-    /// Number of binaries with the model's name that are in folders for platforms which the
-    /// standard does not define.
+    /// Number of binaries with the model's name in folders whose names the standard does not define (folders of vendors).
     of_vendors: usize,
-    /// Files that no host finds because of their name, in the folders that FMI 2.0 defines for
-    /// binaries, each with the names that hosts look for.
+    /// Files in the folders that FMI 2.0 defines for binaries which no host finds because of their names, each with the
+    /// name that hosts look for.
     elsewhere: Vec<(String, String)>,
     declared: Vec<Declared>,
     has_sources: bool,
@@ -106,7 +104,7 @@ impl Binaries {
         }
         let mut all = Binaries::read(archive, declared, tuple, fmi3::PLATFORM);
         all.has_sources = archive.below("sources/buildDescription.xml").next().is_some();
-        // Static libraries have other endings.
+        // Static libraries have other endings, so that they do not count.
         let is_vendors = |name: &&str| {
             let folder = name.split('/').nth(1).unwrap_or_default();
             let is_old = PLATFORMS[..6].iter().any(|(old, ..)| *old == folder);
@@ -116,8 +114,8 @@ impl Binaries {
         all
     }
 
-    /// `declared` has the interfaces, or `None` without a description. `platform` returns file ending and
-    /// format for the name of a folder, and `own_folder` is the folder for the platform of this check.
+    /// `declared` has the interfaces, or `None` if the description cannot be read. `platform` returns file ending and
+    /// format for the name of a folder; `own_folder` is the folder for the platform of this check.
     fn read(
         archive: &Archive,
         declared: Option<Vec<Declared>>,
@@ -144,7 +142,7 @@ impl Binaries {
             let [_, folder, file] = parts[..] else { continue };
             let Some((ending, kind)) = platform(folder) else {
                 let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-                // A standard folder in other capitals is a mistake, not a vendor's own name.
+                // A folder of the standard in other capitals is a mistake, not a name of a vendor.
                 let is_vendors = platform(&folder.to_lowercase()).is_none();
                 let is_named = identifiers.iter().any(|name| name == stem);
                 all.of_vendors += usize::from(is_vendors && is_named);
@@ -152,7 +150,7 @@ impl Binaries {
             };
             let names: Vec<String> =
                 identifiers.iter().map(|identifier| format!("{identifier}{ending}")).collect();
-            // File names on Windows do not depend on capitals.
+            // File names on Windows are not case-sensitive.
             let is_file = |name: &String| match ending {
                 ".dll" => name.eq_ignore_ascii_case(file),
                 _ => name == file,
@@ -182,8 +180,7 @@ impl Binaries {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }
 
-    /// Calls `look` for each binary that this check can parse. The rule is skipped if there is
-    /// none.
+    /// Calls `look` for each binary that this check can parse, or skips the rule if there is none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
         if self.readable().next().is_none() {
             findings.skip("the FMU has no binary that can be parsed");
@@ -244,7 +241,7 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
 }
 
 pub fn name(binaries: &Binaries, findings: &mut Findings) {
-    // Further libraries next to the binary are allowed; a folder without the model's binary is not.
+    // A folder may contain further libraries, but it must contain the model's binary.
     let empty = |folder: &str| !binaries.placed.iter().any(|p| p.name.starts_with(folder));
     for (name, expected) in &binaries.elsewhere {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);

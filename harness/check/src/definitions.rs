@@ -1,5 +1,5 @@
-//! Rules of the head and the definitions of modelDescription.xml (FMI 2.0.5, section 2.2; FMI 3.0.2, section
-//! 2.4): interfaces, capabilities, units, types.
+//! Rules about the attributes of fmiModelDescription and about its definitions (FMI 2.0.5, section 2.2; FMI 3.0.2,
+//! section 2.4): interfaces, capabilities, units, types.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -61,7 +61,7 @@ pub fn interfaces(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Reports each interface whose modelIdentifier cannot be the start of a C function's name.
+/// Reports each interface whose modelIdentifier cannot be the beginning of a C function's name.
 pub fn model_identifier(d: &Description, findings: &mut Findings) {
     for interface in d.interfaces() {
         let name = interface.get("modelIdentifier").unwrap_or_default();
@@ -83,8 +83,7 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
         ("canSerializeFMUState", "canGetAndSetFMUState"),
         ("canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"),
     ];
-    /// Attributes of an interface that describe the binary. Interfaces that use one binary must
-    /// therefore have the same values.
+    /// Attributes of an interface that describe the binary. If two interfaces use one binary, they must have the same values.
     const SHARED: [&str; 3] = [
         "needsExecutionTool",
         "canBeInstantiatedOnlyOncePerProcess",
@@ -188,13 +187,12 @@ pub fn stop_time(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Returns the items of an enumeration's type, which are children of the type itself in FMI 3.0.
+/// Returns the items of an enumeration's type. In FMI 3.0 they are children of the type itself.
 pub(crate) fn items(of: &Element) -> impl Iterator<Item = &Element> {
     of.children.iter().chain(of.list("Enumeration")).filter(|child| child.name == "Item")
 }
 
-/// Reports definitions (of units and types) whose names are repeated, and types two of whose items have the
-/// same name or value.
+/// Reports definitions of units and types with equal names, and types in which two items have the same name or value.
 pub fn unique(d: &Description, findings: &mut Findings) {
     let root = &d.root;
     let mut one = |what: &str, elements: &mut dyn Iterator<Item = &Element>, attribute: &str| {
@@ -252,7 +250,7 @@ pub fn units(d: &Description, findings: &mut Findings) {
 }
 
 pub fn types(d: &Description, findings: &mut Findings) {
-    // In FMI 2.0 the type's element has the child Real, in FMI 3.0 it is itself called Float64Type.
+    // In FMI 2.0 the element of a type has a child such as Real; in FMI 3.0 the element itself has a name such as Float64Type.
     let kind = |of: &'_ Element| match d.is_fmi3() {
         true => of.name.strip_suffix("Type").map(String::from),
         false => Some(of.children.first()?.name.to_string()),

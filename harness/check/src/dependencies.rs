@@ -1,9 +1,9 @@
 //! Rules that compare the dependencies in modelDescription.xml with the binary (FMI 2.0.5, sections 2.2.8 and
 //! 2.1.9).
 //!
-//! Each input and state is changed alone, and the outputs and derivatives that follow are the observed
-//! dependencies. This is repeated from many initial points, because a dependency may show only for some
-//! parameters, and a state that is 0 hides a product.
+//! The rules change each input and each state separately; the outputs and derivatives that then change are the observed
+//! dependencies. This is repeated from many initial points, because a dependency may show only for some parameters, and
+//! because a state of 0 hides a product.
 
 use std::collections::BTreeSet;
 
@@ -19,15 +19,15 @@ use host::description::{Type, Value};
 /// Largest number of initial points that are tried before a declared feedthrough counts as missing in the
 /// binary.
 const STARTS: u64 = 600;
-/// Smallest number of initial points, which is enough to find most dependencies that are not declared.
+/// Smallest number of initial points that are tried. It is enough to find most dependencies that are not declared.
 const AT_LEAST: u64 = 40;
-/// Largest number of attempts to reach these initial points. More attempts than points are needed, because
-/// the FMU may refuse parameters drawn at random.
+/// Largest number of attempts to reach [`STARTS`] initial points. There are more attempts than points, because the FMU
+/// may refuse parameters that are drawn at random.
 const TRIES: u64 = 16 * STARTS;
 /// Probability with which a random start value is divided by 100, because some dependencies show
 /// only at small values.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// Relative change of a value below which the change is a rounding error and no dependency.
+/// Relative change of a value below which the change counts as rounding and not as a dependency.
 const ROUNDING: f64 = 1e-9;
 
 /// Returns an instance whose parameters, inputs and start values are drawn at random with the seed `attempt`.
@@ -218,7 +218,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
     for attempt in 0..TRIES {
         let mut session = random_session(fmu, interface, attempt)?;
         fmu.announce(format!("initialising with other parameters, try {attempt}"));
-        // The FMU refused these parameters: the next attempt draws others.
+        // The FMU refused these parameters; the next attempt draws other parameters.
         if session.initialise().is_err() || session.is_ended() {
             continue;
         }
@@ -247,7 +247,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
             for (n, (_, state)) in states.iter().enumerate() {
                 let mut there = x.clone();
                 there[n] += share * x[n].abs().max(0.1 * state.nominal());
-                // The model cannot be evaluated at this point, so that another attempt is needed.
+                // If the model cannot be evaluated at this point, another attempt is made.
                 if session.instance.set_continuous_states(&there).is_ok()
                     && let Ok(after) = read(&mut session, &unknowns)
                 {

@@ -1,5 +1,5 @@
-//! Reads modelDescription.xml (FMI 2.0.5, section 2.2; FMI 3.0.2, section 2.4) without judging it, so that
-//! rules can report what is wrong.
+//! Reads modelDescription.xml (FMI 2.0.5, section 2.2; FMI 3.0.2, section 2.4) without reporting faults, which is the
+//! task of the rules.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -65,7 +65,7 @@ fn initials(causality: &Causality, variability: &Variability) -> Option<&'static
     }
 }
 
-/// The parts of modelDescription.xml that rules need. Faults are not reported here but by the rules.
+/// The parts of modelDescription.xml that rules need. The rules report its faults.
 pub struct Description {
     pub words: &'static Words,
     pub root: Element,
@@ -74,7 +74,7 @@ pub struct Description {
     places: BTreeMap<u32, usize>,
 }
 
-/// A variable. In `typed` the attributes that it inherits from its declaredType are filled in.
+/// A variable. The element `typed` also has the attributes that the variable inherits from its declaredType.
 #[derive(Clone, Debug)]
 pub struct Variable {
     /// Number by which ModelStructure and the attribute `derivative` name the variable: in FMI 2.0 its position
@@ -221,7 +221,7 @@ impl Description {
         std::ptr::eq(self.words, &FMI3)
     }
 
-    /// Returns fmiVersion if the FMU is of a version for which there are no rules.
+    /// Returns fmiVersion if the check has no rules for this version.
     pub fn other_version(&self) -> Option<&str> {
         let version = self.root.get("fmiVersion").map(str::trim).filter(|_| !self.is_fmi3());
         version.filter(|version| version.starts_with("1.") || version.starts_with("3."))
@@ -259,17 +259,16 @@ impl Description {
         self.unknowns(self.words.outputs).chain(self.unknowns(self.words.derivatives))
     }
 
-    /// Returns true if the FMU lists no derivatives and need not, because it is an FMU 2.0 for
-    /// Co-Simulation only.
+    /// Returns true if the FMU lists no derivatives and is allowed to do so, because it is an FMU 2.0 only for Co-Simulation.
     pub fn hides_states(&self) -> bool {
         !self.is_fmi3()
             && self.interface("ModelExchange").is_none()
             && self.unknowns(self.words.derivatives).next().is_none()
     }
 
-    /// Returns the keys of the continuous states: the variables whose derivatives ModelStructure lists, in its
-    /// order. The attribute `derivative` does not make a state, because inputs, outputs and dummy derivatives
-    /// may also have it (FMI 2.0.5, section 2.2.7). It is used only if the FMU hides its states.
+    /// Returns the keys of the continuous states, which are the variables whose derivatives ModelStructure lists, in
+    /// its order. The attribute `derivative` is used only if the FMU hides its states: by itself it does not make a
+    /// variable a state, because inputs, outputs and dummy derivatives may also have it (FMI 2.0.5, section 2.2.7).
     pub fn states(&self) -> Vec<u32> {
         if self.hides_states() {
             return self.variables.iter().filter_map(Variable::derivative_of).collect();
@@ -300,8 +299,8 @@ impl Description {
     }
 }
 
-/// Reads a variable; in FMI 2.0 the caller corrects the key. `types` are the declared types by name, from which
-/// missing attributes are inherited, and `sizes` the start values of structural parameters by value reference.
+/// Reads a variable; in FMI 2.0 the caller corrects its key. `types` maps the names of declared types to the types, from
+/// which missing attributes are inherited; `sizes` maps value references of structural parameters to their start values.
 fn variable(
     words: &Words,
     element: &Element,

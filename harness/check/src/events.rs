@@ -1,13 +1,13 @@
 //! Rules about events in Model Exchange (FMI 2.0.5, sections 3.1.1 and 3.2.2): the FMU must report every
 //! event and every value that it changes.
 //!
-//! A host may enter event mode at any time. If no event indicator has changed its sign, no time event is due
-//! and fmi2CompletedIntegratorStep has not requested event mode, then there is no event and no value may
-//! change. A value that changes nevertheless shows an event that a host would have missed.
+//! A host may enter event mode at any time. There is no event if no event indicator has changed its sign, no time event
+//! is due, and fmi2CompletedIntegratorStep has not requested event mode; then event mode may not change any value. A
+//! value that changes nevertheless shows an event that a host would have missed.
 //!
-//! An FMU may notice in fmi2CompletedIntegratorStep that the host has passed an event, and request event
-//! mode. If the event indicators of an FMU never change, this is its only way to report events, which are
-//! then up to one integrator step late.
+//! An FMU may also notice an event in fmi2CompletedIntegratorStep, after the host has passed it, and request event
+//! mode. If the event indicators of an FMU never change, this is its only way to report events, and they are up to
+//! one integrator step late.
 
 use anyhow::Result;
 
@@ -19,8 +19,7 @@ use super::under_test::{FmuUnderTest, Interface, Observed, STEPS, Session, skip}
 /// Number of initial points from which the FMU is simulated. The first point has the declared start values, all further
 /// points have parameters drawn at random.
 const STARTS: u64 = 12;
-/// Relative change of a value in event mode below which the change is rounding and no event was
-/// missed.
+/// Relative change of a value in event mode below which the change counts as rounding and not as a missed event.
 const ROUNDING: f64 = 1e-9;
 /// Time to the next time event, as a fraction of the step, below which the event counts as due.
 const NEARLY_DUE: f64 = 1e-6;
@@ -30,7 +29,7 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (mut vary, mut step_event) = (false, None);
     for start in 0..STARTS {
         let mut session = random_session(fmu, Interface::ModelExchange, start)?;
-        // A start with parameters that the FMU refuses or cannot simulate is left out.
+        // A start is skipped if the FMU refuses its parameters or cannot simulate with them.
         if session.initialise().is_err() || session.is_ended() {
             continue;
         }
@@ -38,7 +37,7 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         step_event = step_event.or(session.notes.step_event.clone());
         if let Ok(Some((time, name, change))) = missed {
             findings.at(format!("event mode at t = {time:?} s, start {start}")).add(format!(
-                "{name} goes from {change}: an event of which the host is not told (allowed: an \
+                "{name} goes from {change}: an event that the FMU has not reported to the host (allowed: an \
                      event indicator changes its sign, nextEventTime is reached, or \
                      fmi2CompletedIntegratorStep sets enterEventMode)"
             ));
@@ -55,8 +54,8 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Simulates, enters event mode after each step, and returns the first value that changes there although no
-/// event was due: time, name of the variable, and both values as text. Sets `vary` to true if an event
+/// Simulates, enters event mode after each step, and returns the first value that changes in event mode although
+/// no event was due: time, name of the variable, and both values as text. Sets `vary` to true if an event
 /// indicator changes its value.
 fn missed_event<'f>(
     session: &mut Session<'f>,
@@ -91,7 +90,7 @@ fn missed_event<'f>(
         }
         let after = Observed::read(session)?;
         let Some((name, change)) = before.change(&after, fmu) else { continue };
-        // A variable that changes in every event mode counts events.
+        // A variable that changes in every event mode counts the events; it is not a missed event.
         session.event()?;
         if !session.is_ended() && after.change(&Observed::read(session)?, fmu).is_none() {
             return Ok(Some((session.time, name, change)));
@@ -110,7 +109,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         if session.initialise().is_err() {
             continue;
         }
-        // Failures to get this far are reported by `exchange.run`.
+        // `exchange.run` reports failures in these steps.
         let _ = session.advance(2 * STEPS);
         if let Some((time, n, before, after)) = session.notes.hidden_jump {
             findings.at(format!("the event at t = {time:?} s, start {start}")).add(format!(

@@ -15,7 +15,7 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn event_iteration(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
-    // Other failures are reported by other rules.
+    // Other rules report other failures.
     let mut session = fmu.exchanging()?;
     session.advance(2 * STEPS)
 }

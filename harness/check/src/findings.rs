@@ -36,10 +36,10 @@ pub struct Findings {
     pub list: Vec<Finding>,
     pub more: usize,
     pub skipped: Option<String>,
-    /// Identifier of the rule that reports the fault which made this rule impossible to check.
+    /// Identifier of another rule, which reports the fault that makes it impossible to check this rule.
     pub(crate) reported_by: Option<String>,
-    /// The call at which the rule ended early, because the FMU crashed or refused the call. The last finding of the rule
-    /// then describes this.
+    /// The call at which the rule ended early, because the FMU crashed or refused the call. The rule's last finding
+    /// then describes this call.
     pub(crate) stopped_at: Option<String>,
 }
 
@@ -103,7 +103,7 @@ impl At<'_> {
         let At { findings, place } = self;
         if findings.list.len() >= KEPT {
             findings.more += 1;
-            // An error replaces a warning, so that it shows however many warnings there are.
+            // An error replaces a warning in a full list, so that it is shown in any case.
             let is_hidden = severity == Severity::Error && !findings.has_error();
             if !is_hidden {
                 return;

@@ -13,10 +13,9 @@
 //! error = h/6 (k1 - 2 k2 + k3)
 //! ```
 //!
-//! With J = 0 it is the explicit midpoint rule, which costs three evaluations a step and is tried first. If
-//! the midpoint rule needs many steps, the FMU is stiff, and J is computed by finite differences; the method
-//! is then L-stable. The work is bounded by a number of steps and not by elapsed time, so that the same run
-//! always gives bit-identical results.
+//! With J = 0 it is the explicit midpoint rule, which needs three evaluations for a step and is tried first. If the midpoint
+//! rule needs many steps, the FMU is stiff; J is then computed by finite differences, and the method is L-stable. The work
+//! is bounded by a number of steps and not by elapsed time, so that the same run always gives bit-identical results.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
@@ -29,8 +28,8 @@ use host::fmi2::{CallError, Status};
 const TOLERANCE: f64 = 1e-3;
 /// Number of explicit steps in one communication step after which the FMU counts as stiff.
 const EXPLICIT_STEPS: usize = 40;
-/// Largest number of integrator steps in one communication step. The host then accepts the state that it has
-/// reached, because FMI prescribes no accuracy.
+/// Largest number of integrator steps in one communication step. After these steps the host continues from the state
+/// that it has reached, because FMI does not prescribe an accuracy.
 const MOST_STEPS: usize = 100;
 /// Largest number of states for which a Jacobian is computed by finite differences.
 const MOST_STATES: usize = 200;
@@ -65,7 +64,7 @@ enum Impossible {
 }
 
 impl<V: Tested> Session<'_, V> {
-    /// Integrates to `end`, or as far as the allowed number of steps goes, and handles events on the way.
+    /// Integrates to `end`, or as far as the allowed number of steps reaches, and handles events on the way.
     ///
     /// # Errors
     ///
@@ -90,7 +89,7 @@ impl<V: Tested> Session<'_, V> {
             if step >= EXPLICIT_STEPS && n <= MOST_STATES {
                 jacobian = Some(self.jacobian(t, &x, &magnitudes)?);
             }
-            // If no step is possible, the reason is that of the shortest step, which was tried last.
+            // If no step is possible, the reason for the shortest step, which is tried last, is reported.
             let mut why = None;
             loop {
                 // A step ends neither after `end` nor after a time event that the FMU has announced.
@@ -127,7 +126,7 @@ impl<V: Tested> Session<'_, V> {
                     continue;
                 }
                 self.time = to;
-                // A step that was shortened to end in time gives no reason to shorten the next one.
+                // A step that was shortened to end in time is no reason to shorten the next step.
                 h = if last { h.max((to - t) * factor) } else { (to - t) * factor };
                 V::complete_step(self, crossed)?;
                 z = if crossed { self.indicators()? } else { z_new };
@@ -183,8 +182,8 @@ impl<V: Tested> Session<'_, V> {
         Ok(Trial::Done(x_new, worst))
     }
 
-    /// Evaluates the derivatives at (t, x). The inner error is the reason why the FMU cannot be evaluated
-    /// there, for example fmi2Discard.
+    /// Evaluates the derivatives at (t, x). The inner error is the reason, for example fmi2Discard, why the FMU
+    /// cannot be evaluated there.
     fn derivatives_at(
         &mut self,
         t: f64,

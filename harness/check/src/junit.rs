@@ -9,8 +9,8 @@ use xml::writer::{EventWriter, XmlEvent};
 use super::findings::Severity;
 use super::report::{Outcome, Report};
 
-/// Writes the report. Each rule is a test case, classed by the rule's group; errors fail the test case, and
-/// warnings are its output.
+/// Writes the report. Each rule is a test case, whose class is the group of the rule. Errors make the test case fail,
+/// and warnings are its output.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
     let is_failed = |o: &&Outcome| o.findings.list.iter().any(|f| f.severity == Severity::Error);
     let failures = report.outcomes.iter().filter(is_failed).count();
@@ -48,7 +48,7 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
         }
         xml.write(XmlEvent::end_element())?;
     }
-    // A separate test case, because viewers show a suite that is skipped as a whole as a success.
+    // This is a separate test case, because viewers show a suite whose cases are all skipped as a success.
     if let Some(why) = &report.unchecked {
         begin_case(&mut xml, "check", "0.000")?;
         write_element(&mut xml, "error", Some(why), "")?;

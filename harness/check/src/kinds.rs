@@ -1,8 +1,8 @@
 //! Rules of the attribute dependenciesKind (FMI 2.0.5, section 2.2.8), compared with the binary.
 //!
-//! The kind `dependent` promises nothing. All other kinds promise that the unknown is linear in the known,
-//! with a factor that never changes (`constant`), changes only before initialisation has ended (`fixed`),
-//! when a tunable parameter is set (`tunable`) or at events (`discrete`). The factor is measured by small and
+//! The kind `dependent` promises nothing. Every other kind promises that the unknown is a linear function of the known,
+//! with a factor that never changes (`constant`), or that changes only before initialisation has ended (`fixed`), when
+//! a tunable parameter is set (`tunable`), or at events (`discrete`). The rules measure the factor by small and by
 //! large finite differences, at several states and parameters.
 
 use std::collections::BTreeSet;
@@ -101,8 +101,8 @@ fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Facto
         .then_some(Factor { value, rounding: 1e3 * f64::EPSILON * size / dx.abs() }))
 }
 
-/// Measures the factors of all pairs at three points of one session and reports each pair whose factor
-/// changes; `wrong` has the pairs that were already reported. Returns the factors at the first point.
+/// Measures the factors of all pairs at three points of one session, and reports each pair whose factor changes, unless
+/// it is in `wrong`, the pairs that were already reported. Returns the factors at the first point.
 fn at_points(
     session: &mut Session,
     pairs: &[Pair],
@@ -120,7 +120,7 @@ fn at_points(
             session.advance(2)?;
         }
         if point > 0 && exchange && !initializing {
-            // Other states, with no event in between.
+            // other states, without an event in between
             let states = fmu.states();
             let mut x = session.states()?;
             let here = x.clone();
@@ -160,7 +160,7 @@ pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut interface = Interface::ModelExchange;
     if !fmu.has(interface) {
         interface = Interface::CoSimulation;
-        // Between two steps of Co-Simulation there may be events, which may change the factor.
+        // There may be events between two steps of Co-Simulation, and they may change the factor.
         running.retain(|pair| pair.kind != "discrete");
     }
     if !running.is_empty() && fmu.has(interface) {
@@ -191,11 +191,11 @@ fn look(
                 .and_then(|()| session.instance.enter_initialization_mode())
                 .is_ok()
         } else {
-            // Every second start is at rest.
+            // Every second start begins at rest.
             session.initialise().is_ok()
                 && session.advance(if start % 2 == 0 { 3 } else { 0 }).is_ok()
         };
-        // A start with parameters that the FMU refuses is left out.
+        // A start is skipped if the FMU refuses its parameters.
         if !ready || session.is_ended() {
             continue;
         }

@@ -1,9 +1,9 @@
 //! Checks an FMU against the rules of FMI 2.0 or 3.0 and against what hosts expect (`hubslosh check`).
 //!
-//! Every rule is an entry of a table, [`RULES`] for FMI 2.0 and [`rules::fmi3::RULES`] for FMI 3.0, together
-//! with the function that checks it. Rules of the archive, the description and the binaries only read the
-//! file. Rules of calls load the binary for this platform and call it as hosts do. Each of these runs in a
-//! process of its own, so that a crash or a hang is a finding and not the end of the check.
+//! Every rule is an entry of a table, [`RULES`] for FMI 2.0 and [`rules::fmi3::RULES`] for FMI 3.0, with the function
+//! that checks it. Rules of the archive, the description and the binaries only read files. Rules of calls load the
+//! binary for this platform and call it as hosts do; each of them runs in a separate process, so that a crash or a hang
+//! is a finding and does not end the check.
 
 pub mod archive;
 pub mod arrays;
@@ -75,8 +75,8 @@ pub fn rules() -> Vec<Statement> {
     second.chain(fmi3::RULES.iter().map(|rule| Statement { fmi: "3.0", rule })).collect()
 }
 
-/// Rules that explain why a file cannot be opened as an FMU. If it cannot be opened, findings of
-/// these rules are reported even if the user has not selected the rules.
+/// Rules that explain why a file cannot be opened as an FMU. If the file cannot be opened, their findings are reported
+/// even if the user has not selected these rules.
 const OPENING: [&str; 10] = [
     "zip.readable",
     "zip.methods",
@@ -90,13 +90,13 @@ const OPENING: [&str; 10] = [
     "xml.doctype",
 ];
 
-/// Checks all rules, or those that `options` selects. `progress` is called after each rule of calls with the
-/// number of such rules so far.
+/// Checks all rules, or the rules that `options` selects. After each rule of calls, `progress` receives the number of
+/// rules of calls that have been checked.
 ///
 /// # Errors
 ///
-/// If the file cannot be read, a selected rule does not exist, or a temporary folder cannot be written.
-/// Faults of the FMU are findings, not errors.
+/// If the file cannot be read, a selected rule does not exist, or a temporary folder cannot be written. Faults of the
+/// FMU are findings, not errors.
 pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
     let known = |name: &str| RULES.iter().chain(fmi3::RULES).any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
@@ -118,7 +118,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         Some(Err(why)) => Err(format!("modelDescription.xml cannot be read: {why}")),
         None => Err("there is no modelDescription.xml that can be unpacked".to_string()),
     };
-    // FMI 3 has rules of its own. A file of FMI 1 breaks one rule, which says so.
+    // FMI 3.0 has another table of rules. A file of FMI 1.0 breaks one rule, whose finding says so.
     let described = description.as_ref().ok().copied();
     let table = if described.is_some_and(Description::is_fmi3) { fmi3::RULES } else { RULES };
     let binaries = Binaries::new(&archive, described);
@@ -151,8 +151,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         match (&rule.check, &description) {
             (Check::Archive(check), _) => check(&archive, &mut findings),
             (Check::Description(check), Ok(description)) => check(description, &mut findings),
-            // `zip.description` and `xml.well_formed` report a description that is missing or not
-            // well-formed.
+            // `zip.description` reports a missing description, and `xml.well_formed` one that is not well-formed.
             (Check::Description(_), Err(why)) => findings.skip(why.clone()),
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
             (Check::Calls(_) | Check::Calls3(_), _) => {
@@ -207,8 +206,8 @@ fn write_description(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     Ok((folder, path))
 }
 
-/// Returns the error that no rule was checked, or `None` if at least one of the rules in `outcomes` was
-/// checked. `only` are the selected rules, for the text.
+/// Returns the message that no rule was checked, or `None` if at least one of the rules in `outcomes` was checked.
+/// `only` are the rules that the user has selected; the message names them.
 fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
     let is_skipped = |o: &Outcome| o.findings.skipped.is_some() && o.findings.list.is_empty();
     if !outcomes.iter().all(is_skipped) {
@@ -228,8 +227,8 @@ fn unchecked(outcomes: &[Outcome], only: &[String]) -> Option<String> {
     })
 }
 
-/// Pairs of the first words in a call's description and the rule that owns this call. If the call
-/// fails, only its owner reports the fault, and the other rules that need the call are skipped.
+/// Pairs of the beginning of a call's description and the rule that owns this call. If the call fails, only the owner
+/// reports this; other rules that need the call are skipped.
 const OWNERS: [(&str, &str); 6] = [
     ("fmi2Instantiate", "load.instance"),
     ("fmi2SetupExperiment", "load.initialises"),
@@ -239,12 +238,12 @@ const OWNERS: [(&str, &str); 6] = [
     ("a step from", "exchange.run"),
 ];
 
-/// Reports each failing call only once. A call that crashes or is refused stops every rule that makes it: the rule that
-/// owns the call keeps the finding, and all other rules that make the call are skipped. For a call without an owner, the
-/// first rule that stopped there keeps the finding.
+/// Reports each failing call only once. A call that crashes or is refused stops every rule that makes it. Only the rule
+/// that owns the call keeps its finding, or, for a call without an owner, the first rule that was stopped. All other
+/// rules that make the call are skipped.
 fn name_each_cause_once(outcomes: &mut [Outcome]) {
     let alike = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".-+e".contains(c), "");
-    // Rules whose only finding is the call at which they stopped, by position in the table.
+    // rules whose only finding is the call at which they stopped, as positions in the table
     let stopped: Vec<(usize, String, String)> = (outcomes.iter().enumerate())
         .filter_map(|(n, outcome)| {
             let [finding] = &outcome.findings.list[..] else { return None };
@@ -270,8 +269,8 @@ fn name_each_cause_once(outcomes: &mut [Outcome]) {
     }
 }
 
-/// Turns a skipped rule into a finding if the rule that should have reported the cause was checked and found
-/// nothing, because otherwise nobody would report the fault.
+/// Turns a skipped rule into a finding if the rule that should have reported the cause was checked and found nothing.
+/// Otherwise no rule would report the fault.
 fn restore_unreported_faults(outcomes: &mut [Outcome]) {
     let silent: Vec<&str> = outcomes
         .iter()

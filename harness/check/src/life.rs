@@ -11,8 +11,8 @@ use super::under_test::{
 use host::description::Value;
 use host::fmi2::{CallError, Callbacks, Instance, Instantiation, Status, file_uri};
 
-/// `load.opens`: a binary that cannot be loaded has ended the check before. Only if the two interfaces have
-/// two binaries can the second one still be broken here.
+/// `load.opens`: if no binary could be loaded, the check has already ended. If the two interfaces have different
+/// binaries, one of them may still be broken, which is reported here.
 pub fn opens<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     for why in fmu.broken() {
         findings.at("the binary of one interface").add(why);
@@ -36,7 +36,7 @@ pub fn version<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result
     fmu.announce(&call);
     for binary in fmu.binaries() {
         let answer = binary.version();
-        // FMI 3.0 has bug-fix versions such as 3.0.1.
+        // Releases of FMI 3.0 that only fix errors have versions such as 3.0.1.
         let is_fixed = fmu.description.words.version == "3.0" && answer.starts_with("3.0.");
         if answer != fmu.description.words.version && !is_fixed {
             findings
@@ -111,7 +111,7 @@ fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, Ca
 
 pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first_interface()?;
-    // The standard requires a URI, so that only an FMU that needs no resources can do without.
+    // The standard requires a URI, so that only an FMU without resources has to work with NULL.
     let place = "fmi2Instantiate with the resource location NULL";
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
     let answer = fmu.with_open_effect(place, findings, || fmu.instantiate(interface, &with))?;
@@ -120,7 +120,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     {
         findings.at(place).add(error.to_string());
     }
-    // No host may pass these arguments, so that the standard does not say what happens.
+    // Hosts must not pass these arguments, so that the standard does not define their effect.
     for (what, with) in [
         ("the instance name NULL", Instantiation { name: None, ..fmu.arguments(interface)? }),
         ("an empty instance name", Instantiation { name: Some(""), ..fmu.arguments(interface)? }),
@@ -153,7 +153,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.initialise()?;
         session.advance(STEPS)?;
         let mut all = session.readings()?;
-        // A text variable may contain the path of the resources and differ for this reason.
+        // A text variable may contain the path of the resources, and is therefore not compared.
         all.retain(|values| !matches!(values[0], Value::String(_)));
         Ok(all)
     };
@@ -189,8 +189,8 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Makes a call that the FMU must refuse, with the usual callbacks. Returns true if the FMU logs the reason.
-/// If the call crashes, `values.unknown` reports it.
+/// Makes a call that the FMU must refuse, with the usual callbacks. Returns true if the FMU logs the reason. A crash
+/// is reported by `values.unknown`.
 fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
     let mut session = fmu.running(interface)?;
     Ok(session.refused().is_some_and(|error| !error.messages.is_empty()))
@@ -213,7 +213,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             findings.at(place).add(format!("{error} (required: the instance can be initialised)"))
         }
     }
-    // Hosts must pass a logger. Without one the FMU may refuse, but should not crash.
+    // Hosts must pass a logger. An FMU may refuse an instance without one, but should not crash.
     let with = Instantiation { callbacks: Callbacks::Empty, ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with callbacks that are all NULL";
     let answer = fmu.with_open_effect(place, findings, || {
@@ -327,7 +327,7 @@ fn differs_when_run_again<V: Tested>(fmu: &UnderTest<V>, using: Use) -> Result<O
     Ok(session.difference(&second, &first))
 }
 
-/// Returns an error if two equal runs differ, because comparing runs then proves nothing.
+/// Returns an error if two equal runs differ, because a comparison of runs then proves nothing.
 /// `life.deterministic` reports this fault.
 pub fn is_deterministic<V: Tested>(fmu: &UnderTest<V>, using: impl Into<Use>) -> Result<()> {
     match differs_when_run_again(fmu, using.into())? {
@@ -405,8 +405,7 @@ pub fn terminate<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Resu
         session.instance.terminate()?;
         fmu.announce(format!("reading values after {call}"));
         let after = session.readings()?;
-        // FMI 3.0 requires only that values can be read; Dymola's FMUs change them slightly in
-        // fmi3Terminate.
+        // FMI 3.0 requires only that values can be read; FMUs of Dymola change values slightly in fmi3Terminate.
         if fmu.description.words.version == "2.0"
             && let Some(text) = session.difference(&after, &before)
         {
@@ -447,7 +446,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for (stage, calls) in &common {
             let more: &[Misplaced] = match stage {
                 Stage::Initialised if interface == Interface::CoSimulation => &[],
-                // Continuous-time mode allows the first and the last of these calls.
+                // The first and the last of these calls are allowed in continuous-time mode.
                 Stage::Initialised => &own[1..3],
                 _ => &own,
             };
@@ -463,7 +462,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Adds a finding unless the call is refused with fmi2Error and a message that says why.
+/// Adds a finding unless the FMU refuses the call with fmi2Error and logs the reason.
 pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(), CallError>) {
     match answer {
         Ok(()) => findings.at(place).add("the call is accepted (allowed: fmi2Error and a message)"),
@@ -473,7 +472,7 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
                 .add(format!("{error} (allowed: fmi2Error, and the instance can still be used)"));
         }
         Err(error) if error.messages.iter().all(|m| m.text.trim().is_empty()) => {
-            // The standard requires only the error, so that a missing message is a warning.
+            // The standard requires only the error, so that a missing message is only a warning.
             findings
                 .at(place)
                 .warn(format!("{error} (expected: fmi2Error and a message that says why)"));
@@ -502,7 +501,7 @@ pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         ordinary_lives(fmu, interface)?;
     }
-    // Compared with the state before the binary was loaded, so that changes by its constructors count.
+    // The comparison is with the state before the binary was loaded, so that changes by its constructors count.
     for ((name, before), (_, after)) in fmu.before.iter().zip(surroundings()) {
         if *before != after {
             let values = match *name {

@@ -9,7 +9,7 @@ use host::fmi2::{Fmi2, Instantiation, Message, Status};
 
 pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first_interface()?;
-    // If the FMU uses the text as a printf format, %d prints some number and %% one sign; both are harmless.
+    // An FMU that uses the text as a printf format prints some number for %d and one sign for %%; both are harmless.
     const TEXT: &str = "{a%db%%c}";
     let mut told = Vec::new();
     let place = format!("a message about {TEXT:?}");
@@ -87,8 +87,8 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Simulates an ordinary run with loggingOn and returns the logged messages. `changing` says whether the inputs change
-/// during the run or keep their start values.
+/// Simulates an ordinary run with loggingOn and returns the logged messages. If `changing` is true, the inputs change
+/// during the run; otherwise they keep their start values.
 fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<Vec<Message>> {
     fmu.announce("fmi2Instantiate, loggingOn");
     let with = fmu.arguments(interface)?;
@@ -103,8 +103,8 @@ fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<
     Ok(session.instance.take_messages())
 }
 
-/// `log.quiet`: an ordinary run logs nothing. If the inputs change, warnings are allowed, because the check's
-/// inputs may lead a model out of its range.
+/// `log.quiet`: an ordinary run logs nothing. If the inputs change, warnings are allowed, because the inputs of the
+/// check may lead a model out of its range.
 pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let runs = [("inputs as they start", false), ("inputs changing", true)];
     for (interface, (inputs, changing)) in

@@ -1,8 +1,8 @@
 //! Rule about memory leaks (FMI 2.0.5, sections 2.1.5 and 2.1.8).
 //!
-//! The same calls are repeated in windows of equal length. Memory that is allocated once and used again is
-//! allocated in the first window. If each later window needs more memory, it leaks. The operating system
-//! reports the writable memory (VmData) in steps of about 130 kB.
+//! The same calls are repeated in windows of equal length. Memory that is allocated once and used again is allocated in
+//! the first window. If each of the following windows needs more memory, the FMU leaks. The operating system reports
+//! the writable memory (VmData) in units of about 130 kB.
 
 use std::time::{Duration, Instant};
 
@@ -14,11 +14,11 @@ use super::under_test::{FmuUnderTest, Interface, skip};
 const MOST: usize = 500;
 /// Time limit for the first window of calls; the other windows have the same number of calls.
 const LONGEST: Duration = Duration::from_millis(500);
-/// Smallest number of calls in a window from which a memory leak can be concluded.
+/// Smallest number of calls in a window from which a leak can be concluded.
 const FEWEST: usize = 10;
 /// Number of windows after the first one, each of which must need more memory.
 const WINDOWS: usize = 3;
-/// Growth of the memory, bytes per step, that is a finding. Less is allowed, because an FMU may
+/// Growth of the memory in bytes per step above which the FMU leaks. Less growth is allowed, because an FMU may
 /// store a short history.
 const PER_STEP: u64 = 1024;
 
@@ -29,7 +29,7 @@ fn writable_memory() -> Option<u64> {
     Some(1024 * kilobytes)
 }
 
-/// Returns how many bytes each `call` leaks, or `None` if at least one window needs no further memory.
+/// Returns the number of bytes that each `call` leaks, or `None` if at least one window needs no further memory.
 fn leak_per_call(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
     let started = Instant::now();
     let mut count = 0;

@@ -7,8 +7,7 @@ use super::archive::Archive;
 use super::binaries::PLATFORMS;
 use super::findings::Findings;
 
-/// Characters that Windows does not allow in names. The slash separates folders, and control characters have
-/// a rule of their own.
+/// Characters that Windows does not allow in names. Slashes separate folders, and another rule reports control characters.
 const FORBIDDEN: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
 /// Names of devices on Windows, which no file may have, with any extension.
 const DEVICES: [&str; 6] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"];
@@ -49,7 +48,7 @@ fn parts(name: &str) -> impl Iterator<Item = &str> {
 
 pub fn windows_names(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
-        // A drive letter makes the name absolute, which breaks a rule of its own.
+        // A drive letter makes the name absolute, which breaks another rule.
         let is_drive = |part: &str| part.len() == 2 && part.ends_with(':');
         let faults: Vec<String> = parts(&entry.name)
             .enumerate()
@@ -114,8 +113,7 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
     }
 }
 
-/// Names of folders and files that the standard defines. Hosts on Linux find them only with exactly
-/// these capitals.
+/// Names of folders and files that the standard defines. Hosts on Linux find them only in exactly this spelling.
 const STANDARD_FOLDERS: [&str; 6] =
     ["binaries", "documentation", "resources", "sources", "extra", "terminalsAndIcons"];
 const STANDARD_FILES: [&str; 3] = ["modelDescription.xml", "model.png", "documentation/index.html"];
@@ -150,7 +148,7 @@ fn standard_spelling(name: &str) -> Option<String> {
 
 pub fn capitals(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
-        // If the correct name also exists, the two are duplicates, which is another rule.
+        // If the correct name also exists, the two names are duplicates, which another rule reports.
         let is_there = |name: &String| archive.entries.iter().any(|e| e.name == *name);
         if let Some(right) = standard_spelling(&entry.name).filter(|right| !is_there(right)) {
             findings.at(&entry.name).add(format!(

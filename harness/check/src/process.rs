@@ -1,6 +1,5 @@
-//! Runs each rule of calls in a process of its own, which `host::guard` watches, so that an FMU that crashes,
-//! hangs or exits the process is a finding. The process reports each call before it makes it, and at the end
-//! its findings.
+//! Runs each rule of calls in a separate process that `host::guard` watches, so that an FMU that crashes, hangs or exits
+//! the process causes a finding. The process reports each call before it makes the call, and at the end its findings.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -22,8 +21,8 @@ use super::under_test::{Tested, UnderTest, Unusable};
 pub const SUBCOMMAND: &str = "check-calls";
 /// Number of rules in which a call did not return, after which no further rules of calls are run.
 const HANGS: usize = 2;
-/// Time limit of a single call of the FMU. A shorter limit applies if the rule's own limit is
-/// short, so that [`HANGS`] endless calls take at most about 10 s.
+/// Time limit of a single call of the FMU. If the time limit of the rule is short, the limit of a call is shorter, too.
+/// [`HANGS`] endless calls take at most about 10 s.
 const CALL: Duration = Duration::from_secs(4);
 const PART: f64 = 15.0;
 /// Largest file that an FMU may write, bytes. It is small because several rules run at the same time.
@@ -35,8 +34,8 @@ const PRINTED: usize = 200;
 #[derive(Default)]
 pub struct SoFar {
     hung: AtomicUsize,
-    /// Reason why the binary cannot be loaded. The first rule that finds it stores it here, so that no other rule tries
-    /// again.
+    /// Reason why the binary cannot be loaded. The first rule that finds the reason stores it here, so that no other
+    /// rule tries to load the binary.
     lost: OnceLock<String>,
     pub bug: OnceLock<String>,
 }
@@ -50,7 +49,7 @@ pub struct Unpacked<'a> {
     pub description: &'a Path,
 }
 
-/// Checks `rule` in a process of its own and stores its findings. Skips the rule if `so_far` has a reason.
+/// Checks `rule` in a separate process and stores its findings. Skips the rule if `so_far` has a reason to skip it.
 pub fn check(
     rule: &'static Rule,
     fmu: Unpacked,
@@ -104,7 +103,7 @@ fn run(
     let hear = |answer: &[u8]| match serde_json::from_slice(answer) {
         Ok(Answer::Doing(what, then)) => (doing, crash) = (what, then),
         Ok(Answer::Done(found)) => done = Some(found),
-        // Our own process sends nothing else, unless the FMU has overwritten its memory.
+        // The program sends nothing else, unless the FMU has overwritten its memory.
         Err(_) => is_damaged = true,
     };
     let ended = guard::run(&options.program, arguments, &limits, Output::Kept, hear)?;
@@ -164,7 +163,7 @@ fn run(
                 }
             }
         }
-        // Only one rule reports this; all others would repeat it.
+        // Only one rule reports this, because all other rules would report the same.
         None if is_lost && rule.id != OPENS => {
             findings.skip_for(OPENS, format!("the process ended while {doing}: {why}"));
         }
@@ -190,7 +189,7 @@ const LOADING: &str = "loading the binary";
 /// ends this process after `limit`.
 pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     let Unpacked { path, directory, description } = fmu;
-    // The description is needed until the process ends.
+    // The description is leaked, because it is needed until the process ends.
     let mut packed: &'static [u8] = std::fs::read(description)?.leak();
     let root = Element::unpack(&mut packed)
         .context("the file with the parsed description has changed since it was written")?;
@@ -198,7 +197,7 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     let rules = if description.is_fmi3() { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
     trace::doing(LOADING, Crash::Error);
-    // A rule that is only slow reports its findings before the time limit.
+    // A rule that is slow, but not stuck, reports its findings before the time limit.
     let deadline = Instant::now() + limit.mul_f64(0.75);
     trace::done(match rule.check {
         Check::Calls(check) => {
@@ -229,7 +228,7 @@ fn call<V: Tested>(rule: &Rule, check: CheckCalls<V>, fmu: Result<UnderTest<V>>)
                     }
                 }
             }
-            // So that a crash or hang of the unloading is reported as such.
+            // Announced, so that a crash or a hang while the binary is unloaded is reported as such.
             fmu.announce("unloading the binary");
         }
     }
@@ -242,8 +241,7 @@ mod tests {
 
     use super::*;
 
-    /// Argument that marks the process of the rule. For the test harness it is the name of a test that does
-    /// not exist.
+    /// Argument that marks the process of the rule. The test harness reads it as the name of a test, which does not exist.
     const CHILD: &str = "process_of_the_rule";
 
     #[test]

@@ -12,8 +12,8 @@ use super::under_test::{FmuUnderTest, STEPS, Session, skip, start_value};
 use super::values::{contains_name, items};
 use host::description::{Type, Value};
 
-/// Largest amount by which a value may exceed min or max without a finding, relative to the bound
-/// or the nominal value. An integrator may leave a state slightly outside its range.
+/// Largest amount by which a value may exceed min or max without a finding, relative to min or max or to the nominal
+/// value. It is needed because an integrator may leave a state slightly outside its range.
 const OVERSHOOT: f64 = 1e-3;
 
 pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -92,7 +92,7 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 Type::Real => Value::Real(x),
                 _ => Value::Integer(x as i64),
             };
-            // An FMU that accepts every value breaks another rule; it has no exact range to compare.
+            // An FMU that accepts every value breaks another rule, and has no exact range that could be compared.
             if refusal(fmu, v, &at(far))?.is_ok() {
                 continue;
             }
@@ -133,7 +133,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     .add(format!("{item} is an item of its type, but refused: {why}"));
             }
         }
-        // Reported are types with further items; a type that accepts any number is reported by another rule.
+        // Types that accept further items are reported. Another rule reports a type that accepts any number.
         let beyond = last.saturating_add(1000);
         let takes_any = refusal(fmu, v, &Value::Integer(beyond))?.is_ok();
         if takes_any {
@@ -172,7 +172,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
     };
-    // Runs with other parameters, and with one parameter far from its start value.
+    // runs with other parameters, and runs with one parameter far from its start value
     for attempt in 0..STEPS as u64 {
         let mut session = random_session(fmu, fmu.first_interface()?, attempt)?;
         fmu.announce(format!("initialising with other parameters, try {attempt}"));

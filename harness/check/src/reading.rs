@@ -1,5 +1,4 @@
-//! Rules about dangerous content of modelDescription.xml, which a host parses before it knows anything about
-//! the FMU.
+//! Rules about dangerous content of modelDescription.xml. A host parses this file before it knows anything about the FMU.
 
 use host::xml::{Element, Fault};
 
@@ -42,7 +41,7 @@ impl Doctype {
         Some(Doctype { line, text: rest[..end.unwrap_or(rest.len())].to_string() })
     }
 
-    /// Describes what a DOCTYPE such as this one makes an XML parser do, as part of a sentence.
+    /// Describes, as the end of a sentence, what an XML parser does because of this DOCTYPE.
     pub fn danger(&self) -> &'static str {
         if self.text.contains("SYSTEM") || self.text.contains("PUBLIC") {
             "it makes a parser open another file or address"

@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::findings::{Finding, Findings, Severity};
 use crate::rule::Rule;
 
-/// Largest number of findings of one rule in the text report. The JUnit file has all that were stored.
+/// Largest number of findings of one rule in the text report. The JUnit file lists all findings that were stored.
 const SHOWN: usize = 8;
 
 pub struct Outcome {

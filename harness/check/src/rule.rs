@@ -38,8 +38,8 @@ pub enum Check {
     Archive(fn(&Archive, &mut Findings)),
     Description(fn(&Description, &mut Findings)),
     Binaries(fn(&Binaries, &mut Findings)),
-    /// Function that checks the loaded FMU, in a process of its own. If the function returns an
-    /// error, the call that failed is a finding.
+    /// Function that checks the loaded FMU in a separate process. If the function returns an error, the call that
+    /// failed is a finding.
     Calls(CheckCalls<Fmi2>),
     Calls3(CheckCalls<Fmi3>),
 }

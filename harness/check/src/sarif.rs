@@ -1,4 +1,4 @@
-//! Writes the report as SARIF 2.1.0, which code hosting services show next to the code.
+//! Writes the report as SARIF 2.1.0, whose findings code hosting services show next to the code.
 
 use std::io::Write;
 

@@ -37,13 +37,11 @@ pub type Attributes = &'static [(&'static str, Written)];
 
 pub enum Children {
     Any,
-    /// Each of these child elements at most once, in this order; those marked with `!` are
-    /// required.
+    /// Each of these child elements at most once, in this order. Elements marked with `!` are required.
     Sequence(&'static [&'static str]),
     Ordered(&'static [&'static str]),
     Many(&'static [&'static str]),
-    /// Exactly one of the first list of child elements, then any number of those in the second
-    /// list.
+    /// Exactly one of the elements in the first list, then any number of elements of the second list.
     Choice(&'static [&'static str], &'static [&'static str]),
 }
 
@@ -96,7 +94,7 @@ pub const EXPERIMENT: Attributes =
 #[rustfmt::skip]
 static KINDS: &[Kind] = &[
     kind("fmiModelDescription",
-        // A rule of its own checks the value of fmiVersion.
+        // Another rule checks the value of fmiVersion.
         &[("fmiVersion", Text), ("modelName", Text), ("guid", Text)],
         &[("description", Text), ("author", Text), ("version", Text), ("copyright", Text),
           ("license", Text), ("generationTool", Text), ("generationDateAndTime", Time),
@@ -262,8 +260,7 @@ pub fn structure(d: &Description, findings: &mut Findings) {
     elements(kinds(d), "", &d.root, findings);
 }
 
-/// Elements in which the schema of FMI 3.0 allows any attribute, of other namespaces and of
-/// vendors.
+/// Elements in which the schema of FMI 3.0 allows any attribute of other namespaces and of vendors.
 const ANY_ATTRIBUTE: [&str; 3] = ["ModelExchange", "CoSimulation", "ScheduledExecution"];
 
 fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {
@@ -346,7 +343,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                 if seen.contains(&&*child.name) {
                     findings.at(place(child)).add("the element occurs twice (allowed: once)");
                 } else if at < reached && child.name != "ModelExchange" {
-                    // The two interfaces may come in any order.
+                    // Elements of the two interfaces may come in any order.
                     findings.at(place(child)).add(format!(
                         "the element stands after {} (allowed order: {})",
                         names[reached].trim_start_matches('!'),
@@ -376,7 +373,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
             for child in &element.children {
                 match all.iter().position(|name| *name == child.name) {
                     None => unknown(child, &all, findings),
-                    // The type element comes first, whichever type it is.
+                    // The element of the type comes first, for every type.
                     Some(at) if at.max(choice.len().saturating_sub(1)) < reached => {
                         findings.at(place(child)).add(format!(
                             "the element stands too late (allowed order: {})",

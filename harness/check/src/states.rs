@@ -7,8 +7,8 @@ use super::under_test::{
     FmuUnderTest, Mark, Readings, STEPS, Session, Stage, Tested, UnderTest, Unusable, Use,
 };
 
-/// Returns the uses whose interface declares the capability `can`, for example "canSerialize", to which the
-/// version's word for a state is appended. Skips the rule if there are none.
+/// Returns the uses whose interface declares a capability. Its name is `can`, for example "canSerialize", followed by
+/// the word for a state in this version of FMI. Skips the rule if there are none.
 pub fn uses_with<V: Tested>(fmu: &UnderTest<V>, can: &str, findings: &mut Findings) -> Vec<Use> {
     let flag = format!("{can}{}", V::STATE);
     let mut all = fmu.uses();
@@ -110,7 +110,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let here = session.mark();
             (continue_from(&mut session, &here)?, here, bytes)
         };
-        // Restored into an instance that has been simulated and into one that was neither set up nor
+        // The state is restored into an instance that has been simulated, and into one that was neither set up nor
         // initialised.
         for lived in [true, false] {
             let mut other = match lived {
@@ -173,7 +173,7 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 findings.at(place).add("the call is accepted (allowed: fmi2Error)");
                 break;
             }
-            // After an error the FMU may refuse to be read.
+            // After an error the FMU may refuse calls that read values.
             if let Ok(after) = session.readings()
                 && let Some(text) = session.difference(&after, &before)
             {

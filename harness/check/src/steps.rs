@@ -11,7 +11,7 @@ use host::causality::Causality;
 use host::description::Value;
 use host::fmi2::{CallError, Status};
 
-/// Returns an instance for Co-Simulation after three ordinary steps. If they fail, other rules report it.
+/// Returns an instance for Co-Simulation after three ordinary steps. If these steps fail, other rules report it.
 fn after_three_steps(fmu: &FmuUnderTest) -> Result<Session<'_>> {
     let mut session = fmu.stepping()?;
     session.advance(3)?;
@@ -98,7 +98,7 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = after_three_steps(fmu)?;
     let (start, h) = (session.time, session.step);
     for n in 0..LONG {
-        // n·h and t + h differ by rounding; some hosts pass the first and some the second.
+        // n·h and t + h differ by rounding; some hosts pass the first value and some the second.
         let product = start + n as f64 * h;
         let wobbled = match n % 3 {
             0 => product,
@@ -122,7 +122,7 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
-        // If this fails, another rule reports it.
+        // Another rule reports a failure of this run.
         fmu.running(interface)?.advance(STEPS)?;
         for start in [fmu.experiment().start + 1000.0, fmu.experiment().start - 3.0] {
             let mut session = fmu.session(interface)?;
@@ -171,7 +171,7 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
     }
-    // If no tolerance works, the tolerance is not the reason, and another rule reports it.
+    // If no tolerance works, the reason is not the tolerance, and another rule reports it.
     for interface in fmu.interfaces() {
         let of_this = fails.iter().filter(|(i, ..)| *i == interface);
         if of_this.clone().count() < 3 {
@@ -184,15 +184,15 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Allowed difference of two runs over the tolerance of the FMU's solver, because the tolerance
-    /// is for one step and the errors of many steps add up.
+    /// Allowed difference of two runs, divided by the tolerance of the FMU's solver. It is above 1 because the
+    /// tolerance applies to one step, and the errors of many steps add up.
     const SLACK: f64 = 1e3;
     after_three_steps(fmu)?;
     fmu.require(Interface::CoSimulation, STEP_SIZES)?;
     let Some(tolerance) = fmu.experiment().tolerance else {
         return skip("no tolerance is suggested");
     };
-    // The same inputs, held constant during each long step.
+    // inputs that change at the same times in both runs, and are constant during each long step
     let run = |parts: usize| -> Result<(Vec<f64>, Vec<f64>)> {
         let mut session = fmu.running(Interface::CoSimulation)?;
         let mut scale = vec![0.0f64; fmu.outputs.len()];
@@ -234,8 +234,8 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Relative change of a value with the step size above which the value depends on the step size
-    /// and the change is not rounding.
+    /// Relative change of a value with the step size above which the value depends on the step size. A smaller
+    /// change counts as rounding.
     const SEEN: f64 = 1e-6;
     /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
@@ -250,7 +250,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         v.is_continuous() && (shows || is_state(v))
     };
     let watched: Vec<&Variable> = fmu.variables().iter().filter(is_watched).collect();
-    // Only the FMU's own motion is compared: delaying its inputs by a step may be its purpose.
+    // Inputs are constant, because delaying its inputs by a step may be the purpose of an FMU.
     let run = |step: f64, count: usize| -> Result<Vec<Vec<f64>>> {
         let mut session = fmu.running(Interface::CoSimulation)?;
         session.stimulate()?;
@@ -281,12 +281,12 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     };
     let points = long.len().min(short.len() / 2);
     for (i, v) in watched.iter().enumerate() {
-        // short[2k + 1] is at the time of long[k], and short[2k] half a long step earlier.
+        // short[2k + 1] is at the same time as long[k]; short[2k] is half a long step earlier.
         let off = |k: usize| (long[k][i] - short[2 * k + 1][i]).abs();
         let largest = |of: &dyn Fn(usize) -> f64| (SETTLED..points).map(of).fold(0.0, f64::max);
         let size = largest(&|k| long[k][i].abs()).max(1e-3 * v.nominal());
         let (apart, missed) = (largest(&off), largest(&|k| (long[k][i] - short[2 * k][i]).abs()));
-        // NaN is reported by another rule.
+        // Another rule reports NaN.
         let lags = points > 2 * SETTLED && apart > SEEN * size && missed <= SAME * apart;
         if let Some(k) = (SETTLED..points).find(|k| off(*k) == apart).filter(|_| lags) {
             let time = fmu.experiment().start + (k + 1) as f64 * step;
@@ -349,8 +349,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     let computed = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let computed: Vec<&Variable> = fmu.variables().iter().filter(computed).collect();
     let mut any = false;
-    // One input may be the derivative of another one, which then needs no slope. Therefore it is enough that
-    // one input has an effect.
+    // It is enough that one input has an effect, because one input may be the derivative of another input, which
+    // then needs no slope.
     let (mut acts, mut ignored) = (false, Vec::new());
     for &input in &fmu.inputs {
         let running = || -> Result<(Session, Value)> {
@@ -366,8 +366,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
             continue;
         };
         any = true;
-        // Result of a step with the input held at a value, or with a slope from that value. The input itself
-        // comes last.
+        // Returns the values after a step, with the input held at a value, or with a slope from this value. The last
+        // value is the input itself.
         let end = |value: f64, slope: Option<f64>| -> Result<Vec<f64>> {
             let (mut session, _) = running()?;
             fmu.announce(format!("a step with {} = {value:?}, its slope {slope:?}", input.name));
@@ -383,13 +383,13 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         let held = end(*here, None)?;
         let on_average = end(0.5 * (here + there), None)?;
         let on_slope = end(*here, Some((there - here) / step))?;
-        // The FMU changes the input itself; other variables may follow too little to be seen.
+        // The FMU changes the input itself, and other variables may change too little to be seen.
         if on_slope.last() != held.last() {
             acts = true;
             continue;
         }
-        // The variables that the input visibly changes within a step, and how much of this change the slope
-        // makes.
+        // Returns the variables that the input visibly changes within a step, with the fraction of the change
+        // that the slope causes.
         let followed = |n: usize| {
             let (whole, part) = (on_average[n] - held[n], on_slope[n] - held[n]);
             let size = held[n].abs().max(1e-3 * computed[n].nominal());
@@ -435,7 +435,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
     if !fmu.can(Interface::CoSimulation, STEP_SIZES) {
         return Ok(());
     }
-    // Differences over two short steps with held inputs. Where the two disagree, the output is not smooth.
+    // Differences over two short steps with held inputs. If the two disagree, the output is not smooth.
     let h = session.step * 1e-3;
     let mut points = Vec::new();
     for n in 0..3 {
@@ -451,7 +451,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
             ((points[1][n] - points[0][n]) / h, (points[2][n] - points[1][n]) / h);
         let at_start = 1.5 * first - 0.5 * second;
         let smooth = (first - second).abs() <= 0.1 * first.abs().max(second.abs());
-        // A hundredth of the value, plus the rounding of the values.
+        // one per cent of the value, plus the rounding of the values
         let rounding = 1e-9 * points[0][n].abs().max(1e-3 * v.nominal()) / h;
         let off = (declared[n] - at_start).abs();
         if declared[n].is_nan() || (smooth && off > 1e-2 * at_start.abs() + rounding) {
@@ -480,8 +480,8 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let experiment = fmu.experiment();
     let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let all: Vec<&Variable> = fmu.variables().iter().filter(continuous).collect();
-    // Values before and after `count` steps of `h` with the inputs held, or the FMU's message. `None` if the
-    // FMU ends the simulation.
+    // Values before and after `count` steps of `h` with held inputs, or the FMU's message. `None` if the FMU ends the
+    // simulation.
     type Ends = Option<Result<(Vec<f64>, Vec<f64>)>>;
     let run = |h: f64, count: usize| -> Result<Ends> {
         let mut session = fmu.running(Interface::CoSimulation)?;
@@ -505,7 +505,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         Ok(Some(Ok((before, read(&mut session)?))))
     };
     for h in SMALL {
-        // The same span of time in usual steps and in small steps.
+        // The same time span is simulated with usual steps and with small steps.
         let longest = (MOST * h).min(1.0);
         let steps = (longest / usual).floor().clamp(1.0, STEPS as f64);
         let time = (steps * usual).min(longest);
@@ -526,7 +526,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let moved = usually[n] - before[n];
             let size = before[n].abs().max(usually[n].abs()).max(1e-3 * v.nominal());
             let visible = 100.0 * experiment.tolerance.unwrap_or(1e-5).max(1e-9) * size;
-            // The accuracy of the two runs is the subject of steps.cut.
+            // The rule steps.cut compares the accuracy of the two runs.
             let stays = (small[n] - before[n]).abs() <= 0.05 * moved.abs();
             if moved.abs() > visible && stays {
                 findings.at(v.place()).add(format!(
@@ -583,14 +583,14 @@ pub fn terminated(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     report_early_end(&mut session, findings)
 }
 
-/// Simulates until the FMU requests the end of the simulation, and reports it if that is before the end of
-/// the default experiment.
+/// Simulates until the FMU requests the end of the simulation, and reports this if it is before the stop time
+/// of the default experiment.
 pub fn report_early_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
     let experiment = session.fmu.experiment();
     session.advance(2 * STEPS)?;
     let Some((time, call)) = session.ended else { return Ok(()) };
     let place = format!("{call} at t = {time:?} s");
-    // Without a suggested stop time the model may have reached its own end.
+    // If no stop time is suggested, the model may have reached its natural end.
     let suggested = match experiment.stop {
         Some(stop) if time < stop - 1e-9 * stop.abs() => format!("stopTime={stop}"),
         None => "no stopTime".into(),

@@ -13,9 +13,8 @@ fn place(d: &Description, u: &Unknown) -> String {
     format!("line {}, {}, {}", u.line, u.list, d.name_of(u.key))
 }
 
-/// Compares the entries of one `list` of ModelStructure with the variables that must be in it.
-/// Reports entries that are repeated or not `allowed`, and `needed` variables that are missing;
-/// `why` describes the allowed entries.
+/// Compares the entries of one `list` of ModelStructure with the variables that must be in it. Reports entries that are
+/// repeated or not `allowed`, and missing variables that are `needed`. `why` describes the allowed entries in messages.
 fn compare(
     d: &Description,
     findings: &mut Findings,
@@ -124,7 +123,7 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
             && v.kind != Type::Clock
             && (is_computed && (is_running || is_parameter) || is_parameter && d.is_fmi3())
     };
-    // Without listed derivatives nobody knows whether a local variable is a state.
+    // If derivatives are not listed, a local variable may or may not be a state.
     let may_hide = d.hides_states();
     let needed = |v: &Variable| is_unknown(v) && !(may_hide && v.causality == Causality::Local);
     let why = match d.is_fmi3() {

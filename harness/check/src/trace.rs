@@ -9,20 +9,20 @@ use super::findings::Findings;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Crash {
     Error,
-    /// The crash has the severity of the rule, because the standard leaves the call's effect open.
+    /// A crash has the severity of the rule, because the standard does not define the effect of the call.
     Open,
-    /// The crash is reported by the rule of this name, so that the present rule is skipped.
+    /// Another rule with this name reports the crash, so that the present rule is skipped.
     ReportedBy(String),
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) enum Answer {
-    /// The next call, and what a crash in it would mean.
+    /// The description of the next call, and the meaning of a crash in this call.
     Doing(String, Crash),
     Done(Findings),
 }
 
-/// Tells the parent process which call comes next and what a crash in it would mean.
+/// Tells the parent process the next call and the meaning of a crash in this call.
 pub fn doing(what: &str, crash: Crash) {
     // If sending fails, the report of a crash does not name the call.
     let _ = send(&Answer::Doing(what.into(), crash));

@@ -1,5 +1,5 @@
-//! Rules about tunable parameters (FMI 2.0.5, sections 2.2.7, 3.2.3 and 4.2.4). They may be set between
-//! steps; in Model Exchange in event mode.
+//! Rules about tunable parameters (FMI 2.0.5, sections 2.2.7, 3.2.3 and 4.2.4). Hosts may set tunable parameters
+//! between steps, and in Model Exchange in event mode.
 
 use anyhow::Result;
 
@@ -83,9 +83,9 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Simulates a short run in which one parameter is changed before initialisation (`before`), after it
-/// (`after`) or not at all, and returns all values at the end. Returns `None` if the FMU refuses the change,
-/// which another rule reports.
+/// Simulates a short run in which one parameter is changed before initialisation (`before`), after initialisation
+/// (`after`), or not at all, and returns all values at the end. Returns `None` if the FMU refuses the change, because
+/// another rule reports this.
 fn run(
     fmu: &FmuUnderTest,
     interface: Interface,
@@ -124,7 +124,7 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let change = Some((v, &value));
             let runs = (run(fmu, interface, change, None)?, run(fmu, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };
-            // The effect on all variables other than the parameter itself.
+            // the effect on all variables except for the parameter itself
             let differing = |run: &Readings| {
                 let mut all = fmu.variables().iter().zip(run.iter().zip(&plain));
                 all.find(|(o, (a, b))| {

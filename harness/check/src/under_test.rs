@@ -1,6 +1,6 @@
-//! The FMU under test for any version of FMI: its binaries, the calls that rules make, the meaning of a crash in
-//! them, and the instances that a host simulates. The trait [`Tested`] contains the differences between the
-//! versions; `under_test/fmi2.rs` and `v3/subject.rs` implement it.
+//! The FMU under test, for any version of FMI: its binaries, the calls that rules make, the meaning of a crash in these
+//! calls, and the instances that are simulated. The trait [`Tested`] contains the differences between the versions;
+//! `under_test/fmi2.rs` and `v3/subject.rs` implement it.
 
 mod fmi2;
 mod observed;
@@ -28,11 +28,11 @@ pub use self::observed::Observed;
 pub use host::c_abi::version::Interface;
 
 pub const STEPS: usize = 20;
-/// Time limit for a call whose effect the standard leaves open, because it may never return.
+/// Time limit for a call whose effect the standard does not define, because such a call may never return.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Error that makes a rule impossible to check. The rule named `rule` reports the reason, and all
-/// other rules that meet this error are skipped.
+/// Error that makes it impossible to check a rule. The rule named `rule` reports the reason; other rules that meet
+/// this error are skipped.
 #[derive(Debug, thiserror::Error)]
 #[error("{why}")]
 pub struct Unusable {
@@ -95,11 +95,10 @@ pub trait Tested: Version + 'static {
     const UNKNOWN_READ: &'static str;
     /// True if `load.opens` also reports binaries that are missing.
     const REPORTS_MISSING: bool;
-    /// Smallest number of steps of Model Exchange in the suggested experiment, after which a model may do
-    /// anything; 0 for any step.
+    /// Smallest number of steps in the experiment that the FMU suggests at which the rules use Model Exchange; 0 for
+    /// any number. After the suggested experiment a model may do anything.
     const EXCHANGE_STEPS: f64;
-    /// Smallest number of steps, in the suggested experiment, with the suggested step size for
-    /// which the check uses this step size.
+    /// Smallest number of steps in the suggested experiment at which the check uses the suggested step size.
     const SUGGESTED_STEPS: f64;
     type Notes;
 
@@ -125,18 +124,17 @@ pub trait Tested: Version + 'static {
     /// relative.
     fn magnitudes(session: &mut Session<Self>) -> Called<Vec<f64>>;
 
-    /// Accepts a step of the integrator and handles the events that follow. `crossed` says that an event
-    /// indicator has changed its sign.
+    /// Accepts a step of the integrator and handles the events that follow. `crossed` is true if an event indicator
+    /// has changed its sign.
     fn complete_step(session: &mut Session<Self>, crossed: bool) -> Result<()>;
 
-    /// Returns the values of the elements of input number `n` at a step: its start values plus a sine.
+    /// Returns the values of the elements of input number `n` at a step: the start values plus a sine.
     fn stimulus(v: &Variable, step: usize, n: usize) -> Vec<f64>;
 
-    /// Brings the instance away from its usual trajectory, so that a following reset has something to undo.
+    /// Brings the instance away from its usual trajectory, so that a reset has something to undo.
     fn leave_trajectory(session: &mut Session<Self>) -> Result<()>;
 
-    /// Provokes errors and returns the messages that the FMU logs, and how many of them have the category
-    /// NULL.
+    /// Provokes errors, and returns the messages that the FMU logs, with the number of messages whose category is NULL.
     fn provoke_messages(fmu: &UnderTest<Self>) -> Result<(Vec<Message>, usize)>;
 }
 
@@ -228,7 +226,7 @@ impl<V: Tested> UnderTest<V> {
             if all.is_empty() { "the FMU declares no interface".into() } else { all.join("; ") }
         };
         fmu.binaries.first().with_context(why)?;
-        // Where one of two binaries is missing, FMI 2.0 has a rule of its own.
+        // FMI 2.0 has another rule for an interface whose binary is missing.
         let file =
             |name: &str| format!("binaries/{}/{name}{}", V::PLATFORM, std::env::consts::DLL_SUFFIX);
         fmu.broken.retain(|(name, _)| V::REPORTS_MISSING || directory.join(file(name)).exists());
@@ -264,11 +262,11 @@ impl<V: Tested> UnderTest<V> {
         let above_0 = |x: &f64| *x > 0.0;
         let stop = number("stopTime").filter(|stop| *stop > start);
         let span = stop.map_or(f64::INFINITY, |stop| stop - start);
-        // A step that passes the end at once would show nothing about the FMU.
+        // If one step reached the end of the experiment, the check would learn nothing about the FMU.
         let step = number("stepSize").filter(above_0);
         let step = step.filter(|step| V::SUGGESTED_STEPS * step <= span).unwrap_or(span / 500.0);
         let step = if step.is_finite() { step } else { 0.01 };
-        // A multiple of the FMU's own step, of which there may be millions in a 500th of the experiment.
+        // The step is a multiple of the FMU's own step, because a 500th of the experiment may contain millions of its steps.
         let stepping = self.description.interface("CoSimulation");
         let own = stepping.and_then(|e| e.number("fixedInternalStepSize")).filter(above_0);
         let step = own.map_or(step, |own| (step / own).round().clamp(1.0, 100.0) * own);
@@ -282,15 +280,13 @@ impl<V: Tested> UnderTest<V> {
         *self.doing.borrow_mut() = what;
     }
 
-    /// Makes calls whose crash is reported by `rule`, which makes the same calls, and not by the present
-    /// rule.
+    /// Makes calls that `rule` also makes. If a call crashes, `rule` reports this, and not the present rule.
     pub fn with_crash_reported_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
         self.with_crash(Crash::ReportedBy(rule.into()), calls)
     }
 
-    /// Makes calls whose effect the standard leaves open. A crash has the severity of the rule. If the calls
-    /// take longer than [`PATIENCE`], the process writes the findings so far, adds that the calls do not
-    /// return, and exits.
+    /// Makes calls whose effect the standard does not define. A crash has the severity of the rule. If the calls take
+    /// longer than [`PATIENCE`], the process writes its findings, adds that the calls do not return, and exits.
     pub fn with_open_effect<T>(
         &self,
         what: impl Into<String>,
@@ -316,14 +312,14 @@ impl<V: Tested> UnderTest<V> {
             calls()
         });
         drop(returned);
-        // Some rules make thousands of such calls. Watchdogs that still end would use up the memory that
-        // the process may have for its threads.
+        // Some rules make thousands of such calls. Waiting threads that have not ended would exhaust the memory that
+        // the process may use for threads.
         let _ = watchdog.join();
         answer
     }
 
-    /// Records that the check itself has chosen the parameter values, for which the model may have
-    /// no solution. A crash or a call that does not return then ends the rule without a finding.
+    /// Records that the check itself has chosen the parameter values, for which the model may have no solution. A crash
+    /// or a call that does not return then ends the rule without a finding.
     pub fn chose_values(&self) {
         *self.crash.borrow_mut() = Crash::ReportedBy(String::new());
     }
@@ -332,7 +328,7 @@ impl<V: Tested> UnderTest<V> {
         let before = self.crash.replace(crash);
         let answer = calls();
         self.crash.replace(before);
-        // The next call no longer has the special treatment.
+        // From the next call on, a crash has its usual meaning again.
         self.announce(self.last_call());
         answer
     }
@@ -351,7 +347,7 @@ impl<V: Tested> UnderTest<V> {
         &self.binaries
     }
 
-    /// Lists the reasons why interfaces cannot be called although a binary exists.
+    /// Lists the reasons why interfaces cannot be called although they have a binary.
     pub fn broken(&self) -> impl Iterator<Item = &str> {
         self.broken.iter().map(|(_, why)| &why[..])
     }
@@ -364,8 +360,8 @@ impl<V: Tested> UnderTest<V> {
         self.binary(interface).is_ok()
     }
 
-    /// Creates an instance by `make`. The rule is abandoned (outer error) if the FMU allows only one instance in
-    /// a process and already has had it, or if the deadline has passed.
+    /// Creates an instance by `make`. The outer error ends the rule: the FMU allows only one instance in a process and
+    /// has already created it, or the deadline has passed.
     pub fn make<T, E>(
         &self,
         interface: Interface,
@@ -405,7 +401,7 @@ impl<V: Tested> UnderTest<V> {
         let instance =
             instance.map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
         let Experiment { start, stop, step, .. } = self.experiment();
-        // The suggested step size holds for Co-Simulation only.
+        // The suggested step size is meant only for Co-Simulation.
         let longest = match (using.interface, stop) {
             (Interface::ModelExchange, Some(stop)) => (stop - start) / V::EXCHANGE_STEPS,
             _ => f64::INFINITY,
@@ -472,15 +468,15 @@ pub struct Session<'f, V: Tested = Fmi2> {
     pub instance: Instance<'f, V>,
     pub time: f64,
     pub step: f64,
-    /// Number of steps so far, from which the changing inputs follow.
+    /// Number of steps that have been made, which determines the changing inputs.
     pub count: usize,
     pub next_event: Option<f64>,
     pub ended: Option<(f64, &'static str)>,
     pub notes: V::Notes,
 }
 
-/// The host's own quantities, such as the time, at the instant at which an FMU state was saved,
-/// because a saved FMU state does not contain them.
+/// Quantities of the host, such as the time, at the instant at which an FMU state was saved. A saved FMU state
+/// does not contain them.
 #[derive(Clone, Copy, Debug)]
 pub struct Mark {
     time: f64,
@@ -516,8 +512,7 @@ impl<V: Tested> Session<'_, V> {
         self.ended.get_or_insert((self.time, call));
     }
 
-    /// Returns true if the FMU has requested the end of the simulation, after which a host makes no more
-    /// steps.
+    /// Returns true if the FMU has requested the end of the simulation. A host then makes no further steps.
     pub fn is_ended(&self) -> bool {
         self.ended.is_some()
     }
@@ -535,7 +530,7 @@ impl<V: Tested> Session<'_, V> {
         self.instance.values(v.c_type, v.reference, v.length())
     }
 
-    /// Reads all elements of a variable in an ordinary run. If this fails, `values.readable` reports it.
+    /// Reads all elements of a variable in an ordinary run. `values.readable` reports a failure.
     pub fn read(&mut self, v: &Variable) -> Result<Vec<Value>> {
         self.elements(v).map_err(|error| {
             let why = format!("{} cannot be read: {error}", v.name);
@@ -553,7 +548,7 @@ impl<V: Tested> Session<'_, V> {
         read: fn(&mut Instance<V>, &mut [f64]) -> Called,
     ) -> Called<Vec<f64>> {
         let mut vector = vec![f64::NAN; length];
-        // Hosts do not ask for vectors that are empty.
+        // Hosts do not request vectors of length 0.
         if length > 0 {
             read(&mut self.instance, &mut vector)?;
         }
@@ -618,14 +613,14 @@ impl<V: Tested> Session<'_, V> {
         (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
-    /// Returns the host's own state to the start, which is where the FMU is after a reset.
+    /// Resets the time and other quantities of the host to the start, where the FMU is after a reset.
     pub fn rewind(&mut self) {
         let time = self.fmu.experiment().start;
         self.go_back(&Mark { time, count: 0, next_event: None, ended: None });
     }
 }
 
-/// Returns the start value of each element, or `None` if the description has none or it is not valid.
+/// Returns the start value of each element, or `None` if the description has no valid start value.
 pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
     let value = |text: &String| {
         Some(match v.kind {
@@ -653,7 +648,7 @@ pub fn start_value(v: &Variable) -> Option<Value> {
 
 pub fn surroundings() -> Vec<(&'static str, String)> {
     let state = HostState::now();
-    // Wine also has /proc, but it describes Wine's own process.
+    // Wine has /proc, too, but it describes Wine's own process.
     let count = |folder: &str| match cfg!(target_os = "linux") {
         true => {
             std::fs::read_dir(folder).map_or(String::new(), |entries| entries.count().to_string())
@@ -668,7 +663,7 @@ pub fn surroundings() -> Vec<(&'static str, String)> {
         ("signal handlers", format!("{:#x}", state.signal_handlers)),
         ("working directory", format!("{:?}", std::env::current_dir().ok())),
         ("environment variables", format!("{environment:?}")),
-        // Left out on systems that do not report it.
+        // omitted on systems that do not report it
         ("number of threads", count("/proc/self/task")),
         ("number of open files", count("/proc/self/fd")),
     ]

@@ -13,8 +13,7 @@ use super::findings::Findings;
 use host::description::BaseUnit;
 use host::xml::Element;
 
-/// Position of the radian among [`BaseUnit::NAMES`]. It has dimension 1, and authors may write it or leave it
-/// out.
+/// Position of the radian among [`BaseUnit::NAMES`]. The radian has dimension 1, so that authors may write it or omit it.
 const RADIAN: usize = 7;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +26,8 @@ struct Unit {
 impl Unit {
     const ONE: Unit = Unit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
 
-    /// Multiplies this unit by `other` to the power `power`. The offset is dropped, because it has a meaning
-    /// only for a unit by itself.
+    /// Multiplies this unit by `other` to the power `power`. The offset is dropped, because only a unit that is not
+    /// part of a product can have one.
     fn times(self, other: Unit, power: i32) -> Unit {
         let mut exponents = self.exponents;
         for (e, o) in exponents.iter_mut().zip(other.exponents) {
@@ -65,8 +64,8 @@ impl Unit {
     }
 }
 
-/// A unit symbol: its text, whether it may have a prefix, the exponents of kg, m, s, A, K, mol, cd and rad,
-/// factor and offset. A symbol that stands for several units has several entries.
+/// A unit symbol: its text, true if it may have a prefix, the exponents of kg, m, s, A, K, mol, cd and rad, the factor
+/// and the offset. A symbol that can mean several units has several entries.
 type Symbol = (&'static str, bool, [i32; 8], f64, f64);
 
 #[rustfmt::skip]
@@ -137,7 +136,7 @@ const PREFIXES: [(&str, f64); 12] = [
     ("p", 1e-12),
 ];
 
-/// Lists the units for which a symbol can stand, with and without a prefix.
+/// Lists the units that a symbol can mean, with and without a prefix.
 fn symbol(text: &str) -> Vec<Unit> {
     let unit = |(_, _, exponents, factor, offset): &Symbol, prefix: f64| Unit {
         exponents: *exponents,
@@ -156,8 +155,7 @@ fn symbol(text: &str) -> Vec<Unit> {
     all
 }
 
-/// Lists the units for which the name of a unit can stand; the list is empty if the name cannot be
-/// parsed.
+/// Lists the units that the name of a unit can mean; empty if the name cannot be parsed.
 fn read(name: &str) -> Vec<Unit> {
     let mut rest = name.trim();
     match quotient(&mut rest) {
@@ -172,7 +170,7 @@ fn quotient(rest: &mut &str) -> Option<Vec<Unit>> {
     let Some(after) = rest.strip_prefix('/') else { return Some(above) };
     *rest = after;
     let below = factor(rest)?;
-    // a/b.c and a/b/c are ambiguous for people.
+    // a/b.c and a/b/c are ambiguous for readers.
     if rest.starts_with(['.', '*', '/']) {
         return None;
     }
@@ -261,7 +259,7 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
         let fits = |m: &&Unit| {
             written.measures_like(m)
                 && written.has_radians_of(m)
-                // Authors write % with and without its factor of 0.01.
+                // Some authors give % the factor 0.01, others do not.
                 && (m.exponents == [0; 8]
                     || is_equal(written.factor, m.factor)
                         && (written.offset - m.offset).abs() <= 1e-3 * m.offset.abs())
@@ -281,7 +279,7 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
 pub fn display_units(d: &Description, findings: &mut Findings) {
     for unit in d.root.list("UnitDefinitions") {
         let Some(name) = unit.get("name") else { continue };
-        // Without BaseUnit the name says which unit is converted.
+        // Without BaseUnit the name determines the unit that is converted.
         let from = match declared(unit) {
             Some(written) => vec![written],
             None => read(name),
@@ -297,8 +295,8 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
                 continue;
             }
             let place = format!("line {}, DisplayUnit \"{shown_name}\" of \"{name}\"", shown.line);
-            // shown = factor · value + offset. Here from.factor · value + from.offset and to.factor · shown
-            // + to.offset are the same number in base units.
+            // shown = factor · value + offset. from.factor · value + from.offset and to.factor · shown + to.offset are
+            // the same number in base units.
             let expected: Vec<(f64, f64)> = from
                 .iter()
                 .flat_map(|f| to.iter().map(move |t| (f, t)))

@@ -16,7 +16,7 @@ fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Value)> {
 }
 
 fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
-    // If initialisation fails, another rule reports it.
+    // Another rule reports a failing initialisation.
     fmu.running(fmu.first_interface()?)?;
     let mut session = fmu.session(fmu.first_interface()?)?;
     session.instance.setup_experiment(None, session.time, None)?;
@@ -24,8 +24,8 @@ fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     Ok(session)
 }
 
-/// Returns true if a value equals the value in modelDescription.xml within half a unit of the 15th digit plus
-/// rounding, because a double keeps 15 decimal digits.
+/// Returns true if a value equals the value in modelDescription.xml to within half a unit of the 15th digit plus
+/// rounding. A double represents 15 decimal digits.
 fn has_digits_of(value: &Value, written: &Value) -> bool {
     const HALF_A_UNIT: f64 = 5e-15;
     match (value, written) {
@@ -128,7 +128,7 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut fresh = fmu.session(fmu.first_interface()?)?;
     for (v, start) in settable(fmu) {
         fmu.announce(format!("setting {} to {start}", v.name));
-        // As in hosts that set every start value before fmi2SetupExperiment.
+        // This order is that of hosts which set every start value before fmi2SetupExperiment.
         if let Err(error) = fresh.set(v, &start) {
             findings
                 .at(v.place())
@@ -224,8 +224,8 @@ pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 type Call = (&'static str, fn(&mut Instance, u32) -> Called);
 
-/// Adds a finding unless the FMU refuses the call `what`. Each such call is made with an instance
-/// of its own, because after an error some FMUs refuse every call.
+/// Adds a finding unless the FMU refuses the call `what`. Each such call is made with a new instance, because after an
+/// error some FMUs refuse every call.
 fn refused(
     fmu: &FmuUnderTest,
     findings: &mut Findings,
@@ -298,7 +298,7 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     for (place, is_taken) in accepted {
         match refused {
-            // The binary accepts it, so that this parameter is tunable there.
+            // The binary accepts the new value, so that this parameter is in fact tunable.
             Some(other) if is_taken => findings.at(place).fail(format!(
                 "the call is accepted as for tunable parameters, while {other} is refused (allowed: \
                      fmi2Error, or variability=\"tunable\")"
@@ -363,8 +363,8 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
                 Ok(session.initialise().err().map(|error| error.to_string()))
             };
-            // A refusal because of a contradiction with another parameter is allowed; the message then names
-            // that parameter too.
+            // The FMU may refuse the value because it contradicts another parameter; the message then names this
+            // parameter, too.
             if let Some(why) = try_at(bound)?
                 && !settable(fmu).any(|(o, _)| o.name != v.name && contains_name(&why, &o.name))
             {
@@ -397,7 +397,7 @@ pub fn contains_name(text: &str, name: &str) -> bool {
 }
 
 pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    // Inputs have a rule of their own.
+    // Another rule is about inputs.
     let reals =
         settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != Causality::Input);
     for (v, _) in reals {

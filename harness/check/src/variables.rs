@@ -45,7 +45,7 @@ fn is_structured(name: &str) -> bool {
             _ => is_structured(inner),
         };
     }
-    // An identifier, then indices, then a point and the next identifier.
+    // an identifier, its indices, a point, and the next identifier
     let mut rest = name;
     loop {
         let end = match rest.strip_prefix('\'') {
@@ -87,11 +87,11 @@ pub fn parameter_names(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// `xml.flat_ports`: a point in a name makes the variable a member of a structure, and importers that support
-/// structures make one port of all members.
+/// `xml.flat_ports`: a point in a name makes the variable a member of a structure. Importers that support structures
+/// make one port of all members.
 ///
-/// A name with an index is an element of an array (2.2.9), which importers show as a vector or as single
-/// elements. Both can be wired if no element is missing.
+/// A name with an index is an element of an array (2.2.9). Importers show the array as a vector or as separate
+/// elements; a user can connect both if no element is missing.
 pub fn flat_ports(d: &Description, findings: &mut Findings) {
     let is_structured = d.root.get("variableNamingConvention") == Some("structured");
     let is_port = |v: &&Variable| matches!(v.causality, Causality::Input | Causality::Output);
@@ -175,7 +175,7 @@ pub fn variability(d: &Description, findings: &mut Findings) {
 pub fn initial(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let written = v.written.get("initial")?;
-        // A forbidden combination of causality and variability is reported by another rule.
+        // Another rule reports a combination of causality and variability that is not allowed.
         let allowed = (d.words.initials)(&v.causality, &v.variability)?;
         let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
         (!allowed.contains(&written)).then(|| {

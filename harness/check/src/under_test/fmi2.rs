@@ -17,12 +17,12 @@ pub type FmuUnderTest = UnderTest<Fmi2>;
 
 /// Number of calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Largest number of immediately successive events. An FMU that always requests the next event at once breaks
-/// a rule.
+/// Largest number of events that may immediately follow each other. An FMU that always requests the next event at
+/// once breaks a rule.
 const IMMEDIATE: usize = 3;
-/// Number of events that are examined of those that only fmi2CompletedIntegratorStep requests.
+/// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
 const ASKED: usize = 20;
-/// Relative change of a state at an event below which the change is rounding.
+/// Relative change of a state at an event below which the change counts as rounding.
 const JUMP: f64 = 1e-9;
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
@@ -32,7 +32,7 @@ pub struct Notes {
     /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
     pub past_event: Option<(f64, f64)>,
     immediate_events: usize,
-    /// Result of the last event iteration: whether states, and whether their nominals, have changed.
+    /// Results of the last event iteration: whether states, and whether their nominals, have changed.
     values_changed: bool,
     pub nominals_changed: bool,
     /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
@@ -125,7 +125,7 @@ impl Tested for Fmi2 {
             None => start.abs().max(0.1),
         };
         let moved = start + 0.3 * scale * (0.7 * step as f64 + 1.0 + n as f64).sin();
-        // Checked first, because clamp panics if min is above max.
+        // min and max are compared first, because clamp panics if min is above max.
         vec![moved.max(min).min(max.max(min))]
     }
 
@@ -136,7 +136,7 @@ impl Tested for Fmi2 {
             let (min, max) = v.bounds();
             let moved = start * 1.01;
             if moved >= min && moved <= max {
-                // A value that the FMU refuses keeps its old value.
+                // If the FMU refuses the value, the variable keeps its old value.
                 let _ = session.set(v, &Value::Real(moved));
             }
         }
@@ -221,7 +221,7 @@ impl FmuUnderTest {
         d.unknowns(d.words.derivatives).filter_map(pair).collect()
     }
 
-    /// Instantiates the FMU with the arguments `with`; the outer error as for `make`.
+    /// Instantiates the FMU with the arguments `with`. The outer error is that of `make`.
     pub fn instantiate(
         &self,
         interface: Interface,
@@ -274,7 +274,7 @@ impl Session<'_> {
         self.leave_initialisation()
     }
 
-    /// Calls fmi2ExitInitializationMode, and in Model Exchange goes on to continuous-time mode.
+    /// Calls fmi2ExitInitializationMode and, in Model Exchange, continues to continuous-time mode.
     pub fn leave_initialisation(&mut self) -> Result<()> {
         self.fmu.announce("fmi2ExitInitializationMode");
         self.instance.exit_initialization_mode()?;
@@ -414,8 +414,8 @@ pub fn copy_files(from: &Path, to: &Path) -> Result<()> {
     for entry in std::fs::read_dir(from)? {
         let (path, name) = entry.map(|e| (e.path(), e.file_name()))?;
         let copy = to.join(&name);
-        // A library must be copied, because otherwise the loader takes it for the one that is already
-        // loaded. For all other files a hard link is enough.
+        // A library must be copied, because the loader would take a link for the library that is already loaded. For
+        // all other files a hard link is enough.
         let is_library = path.extension().is_some_and(|e| e == std::env::consts::DLL_EXTENSION);
         if path.is_dir() {
             copy_files(&path, &copy)?;

@@ -7,10 +7,9 @@ use host::description::Value;
 use super::{Session, UnderTest};
 use crate::description::Variable;
 
-/// Relative change of a value at an event below which the change is rounding.
+/// Relative change of a value at an event below which the change counts as rounding.
 const ROUNDING: f64 = 1e-9;
-/// Relative change of a derivative at an event below which the change may come from an iterative
-/// solver.
+/// Relative change of a derivative at an event below which it may come from an iterative solver.
 const ITERATED: f64 = 1e-2;
 
 pub struct Observed {

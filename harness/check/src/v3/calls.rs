@@ -39,7 +39,7 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
             findings.at(subject.last_call()).add(error.to_string());
             continue;
         }
-        // With required intermediate variables, but no callback that receives them.
+        // intermediate variables are requested, but no callback receives them
         let mut session = subject.session(using)?;
         session.initialise()?;
         session.advance(2)?;
@@ -98,11 +98,11 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for v in subject.readable().filter(wanted) {
         let Some(mut values) = start_values(v) else { continue };
         let (min, max) = v.bounds();
-        // Each element has its own value, so that exchanged elements show.
+        // Each element gets a different value, so that exchanged elements are noticed.
         for (i, value) in values.iter_mut().enumerate() {
             match value {
                 Value::Real(x) => {
-                    // A Float32 represents it exactly.
+                    // Float32 represents this value exactly.
                     let size = if *x == 0.0 { v.nominal() } else { x.abs() };
                     let moved = f64::from((*x + size * (i + 1) as f64 / 64.0) as f32);
                     if moved > min && moved < max {
@@ -123,13 +123,13 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let mut session = subject.session(using)?;
         subject.announce(format!("setting {}", v.name));
         if let Err(error) = session.instance.set_values(v.c_type, v.reference, &values) {
-            // A model may refuse a value for its own reasons, but must say why.
+            // A model may refuse a value for reasons of its own, but it must log the reason.
             if error.messages.is_empty() {
                 findings.at(v.place()).add(format!("{error} (allowed: a message)"));
             }
             continue;
         }
-        // With such a value the model may have no solution.
+        // The model may have no solution with such a value.
         if subject.with_crash_reported_by("", || session.enter_initialization()).is_err() {
             continue;
         }
@@ -191,7 +191,7 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let all = subject.readable().filter(|v| v.c_type == CType::Float64);
     for v in all {
         let n = v.length();
-        // nValues is n and then n - 1; the array is longer in both cases.
+        // nValues is n and then n - 1. The array of the host is longer in both cases.
         for told in [n, n.saturating_sub(1)] {
             let place = format!("fmi3GetFloat64 of {} with nValues = {told}", v.name);
             let mut values = vec![CANARY; n + 8];

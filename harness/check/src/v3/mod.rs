@@ -1,5 +1,4 @@
-//! The rules for FMI 3.0 (text of version 3.0.2). Rules about the archive and about XML are shared with FMI
-//! 2.0.
+//! The rules for FMI 3.0 (text of version 3.0.2). FMI 2.0 and 3.0 share rules about the archive and about XML.
 
 pub mod archive;
 pub mod calls;

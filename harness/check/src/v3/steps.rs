@@ -11,8 +11,7 @@ use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
 
-/// Lists the faults in the results that the FMU returns from one fmi3DoStep, from the time `from`
-/// by `h` seconds.
+/// Lists the faults in the results that the FMU returns from one fmi3DoStep of `h` seconds that starts at the time `from`.
 fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     let mut faults = Vec::new();
     for (name, byte) in [
@@ -26,7 +25,7 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
             other => faults.push(format!("{name} is {other} (allowed: 0, 1)")),
         }
     }
-    // Section 4.2.1 allows an FMU to end slightly off the communication point, if its own steps do not fit.
+    // Section 4.2.1 allows an FMU to end slightly off the communication point, if its own steps do not fit into the step.
     let slack = 1e-2 * h;
     let end = from + h;
     if step.last_time.is_nan() {
@@ -177,7 +176,7 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
             if session.is_ended() || !findings.list.is_empty() {
                 break;
             }
-            // Continue to the next event.
+            // Simulates until the next event.
             let events = session.notes.events;
             while session.notes.events == events && !session.is_ended() && steps < LONG {
                 steps += 1;
@@ -277,8 +276,8 @@ fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>
     Ok(outputs)
 }
 
-/// Relative difference of an output that is allowed between two ways to use the FMU (for example with and without event
-/// mode), because the FMU's solver may be restarted at other times.
+/// Relative difference of an output that is allowed between two ways to use the FMU, for example with and without event
+/// mode. The FMU's solver may restart at other times in these runs.
 const SAME: f64 = 1e-3;
 
 pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()> {
@@ -345,7 +344,7 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
         session.count = k;
         session.stimulate()?;
         let (from, h) = (session.time, session.step);
-        // As in `faults`: the FMU's own steps may not fit.
+        // The FMU's own steps may not fit into the step, as in `faults`.
         let slack = 1e-2 * h;
         let mut wrong: Option<String> = None;
         session.raw_step_with_updates(
@@ -423,9 +422,9 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
 
 /// `intermediate.inputs`: checks that inputs which are set in the intermediate update act within the step.
 ///
-/// With an input that changes linearly with time, the outputs must come nearer to the outputs with steps 64 times as short
-/// than with a held input. The short steps also use intermediate update, because an FMU may use the input's rate (a wheel's
-/// torque is minus the rate of its momentum), and held inputs have no rate for any step size.
+/// With an input that changes linearly in time, the outputs must be closer to the outputs of steps 64 times as short
+/// than the outputs with a held input are. The short steps also use intermediate update, because an FMU may use the
+/// input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have no rate for any step size.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     require_updates(subject)?;
     let inputs: Vec<Variable> = subject
@@ -479,7 +478,8 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
         };
         let (fine, held, along) = (run(FINE, true)?, run(1, false)?, run(1, true)?);
         for (((name, right), (_, held)), (_, along)) in fine.iter().zip(&held).zip(&along) {
-            // Direct feedthrough shows the value that was set last, whatever the FMU does with it.
+            // An output with direct feedthrough shows the last value of the input, even if the FMU ignores intermediate
+            // values.
             let effect = (held - right).abs();
             if effect > 1e-9 * right.abs().max(1e-9) && (along - right).abs() > 0.6 * effect {
                 findings.at(v.place()).add(format!(
@@ -536,7 +536,7 @@ fn displaced(
 }
 
 fn require_derivatives(subject: &Subject, flag: &str) -> Result<Use> {
-    // In Model Exchange derivatives follow immediately from states and inputs.
+    // In Model Exchange, derivatives follow immediately from states and inputs, so that differences can be compared.
     if !subject.has(Interface::ModelExchange) {
         return skip(
             "the FMU offers no Model Exchange, where derivatives can be compared with differences",
@@ -557,8 +557,8 @@ impl Difference {
         Difference { quotient: (above - below) / (2.0 * h), rounding }
     }
 
-    /// Returns true if `derivative`, which the FMU computes, agrees with the finite difference
-    /// within rounding, curvature and the error `unsure`.
+    /// Returns true if `derivative`, which the FMU computes, agrees with the finite difference to within rounding,
+    /// curvature and the error `unsure`.
     fn is_near(&self, derivative: f64, unsure: f64) -> bool {
         let size = self.quotient.abs().max(derivative.abs());
         (derivative - self.quotient).abs() <= 1e-4 * size + self.rounding + unsure + 1e-9
@@ -594,9 +594,8 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 let mut last = differences(h)?;
                 let mut wrong: Vec<usize> =
                     (0..own.len()).filter(|i| !last[*i].is_near(own[*i], 0.0)).collect();
-                // Where terms cancel, rounding is larger than the value suggests. The difference between two
-                // step sizes shows how large. A derivative is wrong only if it disagrees for every step
-                // size.
+                // If terms cancel, the rounding error is larger than the value suggests; the difference between two
+                // step sizes shows its size. A derivative is wrong only if it disagrees for every step size.
                 for h in [10.0, 100.0, 1000.0].map(|times| times * h) {
                     let (min, max) = known.bounds();
                     if wrong.is_empty() || base[element] - h < min || base[element] + h > max {
@@ -669,9 +668,9 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if the value `after` a change of a known differs from the value `before` it by more
-/// than rounding. Terms that cancel in exact arithmetic may leave a few units in the last place;
-/// the known itself is changed by at least a hundredth of its magnitude.
+/// Returns true if the value `after` a change of a known differs from the value `before` by more than rounding. Terms
+/// that cancel in exact arithmetic may leave a few units in the last place. The known is changed by at least a
+/// hundredth of its magnitude.
 fn follows(after: f64, before: f64) -> bool {
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let same = after.to_bits() == before.to_bits()

@@ -15,8 +15,8 @@ pub type Session<'f> = Of<'f, Fmi3>;
 
 /// Number of calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Number of events in one communication step after which the simulation is given up, because the
-/// FMU may request events for ever.
+/// Number of events in one communication step after which the simulation is given up. The FMU may otherwise
+/// request events for ever.
 const EVENTS: usize = 1000;
 
 /// Callback for intermediate updates within a step. It returns the time of an early return, or `None`.
@@ -51,8 +51,8 @@ impl Tested for Fmi3 {
     const SUGGESTED_STEPS: f64 = STEPS as f64;
     type Notes = Notes;
 
-    /// Returns true unless the interface is Co-Simulation and the FMU has clocks. Clocks need event
-    /// mode with clock activation, which the rules do not call.
+    /// Returns true unless the interface is Co-Simulation and the FMU has clocks. Clocks need event mode with clock
+    /// activation, and no rule makes these calls.
     fn is_called(description: &Description, interface: Interface, _: &Fmu) -> bool {
         interface == Interface::ModelExchange || !description.has_clocks()
     }
@@ -152,8 +152,8 @@ impl Subject {
         Ok(with)
     }
 
-    /// Instantiates the FMU with the arguments `with`. The inner error is the FMU's refusal; the
-    /// outer error says that the rule cannot create an instance at all.
+    /// Instantiates the FMU with the arguments `with`. The inner error is the refusal by the FMU; the outer error ends
+    /// the rule, because it cannot create an instance at all.
     pub fn instantiate(&self, with: &Instantiation) -> Result<Result<Instance<'_>, CallError>> {
         let binary = self.binary(with.interface)?;
         self.make(with.interface, || binary.instantiate_with(with))
@@ -243,7 +243,7 @@ impl Session<'_> {
         if step.terminate == 1 {
             self.end("fmi3DoStep");
         }
-        // An FMU that returns early reports the time it has reached; otherwise this is the end of the step.
+        // If the FMU returns early, it reports the time that it has reached; otherwise the time is the end of the step.
         self.time = match step.early_return == 1 && step.last_time.is_finite() {
             true => step.last_time,
             false => self.time + h,
@@ -251,8 +251,8 @@ impl Session<'_> {
         Ok(step)
     }
 
-    /// Advances to the time `until` (s), with event mode whenever the FMU requests it. In Model Exchange the run
-    /// ends earlier if the states change fast.
+    /// Advances to the time `until` (s), and enters event mode when the FMU requests it. In Model Exchange the run ends
+    /// earlier if the states change fast.
     pub fn advance_to(&mut self, until: f64) -> Result<()> {
         if self.using.interface == Interface::ModelExchange {
             self.fmu.announce(format!("integrating from {:?} s", self.time));

@@ -28,8 +28,8 @@ fn archives_that_break_hosts_are_reported() {
         files.push((name.into(), b"x".to_vec()));
         zipped(&files, DEFLATED)
     };
-    // The bits of the archive's own structures, in all headers of the first file: local header at
-    // 0, its twin in the central directory.
+    // the bits of the archive's structures in both headers of the first file: the local header at 0, and its copy
+    // in the central directory
     let central = whole.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
     let patched = |local: usize, value: u8| {
         let mut bytes = whole.clone();
@@ -38,12 +38,12 @@ fn archives_that_break_hosts_are_reported() {
         bytes
     };
     let wrong_checksum = patched(14, whole[14] ^ 1);
-    // the size once unpacked, in both headers
+    // a wrong uncompressed size in both headers
     let wrong_size = patched(22, whole[22] ^ 1);
     let encrypted = patched(6, whole[6] | 1);
     let bzip2 = patched(8, 12);
     let twice = {
-        // a name of the same length, then changed to one that is there
+        // a name of the same length, which is then changed to the name of another entry
         let mut bytes = plus("documentation/indey.html");
         let at: Vec<usize> = (0..bytes.len() - 20)
             .filter(|at| bytes[*at..].starts_with(b"documentation/indey.html"))
@@ -182,7 +182,7 @@ fn a_file_that_is_not_an_fmu_breaks_a_rule_whatever_rules_are_selected() {
 fn a_report_without_a_checked_rule_is_an_error_in_sarif_and_junit() {
     for (content, only) in [
         (&b"not a zip archive"[..], "xml"),
-        // a rule of FMI 3.0 alone
+        // a rule that exists only for FMI 3.0
         (&zipped(ours(), CompressionMethod::Stored), "events"),
     ] {
         let report = look(content, &[only]);

@@ -1,4 +1,4 @@
-//! Rules of calls: a library around ours that misbehaves (shim.c), and descriptions that do not fit the binary.
+//! Rules of calls: a library around our binary that misbehaves (shim.c), and descriptions that do not match the binary.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::common::{
     zipped,
 };
 
-/// Returns our FMU with one misbehaviour, which the shim around its binary adds; `word` names it in shim.c.
+/// Returns our FMU with one misbehaviour of the shim around its binary; `word` names the misbehaviour in shim.c.
 fn misbehaving(word: &str) -> Vec<u8> {
     let name = binary();
     let folder = format!("binaries/{PLATFORM}");
@@ -28,8 +28,8 @@ fn misbehaving(word: &str) -> Vec<u8> {
     zipped(&files, CompressionMethod::Stored)
 }
 
-/// The test's library passes the address of its own variable to the logger. A host that followed this pointer would jump
-/// into the variable.
+/// The library passes the address of one of its own variables to the logger. A host that used this pointer would follow
+/// it into the variable.
 #[test]
 fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -46,7 +46,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
         Ok(instance.do_step(0.0, 1.0)?)
     };
     begin("0.1").unwrap();
-    // the message still belongs to the instance whose call it explains
+    // The host still assigns the message to the instance whose call it explains.
     let refused = begin("-1").unwrap_err();
     assert!(format!("{refused:#}").contains("friction.b = -1"), "{refused:#}");
 }
@@ -137,13 +137,13 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("other_order", "exchange.variables"),
 ];
 
-/// A library around the binary of HubSlosh makes one fault at a time, for example a wrong status.
+/// The library around the binary of HubSlosh makes one fault at a time, for example a wrong status.
 #[cfg(target_os = "linux")]
 #[test]
 fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
     let rules: BTreeSet<&str> = MISBEHAVIOURS.iter().map(|(_, rule)| *rule).collect();
     let rules: Vec<&str> = rules.into_iter().collect();
-    // without a misbehaviour the library around ours is as good as ours
+    // Without a misbehaviour the library breaks no rule.
     keep("none", &misbehaving("none"), &[]);
     let report = look(&misbehaving("none"), &rules);
     assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
@@ -172,16 +172,16 @@ fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_
         ("true_is_two", "values.booleans", Severity::Error),
         ("prints", "host.silent", Severity::Error),
         ("free_null_crashes", "instantiate.free_null", Severity::Error),
-        // a crash, and a call without end, with arguments of which the standard says nothing
+        // a crash, and a call that never returns, with arguments whose effect the standard does not define
         ("null_crashes", "instantiate.null", Severity::Warning),
         ("hangs_at_nan", "steps.size", Severity::Warning),
     ] {
         let (found, text) = severities(word, rule);
-        // a Boolean that reads as 2 keeps a 2 as well, which is a warning
+        // A Boolean that is read as 2 also keeps a 2, which is a warning.
         let worst = found.iter().min();
         assert_eq!(worst, Some(&meant), "{word}: {text}");
     }
-    // start values that differ from the file's in the last bit alone
+    // start values that differ from those of the file only in the last bit
     let (found, text) = severities("last_bit_of_start", "values.start");
     assert!(found.is_empty(), "{text}");
     // a tunable parameter that is declared as fixed
@@ -191,7 +191,7 @@ fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_
     let [(_, finding)] = &all[..] else { panic!("{}", report.text()) };
     assert_eq!(finding.severity, Severity::Error);
     assert!(finding.place.contains("friction.b"), "{}", report.text());
-    // where all are taken, it is the binary that is lax
+    // If the binary accepts all of them, the binary is too lax, and none is in fact tunable.
     let (found, text) = severities("sets_anything", "values.fixed");
     assert!(!found.is_empty() && found.iter().all(|s| *s == Severity::Warning), "{text}");
 }
@@ -202,7 +202,7 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("Mutant.fmu");
     std::fs::write(&path, misbehaving("hangs_at_zero")).unwrap();
-    // Enough for the calls before it on a busy machine.
+    // long enough for the preceding calls on a busy machine
     let report = check_rules(&path, &["steps.size", "load.version"], 5.0);
     let all: Vec<_> = report.all().collect();
     let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
@@ -211,8 +211,8 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     assert!(finding.text.contains("have not ended after 4 s"), "{}", finding.text);
 }
 
-/// Changes of modelDescription.xml: name | the text after which | the text that | is replaced by | the rule
-/// that must find it.
+/// Changes of modelDescription.xml: name | the text after which | the text that | is replaced by | the rule that
+/// must find the change.
 const WORDS: &str = r#"
 another start | name="hub.I" | start="0.322414" | start="0.322415" | values.start
 a min that is refused | name="hub.I" | min="1e-6" | min="-1" | values.limits
@@ -226,10 +226,11 @@ derivatives of outputs to an order that is not there | <CoSimulation | maxOutput
 another GUID | <fmiModelDescription | guid="{ | guid="{x | load.instance
 "#;
 
-/// The model description of HubSlosh is changed, for example by exchanging two value references, and the binary is not.
+/// The model description of HubSlosh is changed, for example by an exchange of two value references; the binary is not
+/// changed.
 #[test]
 fn descriptions_that_do_not_fit_the_binary_are_reported() {
-    // theta and omega
+    // the value references of theta and omega
     let references = {
         let text = xml();
         let text = text
@@ -287,7 +288,7 @@ fn descriptions_that_do_not_fit_the_binary_are_reported() {
             zipped(&with(&binary(), b"text".to_vec()), CompressionMethod::Stored),
             "load.opens",
         ),
-        // the first input of omega_dot is tau_cmd
+        // The first input on which omega_dot depends is tau_cmd.
         (
             "a hidden feedthrough",
             unknown("<Outputs>", "omega_dot", "dependencies=\"", "dependencies=\"\" x=\""),

@@ -9,18 +9,18 @@ use zip::CompressionMethod;
 
 use crate::common::{binary, breaks, broken, changed, check_rules, look, ours, with, zipped};
 
-/// `hubslosh check` of HubSlosh as packed for tests has no finding, except the rule on system libraries.
+/// Our FMU, as it is packed for tests, has no finding except for the rule on system libraries.
 #[test]
-fn our_own_fmu_keeps_every_rule() {
+fn our_own_fmu_breaks_no_rule() {
     let report = check_rules(packed_for_tests(), &[], 120.0);
-    // A plain build is for this machine and takes its newer glibc and libgcc; `pack --all-platforms`
-    // does not, and is checked when it packs.
+    // A plain build is for this machine and uses its newer glibc and libgcc. Builds by `pack --all-platforms` do not,
+    // and are checked when they are packed.
     let others: Vec<_> = report.all().filter(|(rule, _)| rule.id != "bin.system").collect();
     assert!(others.is_empty(), "{}", report.text());
     assert_eq!(report.count_findings(Severity::Error), 0);
     let skipped: Vec<_> =
         report.outcomes.iter().filter_map(|o| o.findings.skipped.clone()).collect();
-    // none of its outputs and states has a range
+    // None of its outputs and states has a range.
     assert_eq!(
         skipped,
         ["the FMU has no resources", "no variable that the FMU computes has a min or a max"]
@@ -57,7 +57,7 @@ fn binaries_that_no_host_can_use_are_reported() {
         files.push(("binaries/aarch64-linux/HubSlosh.so".into(), aarch64.into()));
         zipped(&files, CompressionMethod::Stored)
     };
-    // A plain build's need of a newer glibc is left out: the groups are looked at one by one.
+    // The groups are checked separately, because a plain build breaks bin.system.
     breaks(
         vec![
             (

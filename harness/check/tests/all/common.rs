@@ -1,4 +1,4 @@
-//! FMUs to check: our own, an archive packed otherwise, a changed word in the XML, other binaries.
+//! FMUs for the checks: our own FMU, repacked archives, changed words in the XML, other binaries.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Cursor, Read, Write};
@@ -77,8 +77,8 @@ pub fn broken(report: &Report) -> BTreeSet<&'static str> {
     report.all().map(|(rule, _)| rule.id).collect()
 }
 
-/// Keeps an FMU for `.ci/other_tools.py`, together with the rules that it breaks, in the folder that
-/// HUBSLOSH_KEEP_MUTANTS names.
+/// Stores an FMU, with the rules that it breaks, in the folder HUBSLOSH_KEEP_MUTANTS, from where `.ci/other_tools.py`
+/// reads it.
 pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     let Some(folder) = std::env::var_os("HUBSLOSH_KEEP_MUTANTS").map(PathBuf::from) else { return };
     static COUNT: Mutex<usize> = Mutex::new(0);
@@ -92,7 +92,7 @@ pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     writeln!(index.unwrap(), "{file}\t{}\t{}", name.escape_debug(), rules.join(" ")).unwrap();
 }
 
-/// Asserts that each FMU breaks exactly the rules that are listed for it. Only rules of `groups` are checked.
+/// Asserts that each FMU breaks exactly the rules that are listed for it, of the rules in `groups`.
 pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {
@@ -126,8 +126,8 @@ pub fn cases<const N: usize>(table: &str) -> Vec<[&str; N]> {
     lines.map(|line| cells(line).unwrap_or_else(|_| panic!("not {N} cells: {line}"))).collect()
 }
 
-/// Asserts that each changed description breaks exactly the rules of the group `xml` that its line names:
-/// name | the text after which | the text that | is replaced by | rules.
+/// Asserts that each changed description breaks exactly the rules of the group `xml` that its line lists: name | the
+/// text after which | the text that | is replaced by | rules.
 pub fn words_break(table: &str) {
     let cases = cases::<5>(table);
     let rules: Vec<Vec<&str>> = cases.iter().map(|case| case[4].split(' ').collect()).collect();

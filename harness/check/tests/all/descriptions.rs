@@ -35,7 +35,7 @@ fn xml_nested_200_000_levels_deep_is_refused_as_too_deep() {
     let report = look(&bytes, &[]);
     assert_eq!(broken(&report), BTreeSet::from(["xml.size"]), "{}", report.text());
     assert!(report.text().contains("256 levels"), "{}", report.text());
-    // what annotations have is read
+    // Annotations of vendors with 50 levels are accepted.
     let report =
         look(&zipped(&with(XML, nested(50).into_bytes()), CompressionMethod::Stored), &["xml"]);
     assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
@@ -182,7 +182,7 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
         vec![
             ("an output missing", without(outputs), &["xml.outputs"][..]),
             ("an output twice", twice(outputs), &["xml.outputs"]),
-            // which makes its state and itself no state and no derivative, so InitialUnknowns must not list them
+            // The variable is then neither a state nor a derivative, so that InitialUnknowns must not list it.
             (
                 "a derivative missing",
                 without(derivatives),
@@ -198,10 +198,11 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
     );
 }
 
-/// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is. Only Derivatives makes states of
-/// them (2.2.8). Dymola and JModelica write the attribute also for outputs, inputs and dummy derivatives.
+/// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is, but only the list
+/// Derivatives makes this variable a state (2.2.8). Dymola and JModelica write the attribute also for outputs,
+/// inputs and dummy derivatives.
 #[test]
-fn the_attribute_derivative_without_other_signs_makes_no_state() {
+fn the_attribute_derivative_by_itself_makes_no_state() {
     let of = |variable: &str, index: &str| {
         let derivative = format!("<Real derivative=\"{index}\"");
         changed(&format!("name=\"{variable}\""), "<Real", &derivative)
@@ -235,7 +236,7 @@ fn an_fmu_of_another_version_of_fmi_gets_one_finding() {
     }
 }
 
-/// The book's page names every group and the numbers of rules; `book/conf.py` adds the rules themselves from the source.
+/// The page of the book states the groups and the numbers of rules; `book/conf.py` adds the rules themselves from the source.
 #[test]
 fn documentation_has_the_groups_and_numbers_of_rules() {
     let page = |name: &str| {

@@ -1,5 +1,5 @@
-//! Rules on FMUs 3.0. A model without a fault (model3.c, model3.xml) keeps every rule. Copies of it with one fault each break the
-//! intended rule.
+//! Rules on FMUs 3.0. A model without a fault (model3.c, model3.xml) breaks no rule. Copies of it with one fault each
+//! break the intended rule.
 
 use std::collections::BTreeSet;
 
@@ -16,8 +16,7 @@ fn binary() -> String {
     format!("binaries/{PLATFORM}/Model3{}", std::env::consts::DLL_SUFFIX)
 }
 
-/// Returns the files of the FMU of model3.c with one fault; its number replaces the zeros of "MUTANT=00" in
-/// the library.
+/// Returns the files of the FMU of model3.c with one fault, whose number replaces the zeros of "MUTANT=00" in the library.
 fn files(mutant: u32) -> Files {
     let mut library = compiled("model3.c", &[]);
     let at = library.windows(9).position(|bytes| bytes == b"MUTANT=00").unwrap();
@@ -30,13 +29,13 @@ fn report(files: &Files, only: &[&str]) -> Report {
 }
 
 #[test]
-fn an_fmu_3_without_a_fault_keeps_every_rule() {
+fn an_fmu_3_without_a_fault_breaks_no_rule() {
     let report = report(&files(0), &[]);
     assert_eq!(report.all().count(), 0, "{}", report.text());
     assert_eq!(report.outcomes.len(), fmi3::RULES.len());
     let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some());
     let skipped: Vec<_> = skipped.map(|o| o.rule.id).collect();
-    // it has no licence, no terminals, no layered standard
+    // The model has no licence, no terminals and no layered standard.
     assert_eq!(skipped, ["zip.licenses", "zip.terminals", "zip.layered_standards"]);
 }
 
@@ -106,7 +105,7 @@ fn a_wrong_attribute_in_the_description_of_an_fmu_3_is_reported() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// An FMU with clocks may refuse an instance without event mode (section 2.3.1).
+/// FMI 3.0 allows an FMU with clocks to refuse an instance without event mode (section 2.3.1).
 #[test]
 fn co_simulation_of_an_fmu_with_clocks_is_not_called() {
     let clock = "<Clock name=\"tick\" valueReference=\"90\" causality=\"input\" \
@@ -131,7 +130,7 @@ fn a_wrong_archive_of_an_fmu_3_is_reported() {
     };
     let icons = "<fmiTerminalsAndIcons fmiVersion=\"2.0\"/>".to_string();
     let suffix = std::env::consts::DLL_SUFFIX;
-    // where the library is, a file more, and the rule that tells it
+    // Each case has the path of the library, an additional file, and the rule that reports the fault.
     let other = [("linux64", "linux"), ("win64", "windows"), ("darwin64", "macos")];
     let old =
         other.iter().find(|(_, os)| *os == std::env::consts::OS).map_or("linux64", |(old, _)| old);
@@ -227,7 +226,7 @@ fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
     assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
 }
 
-/// If no two runs are the same, a difference after a reset shows nothing.
+/// If every run differs from every other run, a difference after a reset shows nothing.
 #[test]
 fn the_rule_on_reset_is_skipped_if_runs_differ_without_a_reset() {
     let report = report(&files(39), &["life"]);
@@ -251,8 +250,7 @@ fn an_interface_that_cannot_be_loaded_is_reported_and_the_other_is_checked() {
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
 }
 
-/// With fault 36 the library allows only one instance in each process, which breaks rules unless it is
-/// declared.
+/// With fault 36 the library allows only one instance in a process, which breaks rules unless the FMU declares it.
 #[test]
 fn an_fmu_3_that_declares_one_instance_per_process_passes_the_check() {
     let undeclared = files(36);

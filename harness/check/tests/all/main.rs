@@ -1,4 +1,4 @@
-//! The rules of `check` on FMUs: ours keeps every rule, and FMUs that break one are found by it.
+//! Checks FMUs: ours breaks no rule, and each FMU with a fault breaks the intended rule.
 
 mod archives;
 mod behaviour;

@@ -1,4 +1,4 @@
-//! The process of one rule, as `hubslosh` is for `hubslosh check`.
+//! Runs the calls of one rule for the tests, as `hubslosh` does for `hubslosh check`.
 
 use std::env::args_os;
 use std::path::Path;

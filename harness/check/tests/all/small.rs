@@ -1,4 +1,4 @@
-//! Rules on small FMUs of C (model.c).
+//! Checks small FMUs that are compiled from C (model.c).
 
 use std::collections::BTreeSet;
 use std::io::{Cursor, Read};
@@ -93,7 +93,7 @@ fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     for (name, definitions, rate, experiment) in cases {
         let small = Small { definitions, rate: *rate, experiment };
         let report = look(&small.packed(), &[]);
-        // A plain build is for this machine; the one step that is too long is meant.
+        // A plain build is for this machine, and one case has a step that is too long on purpose.
         let fine = ["bin.system", "xml.default_experiment"];
         let others: Vec<_> = report.all().filter(|(rule, _)| !fine.contains(&rule.id)).collect();
         if !others.is_empty() || report.count_findings(Severity::Error) > 0 {
@@ -166,11 +166,11 @@ fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
 #[cfg(target_os = "linux")]
 #[test]
 fn outputs_that_lag_by_one_step_are_reported_and_intended_delays_are_not() {
-    // x after 1.5 s is 11 % too large
+    // x after 1.5 s is 11 % too large.
     let experiment = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.1\"";
     for (habit, severity) in [
         (&["-DSTALE"][..], Some(Severity::Error)),
-        // of an output one cannot be sure
+        // For an output the check cannot be sure that a lag is a fault.
         (&["-DSTALE", "-DHIDDEN_STATE"], Some(Severity::Warning)),
         (&["-DDELAY"], None),
         (&["-DUNIT_DELAY"], None),
@@ -223,8 +223,8 @@ fn an_fmu_that_crashes_in_every_step_gets_a_single_finding() {
     assert!(because.count() > 15, "{}", report.text());
 }
 
-/// Each case comes from a public FMU: either several rules reported one fault, or the FMU could refuse a
-/// value that the check sets.
+/// Each case comes from a public FMU for which either several rules reported one fault, or the FMU could rightly refuse
+/// a value that the check sets.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_fault_is_reported_by_its_own_rule_with_its_severity() {
@@ -323,7 +323,7 @@ fn each_interface_is_called_in_the_binary_that_it_names() {
         report.outcomes.iter().any(|o| o.rule.id == id && o.findings.skipped.is_none())
     };
     assert!(called("exchange.run", &report) && called("steps.run", &report));
-    // without it what is there is still called
+    // If the binary of one interface is missing, the other interface is still called.
     files.pop();
     let report = look(&zipped(&files, CompressionMethod::Stored), &[]);
     assert!(broken(&report).contains("bin.each_interface"), "{}", report.text());
