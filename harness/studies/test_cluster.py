@@ -124,7 +124,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
     failed = cluster.make_runs(client, ours, lambda run: made.append(run["name"]))
     assert sorted(made) == ["linear_50mm_100", "linear_70mm_100", "linear_90mm_100"]
     store = cluster.Store.campaign(ours.out, "a test")
-    with pytest.raises(hubslosh.FmuError, match=r"is held by another campaign: .*a test"):
+    with pytest.raises(hubslosh.FmuError, match=r"is in use by another campaign: .*a test"):
         cluster.make_runs(client, ours)
     store.close()
     assert list(failed) == ["linear_-1000mm_100"]

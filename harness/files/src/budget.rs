@@ -1,15 +1,14 @@
-//! Budgets of one command, checked before anything is
-//! allocated or started: a mistyped number gets a message.
+//! Limits of one command, which are checked before anything is allocated or started, so that a mistyped number gives a
+//! message.
 
 use anyhow::{Result, ensure};
 
 /// Largest number of rows of a table, and of steps of a run. At 50 Hz they are 111 hours.
 pub const ROWS: usize = 20_000_000;
-/// Largest memory for numbers that a command holds at once, bytes. It is twice what the bench's
-/// columns of the longest run take.
+/// Largest memory for numbers that a command uses at the same time, bytes. It is twice the memory for the bench's
+/// columns in the longest run.
 pub const BYTES: u64 = 4 << 30;
-/// Largest text that is read as a whole, bytes: plans, parameter sets, results. A table is limited by
-/// [`ROWS`] instead.
+/// Largest text that is read as a whole, bytes: plans, parameter sets, results. Tables are limited by [`ROWS`] instead.
 pub const TEXT: u64 = 64 << 20;
 /// Largest size of the numbers that are read from one recording, bytes: three signals in [`ROWS`] rows.
 pub const RECORDING: u64 = 512 << 20;
@@ -21,13 +20,11 @@ pub const INFLATED: u64 = 2 << 30;
 pub const RUNS: usize = 100_000;
 pub const JOBS: usize = 512;
 pub const LINES: usize = 20_000;
-/// Largest number of sines that are evaluated for a multisine, lines times rows, which takes half a
-/// minute.
+/// Largest number of sines that are evaluated for a multisine, frequencies times rows. They take half a minute.
 pub const SINES: u64 = 2_000_000_000;
-/// Largest number of products that the frequency responses of one run take, rows times frequencies.
-/// They take about ten seconds.
+/// Largest number of products for the frequency responses of one run, rows times frequencies. They take about ten seconds.
 pub const PRODUCTS: f64 = 4e9;
-/// Largest frequency of a torque, Hz. Its inverse is the smallest frequency.
+/// Largest frequency of a torque, Hz. Its inverse is the smallest frequency, Hz.
 pub const FREQUENCY: f64 = 1e9;
 /// Largest length of a run's name, bytes, because file systems allow 255 with an ending.
 pub const NAME: usize = 200;
@@ -50,7 +47,7 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
         exact <= ROWS as f64,
         "{span:?} s in steps of {step:?} s are {exact:.3e} steps (allowed: at most {ROWS})"
     );
-    // 2700 s / 0.02 s is 135000 steps, however the quotient rounds
+    // 2700 s / 0.02 s is 135000 steps, even if the quotient is rounded.
     let whole = (exact - exact.round()).abs() < 1e-6;
     Ok(if whole { exact.round() } else { exact.ceil() } as usize)
 }
@@ -58,7 +55,7 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
 /// Returns the size of a table of numbers, bytes.
 ///
 /// # Errors
-/// If it has more than [`ROWS`], or takes more than [`BYTES`].
+/// If the table has more than [`ROWS`] rows, or takes more than [`BYTES`].
 pub fn table(rows: usize, columns: usize) -> Result<u64> {
     ensure!(rows <= ROWS + 1, "{rows} rows (allowed: at most {ROWS})");
     let bytes = (rows as u64).saturating_mul(columns as u64).saturating_mul(8);
@@ -72,12 +69,11 @@ pub fn table(rows: usize, columns: usize) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Returns the size of the numbers that are read from a file of `size` bytes. A small file that claims to
-/// hold much is damaged or made to harm.
+/// Returns the size of the numbers that are read from a file of `size` bytes. A small file that claims to contain many
+/// numbers is damaged or malicious.
 ///
 /// # Errors
-/// If [`table`] fails, or the numbers take more than [`RECORDING`] and than [`PER_BYTE`] times the
-/// file.
+/// If [`table`] fails, or the numbers take more than [`RECORDING`] and also more than [`PER_BYTE`] times the size of the file.
 pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     let bytes = table(rows, columns)?;
     let most = RECORDING.max(size.saturating_mul(PER_BYTE));
@@ -92,8 +88,8 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Returns the number of threads for `wanted` jobs at the same time (0 for as many as the machine
-/// has cores), each of which holds `bytes` of memory.
+/// Returns the number of threads for `wanted` jobs at the same time, each of which uses `bytes` of memory. If `wanted`
+/// is 0, the number is that of the processor's cores.
 ///
 /// # Errors
 /// If more than [`JOBS`] jobs are wanted.

@@ -1,5 +1,4 @@
-//! Panics of our own code: caught where a command ends, and reported as a bug of this program with the files that it had
-//! read.
+//! Catches panics of this program where a command ends, and reports them as bugs, with the files that the command has read.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,8 +9,8 @@ use crate::input;
 
 static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
 
-/// Functions that are called at panics of this process: `panics` with the report before the panic unwinds,
-/// because a panic that cannot unwind ends the process, and `catches` when [`caught`] has caught it.
+/// Functions that are called when this process panics: `panics` receives the report before the panic unwinds, because a
+/// panic that cannot unwind ends the process; `catches` is called when [`caught`] has caught the panic.
 pub struct Listener {
     pub panics: fn(&str),
     pub catches: fn(),
@@ -23,7 +22,7 @@ pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }
 
-/// Makes panics of this process keep their messages for [`caught`] instead of printing them.
+/// Stores the messages of panics of this process for [`caught`] instead of printing them.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));
@@ -46,8 +45,8 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[error("{0}")]
 pub struct Panicked(pub String);
 
-/// Runs `work`; returns the message of its panic if it panics. The first panic counts, because a panic of a thread also
-/// makes the thread that waits for it panic.
+/// Runs `work`, and returns the message of its panic if it panics. If there are several panics, the message is that of
+/// the first, because a panic of a thread also makes the thread that waits for it panic.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
@@ -88,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_panic_becomes_a_message_that_blames_this_program() {
+    fn a_panic_becomes_a_report_of_a_bug_in_this_program() {
         assert_eq!(caught(|| 3), Ok(3));
         let told = caught(|| -> i32 { panic!("row {} is odd", 7) }).unwrap_err().0;
         assert!(told.starts_with("row 7 is odd"), "{told}");

@@ -1,5 +1,5 @@
-//! Files that commands read: only regular files, and only as much of them as fits the budget. A named pipe or a
-//! device would block the command, or never end.
+//! Reads the input files of commands. Only regular files are read, up to a size limit, because a named pipe or a device
+//! could block the command, or never end.
 //!
 //! Files that the user names as inputs are protected: [`crate::output`] refuses to replace them.
 
@@ -12,13 +12,13 @@ use anyhow::{Result, bail, ensure};
 
 use crate::budget;
 
-/// Opens a regular file for reading; a symbolic link to one counts as one.
+/// Opens a regular file for reading, also through a symbolic link.
 ///
 /// # Errors
 /// If the file cannot be opened or is not a regular file. The message does not repeat the path.
 pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
-    // before `File::open`, which waits until somebody writes to a named pipe
+    // This is checked before `File::open`, which would wait until somebody writes to a named pipe.
     if !kind.is_file() {
         bail!("the path is {} (allowed: a regular file)", file_kind(&kind));
     }
@@ -66,8 +66,7 @@ pub fn text(path: &Path) -> Result<String> {
     })
 }
 
-/// Removes the numbers of the operating system's errors, `(os error 2)`, from a message, because the words
-/// before them say the same.
+/// Removes the numbers of system errors, such as `(os error 2)`, from a message, because the words before them say the same.
 pub fn without_error_numbers(message: &str) -> String {
     let mut parts = message.split(" (os error ");
     let mut text = parts.next().unwrap_or_default().to_string();
@@ -100,8 +99,8 @@ fn file_kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() { "a directory" } else { "a special file" }
 }
 
-/// Identity of a file, by which two paths that lead to one file are recognised. On systems other
-/// than Unix two hard links count as different files.
+/// Identity of a file, by which two paths that lead to one file are recognised. On systems other than Unix, two hard
+/// links count as different files.
 #[derive(PartialEq)]
 struct Identity(#[cfg(unix)] (u64, u64), #[cfg(not(unix))] PathBuf);
 
@@ -126,8 +125,7 @@ struct Protected {
 
 static PROTECTED: Mutex<Vec<Protected>> = Mutex::new(Vec::new());
 
-/// Protects an input: from now on no output of this process replaces the file. A path without a file is
-/// ignored.
+/// Protects an input: from now on no output of this process replaces the file. A path at which there is no file is ignored.
 pub fn protect(path: &Path) {
     if !path.is_file() {
         return;
@@ -141,8 +139,7 @@ pub fn protect(path: &Path) {
     }
 }
 
-/// Fails if `path` leads to a protected input: by the same name, a relative path, a symbolic link or a hard
-/// link.
+/// Checks that `path` does not lead to a protected input: by the same name, a relative path, a symbolic link or a hard link.
 ///
 /// # Errors
 /// If it does; the message names both paths.

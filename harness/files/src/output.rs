@@ -1,5 +1,5 @@
-//! Outputs: a file appears whole or not at all, because it is written to the same folder under a temporary name, then
-//! renamed; links are followed, and devices and pipes are written to. Hashes of files.
+//! Writes outputs. A file appears completely or not at all, because it is written to the same folder under a temporary
+//! name and then renamed. Links are followed; devices and pipes are written to. Also computes hashes of files.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Seek, Write};
@@ -12,9 +12,9 @@ use crate::{input, temporary};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
-    /// A plain file at this path, which may not exist yet: the output replaces it as a whole.
+    /// A regular file at this path, which may not exist yet. The output replaces the whole file.
     File(PathBuf),
-    /// A device, a named pipe or an open descriptor such as `/dev/stdout`: the output is written to it.
+    /// A device, a named pipe or an open descriptor such as `/dev/stdout`. The output is written to it.
     Stream,
 }
 
@@ -23,7 +23,7 @@ const LINKS: usize = 40;
 /// Finds the destination of an output. Symbolic links are followed, also to a file that does not exist yet.
 ///
 /// # Errors
-/// If the path leads to a directory, or its links lead in a circle.
+/// If the path leads to a directory, or its links form a circle.
 pub fn destination(path: &Path) -> Result<Destination> {
     let name = path.display();
     let mut place = path.to_path_buf();
@@ -38,7 +38,7 @@ pub fn destination(path: &Path) -> Result<Destination> {
             });
         }
         let folder = containing_folder(&place).to_path_buf();
-        // these links open a descriptor; their text names a pipe, or a file that somebody else is writing
+        // These links open a descriptor. Their text names a pipe, or a file that another program is writing.
         if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
             return Ok(Destination::Stream);
         }
@@ -54,9 +54,9 @@ fn containing_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Writes an output through `write`, completely or not at all. A plain file is replaced when its successor is
-/// on the disk, so that neither an error nor a power cut leaves half of it; a device or a pipe receives the
-/// bytes when all of them exist. A protected input ([`input::protect`]) is never written to.
+/// Writes an output through `write`, completely or not at all. A regular file is replaced only when the new file is on
+/// the disk, so that an error or a power failure does not leave an incomplete file. A device or a pipe receives the
+/// bytes when all of them exist. A protected input ([`input::protect`]) is never overwritten.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
     input::check_replaceable(path)?;
     let cannot = || format!("{} cannot be written", path.display());
@@ -82,8 +82,7 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
     Ok(result)
 }
 
-/// Moves a complete file to where the path of an output leads: it takes the place of a plain file, and its
-/// bytes go to a device or a pipe.
+/// Moves a complete file to the destination of an output: replaces a regular file, or copies the bytes to a device or a pipe.
 ///
 /// # Errors
 /// If that fails; the message names `path`.
@@ -91,7 +90,7 @@ pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     let move_or_pour = || -> Result<()> {
         match destination(path)? {
             Destination::File(place) => match fs::rename(draft, &place) {
-                // a link leads to another disk
+                // The link leads to another disk, so that the file must be copied.
                 Err(error) if error.kind() == ErrorKind::CrossesDevices => {
                     atomically(&place, |file| Ok(io::copy(&mut File::open(draft)?, file)?))?;
                     Ok(fs::remove_file(draft)?)
@@ -141,7 +140,7 @@ mod tests {
 
     #[test]
     fn sha_256_equals_the_example_of_the_standard() {
-        // FIPS 180-4, the example of one block
+        // the example with one block in FIPS 180-4
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), expected);
         assert_eq!(hash_reader(&b"abc"[..]).unwrap(), expected);
@@ -217,7 +216,7 @@ mod tests {
         }
     }
 
-    /// The device is a copy of `/dev/full`, which takes no byte; only root can make one.
+    /// The device is a copy of `/dev/full`, which accepts no bytes. Only root can create a device.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_device_is_written_to_and_its_error_is_reported() {
@@ -227,7 +226,7 @@ mod tests {
         let made = std::process::Command::new("mknod").arg(&full).args(["c", "1", "7"]).output();
         let is_device = || full.symlink_metadata().is_ok_and(|f| f.file_type().is_char_device());
         if !made.unwrap().status.success() || File::open(&full).is_err() {
-            // not root: the real one, which then nobody can replace, by a link
+            // Without root the test uses the real device through a link, because this user cannot replace it.
             std::os::unix::fs::symlink("/dev/full", &full).unwrap();
             assert_eq!(destination(&full).unwrap(), Destination::Stream);
             return;

@@ -1,18 +1,18 @@
-//! A folder of stored runs that one program holds at a time: the directory of a campaign, or of a study by Python's
+//! A folder of stored runs that one program uses at a time: the directory of a campaign, or of a study by Python's
 //! `monte_carlo`.
 //!
 //! ```text
-//! plan.toml, features.csv, …, report.html   of a campaign: published together when the last run is there
+//! plan.toml, features.csv, …, report.html   of a campaign: published together when the last run is stored
 //! study.json, runs.csv                      of a study: seed and ranges from the start; the table with the last run
-//! runs/NAME.parquet, runs/000017.json       a run, under its name when it is whole
-//! manifest.sha256                           SHA-256 of all of these, as `sha256sum --check` reads it
-//! .lock                                     locked, with who holds the folder
-//! .unfinished/                              what is being written; removed at the start and the end
+//! runs/NAME.parquet, runs/000017.json       a run; it gets this name when it is complete
+//! manifest.sha256                           SHA-256 of all of these, in the format of `sha256sum --check`
+//! .lock                                     locked; its text describes the program that uses the folder
+//! .unfinished/                              files that are being written; removed at the start and the end
 //! ```
 //!
-//! A run's line is added to the manifest before its file gets its final name. A stored run that differs from the last
-//! line with its name is therefore damaged. A run without a line comes from another program; if HubSlosh wrote it, the
-//! manifest is damaged.
+//! The line of a run is added to the manifest before its file gets its final name. A stored run that differs from the
+//! last line with its name is therefore damaged. A run without a line comes from another program; if HubSlosh wrote it,
+//! the manifest is damaged.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
@@ -32,10 +32,10 @@ const LOCK: &str = ".lock";
 const UNFINISHED: &str = ".unfinished";
 const TABLE: &str = "runs.csv";
 
-/// Kind of folder: a campaign, or a study of `monte_carlo`. Messages use `name`, `noun` (with its article,
-/// for readers who do not know the kind) and `elsewhere`, the advice if the folder is taken. The file
-/// `definition` determines which runs there are. `is_published` is true for names of files that are published
-/// with the last run; no other file is removed, whatever the manifest lists.
+/// Kind of folder: a campaign, or a study of `monte_carlo`. Messages use `name`; `noun`, the name with its article for
+/// readers who do not know the kind; and `elsewhere`, the advice if another program uses the folder. The file
+/// `definition` determines the runs. `is_published` is true for names of files that are published with the last run;
+/// other files are never removed, even if the manifest lists them.
 #[derive(Debug)]
 pub struct Kind {
     name: &'static str,
@@ -96,16 +96,15 @@ pub enum Damage {
     Unreadable(anyhow::Error),
 }
 
-/// Text of a definition, and a function that fails if the text of a definition in the folder defines other
-/// runs.
+/// Text of a definition, and a function that fails if another text, which is in the folder, defines other runs.
 #[derive(Clone, Copy)]
 pub struct Definition<'a> {
     pub text: &'a str,
     pub compare: &'a dyn Fn(&str) -> Result<()>,
 }
 
-/// A locked folder; dropping this unlocks it. `lost` are files that are in the manifest, but not in the
-/// folder; `is_new` is true if the folder had no manifest, so that all runs come from other programs.
+/// A locked folder; it is unlocked when this value is dropped. `lost` are files that are in the manifest but not in the
+/// folder. `is_new` is true if the folder had no manifest, so that all of its runs come from other programs.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
@@ -119,8 +118,8 @@ pub struct Store {
     _lock: File,
 }
 
-/// The hashes of the stored files, by name, and the file of the manifest. The file is `None` after
-/// publication, and after a line that could not be written.
+/// The hashes of the stored files, by name, and the file of the manifest. The file is `None` after publication, and
+/// after a line that could not be written.
 #[derive(Debug)]
 struct Manifest {
     file: Option<File>,
@@ -131,8 +130,8 @@ fn lines(sums: &BTreeMap<String, String>) -> String {
     sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
 }
 
-/// Returns the SHA-256 that each file name in the manifest's text has in its last line. A last line
-/// that is incomplete, because the program was killed, does not count.
+/// Returns the SHA-256 in the last line for each file name, from the text of a manifest. An incomplete last line, which
+/// a killed program leaves, does not count.
 ///
 /// # Errors
 /// If another line is not in the format of a manifest.
@@ -164,8 +163,7 @@ fn has_no_runs(path: &Path) -> bool {
 /// Reads the manifest of a folder. `is_used` is true if a program has locked the folder before.
 ///
 /// # Errors
-/// If the manifest is damaged, or is missing although the folder was used, so that nothing verifies
-/// the stored runs.
+/// If the manifest is damaged, or if it is missing although the folder was used, so that nothing verifies the stored runs.
 fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
     let place = path.join(MANIFEST);
     let read = || -> Result<BTreeMap<String, String>> {
@@ -209,12 +207,12 @@ impl Definition<'_> {
 }
 
 impl Store {
-    /// Creates the folder if it does not exist, and locks it. Other programs that want to lock it get `about`
-    /// as the reason. The definition of a campaign is published with its tables, so it has none here.
+    /// Creates the folder if it does not exist, and locks it. `about` tells other programs why it is locked. The
+    /// definition of a campaign is not passed, because it is published with the tables.
     ///
     /// # Errors
-    /// Another program has locked the folder, it belongs to runs of another kind or of another
-    /// definition, or its manifest is damaged. In case of an error nothing in the folder has changed, except for the lock.
+    /// If another program has locked the folder, the folder contains runs of another kind or of another definition, or
+    /// its manifest is damaged. After an error nothing in the folder has changed, except for the lock.
     pub fn take(
         path: &Path,
         kind: &'static Kind,
@@ -266,7 +264,7 @@ impl Store {
             _lock: lock,
         };
         if let Some(definition) = definition {
-            // another program may have defined its runs before the lock
+            // Another program may have written a definition before this one got the lock.
             definition.check(path, kind)?;
             let text = definition.text.as_bytes();
             let is_there = fs::read(path.join(kind.definition)).is_ok_and(|there| there == text);
@@ -290,12 +288,11 @@ impl Store {
         self.manifest().sums.contains_key(&self.kind.run_file(run))
     }
 
-    /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line
-    /// in the manifest is accepted if the folder is new, or if `is_ours` says that HubSlosh has not
-    /// written its file.
+    /// Returns the SHA-256 of a stored run, or `None` if the run was never stored. A run without a line in the manifest
+    /// is accepted if the folder is new, or if `is_ours` returns false, because another program has written its file.
     ///
     /// # Errors
-    /// If the file is not the one that was stored.
+    /// If the file differs from the file that was stored.
     pub fn check(
         &self,
         run: &str,
@@ -308,11 +305,10 @@ impl Store {
         Ok(sum)
     }
 
-    /// Returns the bytes of a stored run of a kind that only HubSlosh writes, or `None` if it was
-    /// never stored.
+    /// Returns the bytes of a stored run of a kind that only HubSlosh writes, or `None` if the run was never stored.
     ///
     /// # Errors
-    /// If the file is not the one that was stored.
+    /// If the file differs from the file that was stored.
     pub fn read(&self, run: &str) -> Result<Option<Vec<u8>>, Damage> {
         let read = |path: &Path| {
             let bytes = input::bytes(path)?;
@@ -321,8 +317,8 @@ impl Store {
         self.read_checked(run, |_| true, read)
     }
 
-    /// Returns the value that `read` extracts from the file of a stored run, if the SHA-256 that it also
-    /// returns is the stored one.
+    /// Returns the value that `read` extracts from the file of a stored run. `read` also returns the SHA-256 of the
+    /// file, which must be the stored one.
     fn read_checked<T>(
         &self,
         run: &str,
@@ -346,15 +342,15 @@ impl Store {
         self.add_to_manifest(&self.kind.run_file(run), sum)
     }
 
-    /// Stores a run in the folder. `write` writes the run's file to the path that it receives. When
-    /// this function returns, the run is on the disk.
+    /// Stores a run in the folder. `write` receives a path and writes the run's file there. When this function returns,
+    /// the run is on the disk.
     pub fn add(&self, run: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let stored = self.write(&self.kind.run_file(run), write);
         stored.with_context(|| format!("{} cannot be stored", self.run(run).display()))
     }
 
-    /// Writes a file of the folder: first its line in the manifest, then the file itself, which
-    /// gets its name when it is complete.
+    /// Writes a file of the folder: first its line in the manifest, then the file, which gets its final name
+    /// when it is complete.
     fn write(&self, file: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let place = self.path.join(file);
         input::check_replaceable(&place)?;
@@ -367,7 +363,7 @@ impl Store {
     pub fn publish(self, files: Vec<(&str, Vec<u8>)>) -> Result<()> {
         for (name, bytes) in &files {
             let place = self.path.join(name);
-            // a plan that is executed in its own place is not rewritten
+            // A plan that is executed from its own place in the folder is not written again.
             if !input::bytes(&place).is_ok_and(|there| there == *bytes) {
                 input::check_replaceable(&place)?;
             }
@@ -382,7 +378,7 @@ impl Store {
             kept.map(|(name, sum)| (name.clone(), sum.clone())).collect();
         sums.extend(files.iter().map(|(name, bytes)| (name.to_string(), sha256(bytes))));
         let text = lines(&sums).into_bytes();
-        // a full disk is detected before any file is replaced
+        // A full disk must be detected before any file is replaced.
         let all = files.into_iter().chain([(MANIFEST, text)]);
         let names = all.map(|(name, bytes)| {
             let wrote = output::write(&self.unfinished.join(name), &bytes);
@@ -391,7 +387,7 @@ impl Store {
             Ok(name)
         });
         let names = names.collect::<Result<Vec<_>>>()?;
-        // Windows does not rename a file to the name of an open file
+        // Windows cannot rename a file to the name of an open file.
         drop(manifest.file.take());
         let gone =
             manifest.sums.keys().filter(|name| is_published(name) && !sums.contains_key(*name));
@@ -427,7 +423,7 @@ impl Store {
         let place = place.with_context(|| format!("{name} is closed, or could not be written"))?;
         let added = place.write_all(line.as_bytes()).and_then(|()| place.sync_data());
         if added.is_err() {
-            // no other line may follow an incomplete line
+            // An incomplete line must stay the last line.
             manifest.file = None;
         }
         added.with_context(|| format!("{name} cannot be written"))?;
@@ -438,7 +434,7 @@ impl Store {
 
 impl Drop for Store {
     fn drop(&mut self) {
-        // a fork has the store from the process that took it
+        // A forked process also has the store, which belongs to the process that locked it.
         if std::process::id() == self.process {
             let _ = fs::remove_dir_all(&self.unfinished);
         }
@@ -454,13 +450,13 @@ fn hold(path: &Path, kind: &Kind, about: &str) -> Result<File> {
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
-            // Windows does not allow reading a locked file
+            // On Windows a locked file cannot be read.
             let who = fs::read_to_string(&place).unwrap_or_default();
             let who = who.trim();
             let since = place.metadata().and_then(|file| file.modified()).ok();
             let age = since.and_then(|since| since.elapsed().ok()).unwrap_or_default().as_secs();
             bail!(
-                "{} is held by another {}{}{who}, for {age} s; wait for its end, or {}",
+                "{} is in use by another {}{}{who}, for {age} s; wait for its end, or {}",
                 path.display(),
                 kind.name,
                 if who.is_empty() { "" } else { ": " },
@@ -514,7 +510,7 @@ mod tests {
             let held = take(directory.path(), kind).unwrap();
             let error = take(directory.path(), kind).unwrap_err().to_string();
             let who =
-                format!("held by another {}: process {}, here", kind.name, std::process::id());
+                format!("in use by another {}: process {}, here", kind.name, std::process::id());
             assert!(error.contains(&who) && error.contains(kind.elsewhere), "{error}");
             drop(held);
             take(directory.path(), kind).unwrap();
@@ -543,7 +539,7 @@ mod tests {
             }
             fs::write(&path, "2").unwrap();
             assert!(folder.check_text("b").is_ok());
-            // another program's run, verified from then on
+            // a run of another program, which is verified from now on
             let other = directory.path().join(kind.run_file("c"));
             fs::write(&other, "other").unwrap();
             assert!(matches!(folder.read("c"), Err(Damage::Unlisted)));
@@ -590,7 +586,7 @@ mod tests {
         let lines: Vec<&str> = good.split_inclusive('\n').collect();
         let zeros = "0".repeat(64);
         let wrong_hash = lines[0].replace(&lines[0][..64], &zeros);
-        // content of the manifest, and words of the error or the unverified runs
+        // the content of the manifest, and the expected words of the error or the expected unverified runs
         type Expected<'a> = Result<&'a [&'a str], &'a str>;
         let cases: [(Vec<u8>, Expected); 11] = [
             (Vec::new(), Ok(&["a", "b", "c"])),
@@ -629,7 +625,7 @@ mod tests {
         fs::create_dir(&place).unwrap();
         let error = format!("{:#}", take().unwrap_err());
         assert!(error.contains("the path is a directory"), "{error}");
-        // without runs there is nothing to verify
+        // If there are no runs, there is nothing to verify.
         fs::remove_dir(&place).unwrap();
         fs::remove_dir_all(directory.path().join("runs")).unwrap();
         take().unwrap();
@@ -677,10 +673,10 @@ mod tests {
         assert_eq!(names, [".lock", MANIFEST, "plan.toml", "runs", "runs.csv"]);
     }
 
-    /// A forged manifest lists files outside the campaign's directory and files with other names; the campaign does not
-    /// remove them.
+    /// A forged manifest lists files outside the campaign's directory, and files whose names a campaign does not use.
+    /// The campaign does not remove them.
     #[test]
-    fn files_that_are_not_the_campaigns_own_are_left_alone_whatever_the_manifest_says() {
+    fn files_of_others_are_not_removed_even_if_the_manifest_lists_them() {
         let directory = tempfile::tempdir().unwrap();
         let out = directory.path().join("out");
         fs::create_dir(&out).unwrap();

@@ -1,5 +1,5 @@
-//! Temporary folders and half-written files: they are removed when they are dropped, on a signal ([`remove_all`]), and after a kill when the next
-//! program needs a folder.
+//! Temporary folders and incomplete files. They are removed when they are dropped or when a signal ends the program
+//! ([`remove_all`]). If a program was killed, the next program that needs a folder removes them.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -30,8 +30,8 @@ impl Drop for Registered {
     }
 }
 
-/// Removes all registered files and folders, before a signal ends the program. The registry stays locked, so
-/// a thread that would register another file waits until the program has ended.
+/// Removes all registered files and folders before a signal ends the program. The registry stays locked, so that a
+/// thread that registers another file waits until the program has ended.
 pub fn remove_all() {
     let paths = paths();
     for path in paths.iter() {
@@ -43,31 +43,29 @@ pub fn remove_all() {
     std::mem::forget(paths);
 }
 
-/// Runs `work`, and delays signals that would end the program until it returns. `work` must not register
-/// anything.
+/// Runs `work`, and delays signals that would end the program until `work` returns. `work` must not register a file.
 pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     let _held = paths();
     work()
 }
 
 pub const PREFIX: &str = "hubslosh-";
-/// Name of the file in a temporary folder that the program locks as long as it runs. It shows other
-/// programs that the folder is in use.
+/// Name of a file in each temporary folder that the program locks as long as it runs. The lock shows other programs
+/// that the folder is in use.
 const ALIVE: &str = "alive";
 const FILES: &str = "files";
 
 #[derive(Debug)]
 pub struct Folder {
     files: PathBuf,
-    // dropped in this order: Windows removes no file that is open
+    // The order of these fields is the order in which they are dropped: Windows cannot remove an open file.
     _alive: File,
     directory: TempDir,
     _registered: Registered,
     process: u32,
 }
 
-/// Removes the folder. A forked process does not, because the folder belongs to the process that
-/// created it.
+/// Removes the folder, except in a forked process, because the folder belongs to the process that created it.
 impl Drop for Folder {
     fn drop(&mut self) {
         if std::process::id() != self.process {
@@ -85,8 +83,8 @@ impl Folder {
         Folder::make(&std::env::temp_dir(), PREFIX)
     }
 
-    /// Creates a temporary folder in `parent`, with a name that begins with `prefix`. Removes
-    /// folders with such names that programs have left which were killed.
+    /// Creates a temporary folder in `parent` with a name that begins with `prefix`. Also removes folders with such
+    /// names that killed programs have left.
     pub fn new_in(parent: &Path, prefix: &str) -> Result<Folder> {
         sweep(parent, prefix);
         Folder::make(parent, prefix)
@@ -96,10 +94,10 @@ impl Folder {
         let make = || -> std::io::Result<Folder> {
             let directory = tempfile::Builder::new().prefix(prefix).tempdir_in(parent)?;
             let registered = register(directory.path());
-            // locked before it has its name, so that nobody finds it unlocked
+            // The file is locked before it gets its name, so that no other program finds it unlocked.
             let draft = directory.path().join("draft");
             let alive = File::create(&draft)?;
-            // where there are no locks, nobody can take it for dead either
+            // On a system without locks, no other program can take this folder for an abandoned one either.
             let _ = alive.try_lock();
             fs::rename(&draft, directory.path().join(ALIVE))?;
             let files = directory.path().join(FILES);
@@ -119,7 +117,7 @@ fn sweep(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let ours = entry.file_name().to_string_lossy().starts_with(prefix);
         let alive = entry.path().join(ALIVE);
-        // of anything but a plain file, opening it could take for ever
+        // Only a regular file is opened, because opening anything else could block.
         let is_file = || fs::symlink_metadata(&alive).is_ok_and(|found| found.is_file());
         if ours && entry.file_type().is_ok_and(|kind| kind.is_dir()) && is_file() {
             let locked = File::open(&alive).map(|file| file.try_lock().is_ok());
@@ -147,7 +145,7 @@ mod tests {
         held.lock().unwrap();
         sweep(parent.path(), PREFIX);
         assert!(!dead.exists() && living.exists());
-        assert!(other.exists(), "without the file it is not one of ours");
+        assert!(other.exists(), "a folder without the file alive belongs to another program");
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! Reads the zip archive of an FMU (FMI 2.0.5, section 2.3). No archive can fill the disk or the memory, or
-//! write outside the folder into which it is unpacked.
+//! Reads the zip archive of an FMU (FMI 2.0.5, section 2.3). Limits ensure that an archive cannot fill the disk or the
+//! memory, or write outside the folder into which it is unpacked.
 //!
-//! Every command that opens an FMU does so here; `book/foreign.md` lists the limits for users.
+//! Every command opens FMUs with this module; `book/foreign.md` lists the limits for users.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,8 +12,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use files::input;
 use zip::read::Config;
 use zip::result::ZipError;
-// This part of the crate is marked as unstable. It is the only reader that shows repeated names; the lock
-// file pins its version.
+// This part of the crate `zip` is marked as unstable. No other reader shows repeated names, and Cargo.lock fixes its version.
 use zip::unstable::read::ZipIterable;
 use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
 
@@ -22,10 +21,10 @@ use crate::xml;
 pub const MOST_ENTRIES: usize = 20_000;
 /// Longest name of an entry, bytes. Windows opens paths of up to 259 characters.
 pub const LONGEST_NAME: usize = 1024;
-/// Number of bytes to which the files of an archive may unpack, however small the archive is.
+/// Total size to which the files of any archive may unpack, bytes.
 pub const UNPACKED: u64 = 64 << 20;
-/// Number of bytes to which the files may unpack for each byte of the archive, in addition to
-/// [`UNPACKED`]. Binaries usually compress to a third and descriptions to a twentieth.
+/// Number of bytes to which the files may unpack for each byte of the archive, in addition to [`UNPACKED`]. Binaries
+/// usually compress to a third and descriptions to a twentieth.
 pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
@@ -42,8 +41,8 @@ impl Entry {
         self.name.ends_with('/')
     }
 
-    /// Returns the reason why unpacking this entry would write outside the folder into which the
-    /// archive is unpacked, or `None` if it stays inside.
+    /// Returns the reason why this entry would be written outside the folder into which the archive is unpacked, or
+    /// `None` if it stays inside.
     fn way_out(&self) -> Option<&'static str> {
         let name = &self.name;
         if name.starts_with('/') || name.get(1..2) == Some(":") {
@@ -62,12 +61,12 @@ impl Entry {
     }
 }
 
-/// Returns the path of an entry as the most lenient file system understands its name. Windows and
-/// macOS ignore capitals. Windows drops full stops and spaces at the end of a part, and takes the
-/// text after a colon for a stream of the file.
+/// Returns the path under which the most lenient file system would store an entry. Windows and macOS ignore capitals.
+/// Windows drops full stops and spaces at the end of a part, and treats the text after a colon as the name of a
+/// stream of the file.
 ///
-/// Two entries with the same place would overwrite each other on some systems. An archive with such
-/// entries is refused on every system, so that an FMU consists of the same files everywhere.
+/// Two entries with the same place would overwrite each other on some systems. An archive with such entries is refused
+/// on every system, so that an FMU consists of the same files everywhere.
 pub fn place(name: &str) -> String {
     let part = |part: &str| {
         let file = part.split(':').next().unwrap_or_default();
@@ -80,8 +79,7 @@ pub struct Archive {
     file: File,
     /// Entries in the order of the zip directory, with repeated names, up to the first fault.
     pub entries: Vec<Entry>,
-    /// Error in the directory, or the limit that is exceeded. If there is one, nothing of the archive should
-    /// be unpacked.
+    /// Error in the directory, or the limit that is exceeded. If there is a fault, no file of the archive should be unpacked.
     pub fault: Option<String>,
 }
 
@@ -90,8 +88,7 @@ impl Archive {
     ///
     /// # Errors
     ///
-    /// If the file cannot be read. A file that is not a valid archive is no error; [`Archive::fault`] has the
-    /// reason.
+    /// If the file cannot be read. A file that is not a valid archive is not an error; [`Archive::fault`] then has the reason.
     pub fn open(path: &Path) -> Result<Archive> {
         let name = path.display();
         let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
@@ -146,12 +143,12 @@ impl Archive {
         Ok(())
     }
 
-    /// Checks that the archive can be unpacked: it is complete, within the limits, every name stays inside
-    /// the folder, and each file has a [`place`] of its own.
+    /// Checks that the archive can be unpacked: it is complete and within the limits, every name stays inside the
+    /// folder, and no two files have the same [`place`].
     ///
     /// # Errors
     ///
-    /// The first of these conditions that is not fulfilled.
+    /// If one of these conditions is not fulfilled; the message states the first.
     pub fn check(&self) -> Result<()> {
         if let Some(why) = &self.fault {
             bail!("{why}");
@@ -189,7 +186,7 @@ impl Archive {
         }
         let mut reader = BufReader::new(&self.file);
         let file = entry.zip.as_ref().with_reader(&mut reader, ZipReadOptions::new())?;
-        // One byte more than the header says, to notice a longer file.
+        // One byte more than the header states is read, so that a longer file is noticed.
         let size = std::io::copy(&mut file.take(said.saturating_add(1)), to).map_err(|why| {
             match why.kind() {
                 ErrorKind::InvalidInput | ErrorKind::InvalidData => {
@@ -218,7 +215,7 @@ impl Archive {
             made.map_err(anyhow::Error::from)
                 .and_then(|()| match entry.is_folder() {
                     true => Ok(()),
-                    // A file system may have further names for an existing file, so that it must never be
+                    // A file system may give an existing file further names, so that an existing file must never be
                     // overwritten.
                     false => self.copy(entry, &mut File::create_new(&path)?),
                 })

@@ -1,8 +1,7 @@
-//! Reads the requirements and the exported functions of an FMU's binary from the file, for any platform.
+//! Reads from the file of an FMU's binary, for any platform, what it requires and which functions it exports.
 //!
-//! An FMU is loaded by programs that its author has never seen, for example MATLAB on an old Linux cluster or
-//! on Windows without development tools. If a library or a symbol version is missing there, the FMU cannot be
-//! loaded at all.
+//! FMUs are loaded by programs that their author has never seen, for example MATLAB on an old Linux cluster or on Windows
+//! without development tools. If a library or a symbol version is missing there, the FMU cannot be loaded at all.
 
 use std::fmt;
 
@@ -19,7 +18,7 @@ use crate::symbol::readable;
 /// Newest version of glibc that a binary may need: the version in the oldest Linux on which simulation tools still
 /// run.
 pub const GLIBC: Version = Version(2, 17);
-/// Newest version of macOS that a binary may need: the first one for both architectures.
+/// Newest version of macOS that a binary may need: the oldest version that runs on both architectures.
 pub const MACOS: Version = Version(11, 0);
 
 const NAMED: usize = 8;
@@ -122,15 +121,15 @@ impl Binary {
         Ok(binary)
     }
 
-    /// Lists everything that would keep the binary from loading on a machine without development tools, or a
-    /// host from finding the functions `wanted`. Each item is a sentence.
+    /// Lists all reasons why the binary could not be loaded on a machine without development tools, or why a host would
+    /// not find the functions `wanted`. Each item is a sentence.
     pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
         let (loading, lacking) = (self.loading_faults(), self.lacking(wanted));
         loading.into_iter().chain(lacking).chain(self.surplus()).collect()
     }
 
-    /// Lists what would keep the binary from loading on a machine without development tools.
-    /// Machines with each processor of the binary's platform are considered.
+    /// Lists the reasons why the binary could not be loaded on machines without development tools, for each
+    /// processor of its platform.
     pub fn loading_faults(&self) -> Vec<String> {
         self.loading_faults_for(match self.kind {
             Kind::Linux | Kind::Windows => &["x86_64"],
@@ -139,7 +138,7 @@ impl Binary {
         })
     }
 
-    /// Lists what would keep the binary from loading on machines with these processors.
+    /// Lists the reasons why the binary could not be loaded on machines with these processors.
     pub fn loading_faults_for(&self, architectures: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
         let (libraries, newest): (&[&str], _) = match self.kind {
@@ -159,30 +158,29 @@ impl Binary {
         if let (Some((system, newest)), Some(needed)) = (newest, self.needs)
             && needed > newest
         {
-            faults.push(format!("it needs {system} {needed}; {newest} must do"));
+            faults.push(format!("it needs {system} {needed} (allowed: at most {newest})"));
         }
         for path in &self.search_paths {
-            faults.push(format!("it has the loader search {path}"));
+            faults.push(format!("it makes the loader search {path} for libraries"));
         }
         if let Some(fault) = &self.signature {
-            faults.push(format!("macOS would not load its arm64 half: {fault}"));
+            faults.push(format!("macOS would not load its part for arm64: {fault}"));
         }
         faults
     }
 
-    /// Lists the functions of `wanted` that the binary does not export, in one sentence; `None` if none is
-    /// missing.
+    /// Returns a sentence with the functions of `wanted` that the binary does not export, or `None` if it exports all.
     pub fn lacking(&self, wanted: &[&str]) -> Option<String> {
         let lacking: Vec<_> =
             wanted.iter().filter(|w| !self.exports.iter().any(|e| e == **w)).copied().collect();
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
     }
 
-    /// Lists the exports that are not functions of FMI, in one sentence; `None` if there are none.
+    /// Returns a sentence with the exports that are not functions of FMI, or `None` if there are none.
     pub fn surplus(&self) -> Option<String> {
-        // macOS binds a name to the library that it comes from, so that further exports do no harm there;
-        // and the linker for macOS exports some of Rust's names when it runs on other systems. One library
-        // may serve several versions of FMI (FMI 3.0.2, section 2.5).
+        // On macOS further exports do no harm, because a name is bound to the library from which it comes; and the
+        // linker for macOS exports some of Rust's names when it runs on other systems. One library may serve several
+        // versions of FMI (FMI 3.0.2, section 2.5).
         let own = |name: &&str| name.starts_with("fmi2") || name.starts_with("fmi3");
         let others = || self.exports.iter().map(String::as_str).filter(|name| !own(name));
         let count = others().count();
@@ -268,8 +266,8 @@ fn linux(bytes: &[u8]) -> Result<Binary> {
     Ok(binary)
 }
 
-/// Parses the name of a symbol version: 2.14 for `GLIBC_2.14`. Only two parts of the number are
-/// kept, so that `GLIBC_2.2.5` gives 2.2.
+/// Parses the name of a symbol version, for example 2.14 for `GLIBC_2.14`. Only two parts of the number are returned,
+/// so that `GLIBC_2.2.5` gives 2.2.
 fn glibc_version(name: &str) -> Option<Version> {
     let mut numbers = name.strip_prefix("GLIBC_")?.split('.').map(str::parse);
     Some(Version(numbers.next()?.ok()?, numbers.next()?.ok()?))
@@ -292,7 +290,7 @@ fn macos(bytes: &[u8]) -> Result<Binary> {
     let endian = file.endian();
     let mut binary = common(Kind::MacOs, &file)?;
     for name in &mut binary.exports {
-        // macOS writes an underscore before the names of C functions.
+        // On macOS the names of C functions begin with an underscore.
         if let Some(plain) = name.strip_prefix('_') {
             *name = plain.into();
         }
@@ -308,7 +306,7 @@ fn macos(bytes: &[u8]) -> Result<Binary> {
                 binary.search_paths.push(text(command.string(endian, path.path)?));
             }
             LoadCommandVariant::BuildVersion(version) => {
-                // Version in the form xxxx.yy.zz.
+                // version in the form xxxx.yy.zz
                 let oldest = version.minos.get(endian);
                 binary.needs = Some(Version(oldest >> 16, (oldest >> 8) & 0xff));
             }
@@ -361,7 +359,7 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
         if !is(0, SIGNATURE) {
             return None;
         }
-        // A magic number, a length and a count, then a type and an offset for each blob.
+        // a magic number, a length and a count, then the type and the offset of each blob
         let directory =
             (0..number(8)?).filter_map(|i| number(16 + 8 * i)).find(|at| is(*at, DIRECTORY))?;
         let hashes = directory + number(directory + 16)?;
@@ -392,7 +390,7 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
 pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     const ALIGNMENT: u32 = 14; // 2^14: arm64's pages are the larger ones
     let page = 1 << ALIGNMENT;
-    // The head consists of magic number, count, and five numbers for each part, all big-endian.
+    // The head consists of a magic number, a count, and five numbers for each part, all big-endian.
     let mut head = vec![macho::FAT_MAGIC, parts.len() as u32];
     let mut body = vec![0; page];
     for part in parts {
@@ -454,8 +452,7 @@ mod tests {
         }
     }
 
-    /// A binary that needs a library and a glibc that not every system has, that exports other
-    /// names, and that has a search path has all of these reported at once.
+    /// The binary needs a library and a glibc that not every system has, exports other names, and has a library search path.
     #[test]
     fn all_faults_of_a_binary_are_reported_at_once() {
         let mut linux = good(Kind::Linux);
@@ -467,8 +464,8 @@ mod tests {
             linux.faults(&["fmi2DoStep", "fmi2Reset"]),
             [
                 "it needs libgcc_s.so.1, which is not guaranteed on every system",
-                "it needs glibc 2.34; 2.17 must do",
-                "it has the loader search /opt/lib",
+                "it needs glibc 2.34 (allowed: at most 2.17)",
+                "it makes the loader search /opt/lib for libraries",
                 "it does not export fmi2Reset",
                 "it also exports rust_eh_personality",
             ]

@@ -1,5 +1,5 @@
-//! The C interface as a host sees it in any version of FMI: status, messages, the process state that an FMU
-//! shares with its host, and loading a library.
+//! The C interface as a host sees it in any version of FMI: status, messages, loading of libraries, and the process
+//! state that an FMU shares with its host.
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
@@ -23,7 +23,7 @@ pub mod version;
 pub enum Status {
     Ok,
     Warning,
-    /// The FMU refused the step, because it cannot compute it.
+    /// The FMU has refused the step, because it cannot compute it.
     Discard,
     Error,
     Fatal,
@@ -50,10 +50,10 @@ struct Sink {
     uncategorised: AtomicUsize,
 }
 
-/// Receivers of the messages of all living instances. The key is the environment pointer that an
-/// FMU passes back to the callbacks.
+/// Receivers of the messages of all existing instances. The key is the environment pointer that an FMU passes
+/// back to the callbacks.
 ///
-/// An FMU may pass any pointer. The callbacks look it up in this map and never follow it.
+/// An FMU may pass a wrong pointer. The callbacks only look the pointer up in this map, and never dereference it.
 static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
 
 static FOREIGN: AtomicUsize = AtomicUsize::new(0);
@@ -76,8 +76,8 @@ pub(crate) fn count_foreign_environment() {
     FOREIGN.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Environment of an instance. It receives the instance's messages until it is dropped, which must be after
-/// the instance.
+/// Environment of an instance. It receives the messages of the instance until it is dropped, which must happen after
+/// the instance is freed.
 pub(crate) struct Environment {
     sink: Arc<Sink>,
 }
@@ -97,8 +97,8 @@ impl Environment {
         Arc::as_ptr(&self.sink).cast_mut().cast()
     }
 
-    /// Records that a call of the instance begins on this thread, so that messages with a wrong environment
-    /// can be assigned.
+    /// Records that a call of the instance begins on this thread, so that messages with a wrong environment can be
+    /// assigned to the instance.
     pub(crate) fn begin_call(&self) {
         CALLED.set(self.address());
     }
@@ -124,8 +124,8 @@ impl Sink {
     }
 }
 
-/// Returns the receiver of messages with this environment pointer. If no instance has this pointer, the message is assigned
-/// to the instance that this thread called last, or to the only instance.
+/// Returns the receiver of messages with this environment pointer. If no instance has this pointer, the message is
+/// assigned to the instance that this thread called last or, if there is only one instance, to this one.
 fn find_sink(environment: *mut c_void) -> Option<Arc<Sink>> {
     let sinks = sinks();
     if let Some(sink) = sinks.get(&(environment as usize)) {
@@ -150,17 +150,17 @@ pub(crate) extern "C" fn log_message(
     }
     let mut messages = sink.lock();
     if messages.len() < MESSAGES_KEPT {
-        // SAFETY: terminated strings of the FMU, or of the shim.
+        // SAFETY: the FMU, or `logger.c`, passes terminated strings.
         let (category, text) = unsafe { (copy_text(category), copy_text(text)) };
         messages.push(Message { status: status.into(), category, text });
     }
 }
 
-/// Copies a text of an FMU, which is valid only until the next call. NULL becomes an empty text.
+/// Copies a text of an FMU, because the text is valid only until the next call. NULL becomes an empty text.
 ///
 /// # Safety
 ///
-/// The pointer is NULL or points to a terminated string.
+/// The pointer must be NULL or point to a terminated string.
 pub(crate) unsafe fn copy_text(text: *const c_char) -> String {
     match text.is_null() {
         true => String::new(),
@@ -172,7 +172,7 @@ pub(crate) fn c_string(text: Option<&str>) -> Option<CString> {
     text.map(|text| CString::new(text).unwrap_or_default())
 }
 
-/// Returns the pointer to a text for a C function, or NULL for `None`. The text must outlive the pointer.
+/// Returns the pointer to a text for a C function, or NULL for `None`. The text must exist as long as the pointer is used.
 pub(crate) fn pointer(text: &Option<CString>) -> *const c_char {
     text.as_ref().map_or(null(), |text| text.as_ptr())
 }
@@ -214,7 +214,7 @@ impl std::fmt::Display for CallError {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let (call, status) = (self.call, self.status);
         match call.get(..4) {
-            _ if call.contains("Instantiate") => write!(f, "{call} gave no instance")?,
+            _ if call.contains("Instantiate") => write!(f, "{call} returned no instance")?,
             Some(version) => write!(f, "{call} returned {version}{status:?}")?,
             None => write!(f, "{call} returned {status:?}")?,
         }
@@ -235,8 +235,8 @@ pub(crate) struct Function<T> {
     pub call: T,
 }
 
-/// Declares a table of C functions with field, symbol and type of each. A table for both versions of FMI has
-/// one symbol per version.
+/// Declares a table of C functions with field, symbol and type of each function. A table for both versions of FMI has
+/// one symbol for each version.
 macro_rules! functions {
     ($table:ident $(<$boolean:ident>)?: $($field:ident $($symbol:literal)+, $type:ty;)*) => {
         pub(crate) struct $table $(<$boolean>)? {
@@ -249,7 +249,7 @@ macro_rules! functions {
             }
 
             /// # Safety
-            /// The library must be a binary of that version of FMI: the types are taken on trust.
+            /// The library must be a binary of this version of FMI, because the types of its functions cannot be checked.
             pub(crate) unsafe fn load(
                 library: &libloading::Library,
                 version: usize,
@@ -277,8 +277,7 @@ pub struct HostState {
 
 impl HostState {
     pub fn now() -> Self {
-        // SAFETY: the three take nothing; the locale's name is a terminated string of the C
-        // library.
+        // SAFETY: the three functions have no arguments; the locale's name is a terminated string of the C library.
         unsafe {
             HostState {
                 float_control: hubslosh_float_control(),
@@ -320,11 +319,11 @@ pub(crate) struct Loaded {
     pub binary: String,
 }
 
-/// Loads the library `identifier` of the FMU that is unpacked in `directory`. Errors call the FMU `name`.
+/// Loads the library `identifier` of the FMU that is unpacked in `directory`. `name` is the FMU's name in error messages.
 ///
 /// # Errors
 ///
-/// If there is no such library for the platform, or it cannot be loaded; the text says why.
+/// If there is no such library for the platform, or it cannot be loaded; the message states the reason.
 pub(crate) fn load(
     directory: &Path,
     name: &Path,
@@ -332,7 +331,7 @@ pub(crate) fn load(
     identifier: &str,
 ) -> Result<Loaded> {
     let name = name.display();
-    // A library outside the archive is not part of the FMU.
+    // A library outside the archive would not be part of the FMU.
     if identifier.contains(['/', '\\', ':', '\0']) {
         bail!(
             "the FMU {name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \
@@ -356,9 +355,9 @@ pub(crate) fn load(
     let hash = sha256(&bytes);
     guard::before_loading();
     let (before, calls) = (HostState::now(), Calls::one());
-    // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
+    // SAFETY: loading runs the initialisers of the library, which is the purpose of opening an FMU.
     let library = unsafe { Library::new(&path) }.map_err(|error| {
-        // The loader's error names the undefined symbol in its cause.
+        // The cause of the loader's error contains the name of the undefined symbol.
         let error = format!("{:#}", anyhow::Error::new(error));
         let needs = explain_needs(&error);
         anyhow!(with_readable_symbol(&error))
@@ -379,8 +378,8 @@ fn with_readable_symbol(error: &str) -> String {
     }
 }
 
-/// Returns an explanation if the loader's message shows that the binary needs a Python interpreter in the
-/// host process; otherwise an empty text.
+/// Returns an explanation if the loader's message shows that the binary needs a host process with a Python interpreter;
+/// otherwise an empty text.
 fn explain_needs(error: &str) -> &'static str {
     let symbol = error.split("undefined symbol: ").nth(1).unwrap_or_default();
     match symbol.trim_start_matches('_').starts_with("Py") {
@@ -394,7 +393,7 @@ fn explain_needs(error: &str) -> &'static str {
 
 pub(crate) fn missing_functions(library: &Library, symbols: &[&'static str]) -> Vec<&'static str> {
     let is_there = |symbol: &&&str| {
-        // SAFETY: only asked whether the symbol is there.
+        // SAFETY: the symbol is only looked up, not used.
         unsafe { library.get::<*const std::ffi::c_void>(**symbol) }.is_ok()
     };
     symbols.iter().filter(|symbol| !is_there(symbol)).copied().collect()

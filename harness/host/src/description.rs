@@ -1,10 +1,9 @@
 //! Reads `modelDescription.xml` (FMI 2.0, section 2.2; FMI 3.0, section 2.4) as far as a host needs it to run
 //! the FMU.
 //!
-//! Both versions are read into the same structures: a Float64 of FMI 3.0 is a Real here, its
-//! instantiationToken is the GUID, and an alias is a variable with the same reference. An array becomes one
-//! variable per element, for example `x[1,2]`, as in FMI 2.0; [`ModelDescription::element`] returns its
-//! position.
+//! Both versions are read into the same structures: a Float64 of FMI 3.0 becomes a Real, its instantiationToken becomes
+//! the GUID, and an alias becomes a variable with the same value reference. An array becomes one variable for each
+//! element, for example `x[1,2]`, as in FMI 2.0; [`ModelDescription::element`] returns the position of an element.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -44,7 +43,7 @@ pub struct Array {
     pub length: usize,
     pub c_type: CType,
     pub start: Vec<String>,
-    /// True if structural parameters change its size, so that the declared start values have no meaning.
+    /// True if structural parameters have changed the array's size, so that its declared start values have no meaning.
     pub(crate) is_resized: bool,
 }
 
@@ -91,8 +90,8 @@ impl BaseUnit {
     /// Base units of FMI and SSP, which are the base units of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
-    /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if it is missing or one of its numbers
-    /// is not valid.
+    /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if the child is missing or one of its
+    /// numbers is not valid.
     pub fn from_element(unit: &Element) -> Option<BaseUnit> {
         let base = unit.child("BaseUnit")?;
         let mut exponents = [0; 8];
@@ -132,8 +131,7 @@ pub struct Item {
 #[derive(Clone, Debug)]
 pub struct Variable {
     pub name: String,
-    /// Value reference. An element of an array has a number that this host assigns and that no other variable
-    /// has.
+    /// Value reference. For an element of an array, the host assigns a number that no other variable has.
     pub reference: u32,
     pub causality: Causality,
     /// Variability; `Other` with an empty text if it is missing.
@@ -325,8 +323,8 @@ impl Reader {
         }
     }
 
-    /// Reads a required attribute of an element with `read`. If the attribute is missing or not
-    /// valid, a problem is added, and the default is returned.
+    /// Reads a required attribute of an element with `read`. If the attribute is missing or not valid, adds a problem
+    /// and returns the default.
     fn required<T: Default>(
         &mut self,
         element: &Element,
@@ -368,7 +366,7 @@ impl Reader {
     }
 
     fn item(&mut self, element: &Element) -> Item {
-        // Item values have 32 bits in FMI 2.0 and 64 bits in FMI 3.0.
+        // Values of items have 32 bits in FMI 2.0 and 64 bits in FMI 3.0.
         let is_fmi3 = self.is_fmi3;
         let fits = |n: &i64| is_fmi3 || i32::try_from(*n).is_ok();
         let value = self.required(element, "value", |text| text.trim().parse().ok().filter(fits));
@@ -438,8 +436,8 @@ impl Reader {
         }
     }
 
-    /// Reads the variables of FMI 3.0 with their aliases; an array becomes one variable per element. `set`
-    /// has the values of structural parameters, by value reference, that differ from the declared ones.
+    /// Reads the variables of FMI 3.0 with their aliases; an array becomes one variable for each element. `set` has the
+    /// values of structural parameters that differ from the declared values, by value reference.
     fn variables3(
         &mut self,
         root: &Element,
@@ -548,8 +546,8 @@ impl Reader {
         dimensions
     }
 
-    /// Returns the aliases of a variable as variables. The variable is set and recorded only by its first
-    /// name.
+    /// Returns the aliases of a variable as variables that cannot be set, because a variable is set and recorded only
+    /// by its first name.
     fn aliases(&mut self, element: &Element, variable: &Variable) -> Vec<Variable> {
         let mut aliases = Vec::new();
         for alias in element.children.iter().filter(|child| child.name == "Alias") {
@@ -607,7 +605,7 @@ pub fn starts(element: &Element, c_type: CType) -> Vec<String> {
     }
 }
 
-/// Converts a row-major index, counted from 0, to indices from 1, separated by commas.
+/// Converts a row-major index, counted from 0, to indices that are counted from 1 and separated by commas.
 fn indices(mut index: usize, dimensions: &[usize]) -> String {
     let mut all = Vec::new();
     for size in dimensions.iter().rev() {
@@ -640,7 +638,7 @@ impl ModelDescription {
         Ok((text, description))
     }
 
-    /// Checks that the FMI version is 2.0 or 3.
+    /// Checks that the version of FMI is 2.0 or 3.
     ///
     /// # Errors
     ///
@@ -689,8 +687,8 @@ impl ModelDescription {
     ///
     /// # Errors
     ///
-    /// If it is not well-formed, is of another version of FMI, or lacks what a host needs; the text names
-    /// what is missing.
+    /// If the text is not well-formed, is of another version of FMI, or lacks data that a host needs; the message
+    /// names the missing data.
     pub fn from_xml(text: &str) -> Result<Self> {
         ModelDescription::from_xml_with(text, &BTreeMap::new())
     }
@@ -705,7 +703,7 @@ impl ModelDescription {
     }
 
     pub(crate) fn from_element(root: &Element, set: &BTreeMap<u32, Value>) -> Result<Self> {
-        // Checked first, because an FMU of another version would otherwise be reported as incomplete.
+        // The version is checked first, because an FMU of another version would otherwise be reported as incomplete.
         let version = root.get("fmiVersion").unwrap_or("2.0");
         let is_fmi3 = version.starts_with("3.");
         if !is_fmi3 && !version.starts_with("2.") {
@@ -769,7 +767,7 @@ impl ModelDescription {
     ///
     /// # Errors
     ///
-    /// If there is none; the text suggests similar names.
+    /// If there is no variable with this name; the message suggests similar names.
     pub fn variable(&self, name: &str) -> Result<&Variable> {
         self.variables.iter().find(|v| v.name == name).with_context(|| {
             let names = self.variables.iter().map(|v| v.name.as_str());
@@ -867,7 +865,7 @@ impl ModelDescription {
     ///
     /// # Errors
     ///
-    /// If the text does not fit the type; the message says what is allowed.
+    /// If the text is not a value of the variable's type; the message states the allowed values.
     pub fn value(&self, variable: &Variable, text: &str) -> Result<Value> {
         let name = &variable.name;
         let text = text.trim();
@@ -1037,10 +1035,10 @@ mod tests {
         assert_eq!((d.unit(last), last.intermediate), ("rad", true));
     }
 
-    /// A structural parameter n is set to 3: an array of n by n has 9 elements, and its declared start values no longer
-    /// apply.
+    /// A structural parameter n is set to 3. An array of n by n then has 9 elements, and its declared start
+    /// values do not apply.
     #[test]
-    fn arrays_have_the_size_that_a_structural_parameter_is_set_to_and_no_start_values_then() {
+    fn structural_parameters_set_the_size_of_arrays_whose_start_values_then_do_not_apply() {
         let set = BTreeMap::from([(7, Value::Integer(3))]);
         let mut d = ModelDescription::from_xml_with(XML3, &set).unwrap();
         assert_eq!(d.variable("n").unwrap().attributes().start.as_deref(), Some("3"));

@@ -1,6 +1,6 @@
-//! Runs an FMU of either version of FMI. Inputs are set at every communication point: Reals with their slope
-//! until the next point; integers, enumerations and Booleans are held. An FMU that was opened for Model
-//! Exchange is integrated between the communication points ([`exchange`]).
+//! Runs an FMU of either version of FMI. Inputs are set at every communication point: Reals with their slope until the
+//! next point, whereas integers, enumerations and Booleans are held. An FMU that was opened for Model Exchange is
+//! integrated between the communication points by [`exchange`].
 
 use std::borrow::Cow;
 
@@ -25,15 +25,15 @@ pub struct Inputs {
 /// Relative tolerance of the host's solver in Model Exchange, if neither the user nor the default
 /// experiment gives one.
 const TOLERANCE: f64 = 1e-6;
-/// Deviation of an input from the line that its slope gives, relative to its magnitude, above which
-/// the input jumps, which is an event.
+/// Deviation of an input from the value that its slope predicts, relative to its magnitude, above which the input
+/// jumps. A jump is an event.
 const JUMP: f64 = 1e-9;
 
 /// The inputs between two communication points: value and slope of each input, in the order of [`Inputs`].
 pub struct Course<'a> {
     pub values: &'a mut [f64],
-    /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot
-    /// interpolate or the inputs are held.
+    /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot interpolate its
+    /// inputs or if the inputs are held.
     pub slopes: &'a mut [f64],
 }
 
@@ -68,7 +68,7 @@ impl Inputs {
         matches!(kind, Type::Real | Type::Integer | Type::Enumeration | Type::Boolean)
     }
 
-    /// Initialises an instance whose start values are set. `values` are the inputs at the start; times in s.
+    /// Initialises an instance whose start values have been set. `values` are the inputs at the start. Times are in s.
     pub fn initialise(
         &self,
         instance: &mut Instance,
@@ -82,9 +82,9 @@ impl Inputs {
         instance.exit_initialization_mode()
     }
 
-    /// Simulates an initialised instance from `start`, s. At every communication point `at` receives the
-    /// instance and the time, reads outputs, writes the inputs until the next point, and returns the time of
-    /// that point, or `None` to end the run.
+    /// Simulates an initialised instance from `start`, s. At every communication point `at` receives the instance and
+    /// the time, reads outputs, writes the inputs until the next point, and returns the time of the next point, or
+    /// `None` to end the run.
     ///
     /// # Errors
     ///
@@ -110,8 +110,8 @@ impl Inputs {
         Ok(())
     }
 
-    /// Simulates as [`Inputs::drive`] does, but in Model Exchange. If an input deviates from its slope, or an input other
-    /// than a Real changes, this is an event.
+    /// Simulates as [`Inputs::drive`] does, but in Model Exchange. An input that deviates from its slope, and a change
+    /// of an input that is not a Real, are events.
     fn integrate<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,
@@ -122,7 +122,7 @@ impl Inputs {
         let count = self.places.len() + self.discrete.len();
         let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
         let mut run = exchange::Run::new(instance, tolerance, start, exchange::MOST_STEPS)?;
-        // Values, slopes and time of the inputs since the last communication point.
+        // values, slopes and time of the inputs at the last communication point
         let mut last: Option<(Vec<f64>, Vec<f64>, f64)> = None;
         let mut t = start;
         while let Some(next) =

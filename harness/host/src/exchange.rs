@@ -2,10 +2,10 @@
 //! Appl. Math. 6, 1980), with events located on its continuous extension (Hairer, Nørsett, Wanner, Solving
 //! Ordinary Differential Equations I, II.6).
 //!
-//! A state event is a sign change of an indicator (FMI 2.0.5, section 3.1.1); it is located by bisection to
-//! [`LOCATED`] of the step. Time events, and events that completedIntegratorStep requests, are handled as
-//! they occur. If events accumulate, for example in chattering, each one still advances the time by [`APART`]
-//! of the distance to the next row, so that the run ends.
+//! A state event is a sign change of an event indicator (FMI 2.0.5, section 3.1.1); its time is located by bisection to
+//! [`LOCATED`] of the step. Time events, and events that completedIntegratorStep requests, are handled when they occur.
+//! If events accumulate, for example in chattering, each event still advances the time by [`APART`] of the distance to
+//! the next row, so that the run ends.
 
 use std::ops::DerefMut;
 
@@ -62,13 +62,13 @@ pub struct Run<I> {
     h: f64,
     next_event: Option<f64>,
     most_steps: usize,
-    /// The inputs: value references, values and slopes, and the time for which the values hold.
+    /// The inputs: value references, values, slopes, and the time at which the values hold.
     inputs: (Vec<u32>, Vec<f64>, Vec<f64>, f64),
 }
 
 impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
-    /// Starts a simulation from an instance in event mode, as initialisation leaves it. `tolerance` is
-    /// relative; `most_steps` limits the number of steps between two rows.
+    /// Starts a simulation from an instance in event mode, the mode after initialisation. `tolerance` is relative;
+    /// `most_steps` limits the number of steps between two rows.
     pub fn new(mut instance: I, tolerance: f64, start: f64, most_steps: usize) -> Result<Self> {
         let (states, indicators) = instance.sizes()?;
         let mut run = Run {
@@ -100,7 +100,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         self.update()
     }
 
-    /// Sets the values and slopes of Real inputs from now on. `jump` says that one of them is discontinuous,
+    /// Sets the values and slopes of Real inputs from now on. `jump` is true if one of the inputs is discontinuous,
     /// which is an event.
     pub fn drive(
         &mut self,
@@ -177,8 +177,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(dx)
     }
 
-    /// Returns true if an event indicator changes sign between the present point and the states `x`
-    /// at the time `t`.
+    /// Returns true if an event indicator has another sign at the time `t` with the states `x` than at the present point.
     fn crosses(&mut self, t: f64, x: &[f64]) -> Result<bool> {
         if self.z.is_empty() {
             return Ok(false);
@@ -235,7 +234,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             let (mut to, mut x_to) = (if ends_row { limit } else { t + h }, new.clone());
             let crossed = self.crosses(to, &x_to)?;
             if crossed {
-                // The first time after the sign change.
+                // the last fraction of the step before the sign change, and the first after it
                 let (mut before, mut after) = (0.0, 1.0);
                 while after - before > LOCATED {
                     let middle = 0.5 * (before + after);
@@ -252,7 +251,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             self.go_to(to, &x_to)?;
             (self.t, self.x) = (to, x_to);
             let grown = h * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
-            // A step that was shortened gives no reason to shorten the next one.
+            // A step that was shortened to end at a point is no reason to shorten the next step.
             self.h = match crossed || h < self.h {
                 true => self.h.max(grown),
                 false => grown,

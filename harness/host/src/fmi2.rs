@@ -1,8 +1,8 @@
-//! The part of the C interface that only FMI 2.0 has: its types, the functions whose types differ from FMI
-//! 3.0, and calls for tests. [`crate::c_abi::version`] has the rest.
+//! The part of the C interface that only FMI 2.0 has: its types, the functions whose types differ from FMI 3.0, and
+//! calls for tests. The rest is in [`crate::c_abi::version`].
 //!
-//! The unsafe code of the harness is in this file, `c_abi.rs`, `fmi3.rs` and `harness/native/src/instance.rs`
-//! (`tests/architecture.rs`).
+//! Unsafe code of the harness is only in this file, `c_abi.rs`, `fmi3.rs` and `harness/native/src/instance.rs`
+//! (`tests/architecture.rs` checks this).
 #![allow(unsafe_code)]
 
 use std::ffi::{c_char, c_int, c_void};
@@ -114,7 +114,7 @@ pub struct EventInfo {
 impl<T> Getter<T> for Get<T> {
     unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int {
         assert_eq!(references.len(), values.len());
-        // SAFETY: two slices of the length given.
+        // SAFETY: both slices have the length that is passed.
         unsafe { self(component, references.as_ptr(), references.len(), values.as_mut_ptr()) }
     }
 }
@@ -122,7 +122,7 @@ impl<T> Getter<T> for Get<T> {
 impl<T> Setter<T> for Set<T> {
     unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int {
         assert_eq!(references.len(), values.len());
-        // SAFETY: two slices of the length given.
+        // SAFETY: both slices have the length that is passed.
         unsafe { self(component, references.as_ptr(), references.len(), values.as_ptr()) }
     }
 }
@@ -145,7 +145,7 @@ impl Version for Fmi2 {
     }
 
     unsafe fn load(library: &Library) -> Result<Self, libloading::Error> {
-        // SAFETY: as promised.
+        // SAFETY: the caller has the same obligations.
         unsafe {
             Ok(Fmi2 {
                 functions: Functions::load(library, 0)?,
@@ -183,7 +183,7 @@ impl Version for Fmi2 {
 
     fn set_slopes(instance: &mut Instance, references: &[u32], slopes: &[f64]) -> Called {
         assert_eq!(references.len(), slopes.len());
-        // Steps must not allocate memory, so the references are set in groups of the length of `ones`.
+        // Steps must not allocate memory, so that the references are set in groups of at most the length of `ones`.
         let ones = [1; 16];
         for (some, slopes) in references.chunks(ones.len()).zip(slopes.chunks(ones.len())) {
             instance.set_real_input_derivatives(some, &ones[..some.len()], slopes)?;
@@ -251,7 +251,7 @@ impl Version for Fmi2 {
         let (reference, functions) = ([reference], instance.functions());
         values.iter().try_for_each(|value| match value {
             Value::Real(value) => instance.write(functions.set_real, &reference, &[*value]),
-            // The value fits 32 bits, because `ModelDescription::value` has checked it.
+            // `ModelDescription::value` has checked that the value has 32 bits.
             Value::Integer(value) => {
                 instance.write(functions.set_integer, &reference, &[*value as i32])
             }
@@ -322,11 +322,11 @@ impl Fmu {
     }
 
     pub fn types_platform(&self) -> String {
-        // SAFETY: takes nothing, returns a constant string.
+        // SAFETY: the function has no arguments and returns a constant string.
         unsafe { copy_text((self.own.functions.get_types_platform.call)()) }
     }
 
-    /// Returns the arguments that [`Fmu::instantiate`] uses, which tests of bad calls modify.
+    /// Returns the arguments that [`Fmu::instantiate`] uses; tests of wrong calls modify them.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         Instantiation {
             name: Some(name),
@@ -341,12 +341,12 @@ impl Fmu {
         }
     }
 
-    /// Calls fmi2Instantiate with exactly these arguments, even if they are not valid, for tests.
+    /// Calls fmi2Instantiate with exactly these arguments, which may be wrong in tests.
     pub fn instantiate_with(&self, with: &Instantiation) -> Result<Instance<'_>, CallError> {
         let (name, guid, resources) =
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
         static ONCE: Once = Once::new();
-        // SAFETY: the function lives as long as the program.
+        // SAFETY: the function exists as long as the program.
         ONCE.call_once(|| unsafe { hubslosh_set_log_message(c_abi::log_message) });
         let environment = Environment::new();
         let full = matches!(with.callbacks, Callbacks::Full | Callbacks::Fleeting);
@@ -360,7 +360,7 @@ impl Fmu {
         }));
         let instantiate = self.own.functions.instantiate;
         self.create_instance(instantiate.name, environment, Given(callbacks), || {
-            // SAFETY: strings and callbacks outlive the call; the callbacks outlive the instance.
+            // SAFETY: strings and callbacks exist until the call has returned; the callbacks exist longer than the instance.
             let component = unsafe {
                 (instantiate.call)(
                     pointer(&name),
@@ -373,7 +373,7 @@ impl Fmu {
                 )
             };
             if with.callbacks == Callbacks::Fleeting {
-                // SAFETY: made above, read by nobody any more.
+                // SAFETY: the struct was created above, and nobody reads it any more.
                 unsafe { callbacks.write_bytes(0, 1) };
             }
             component
@@ -384,8 +384,8 @@ impl Fmu {
         let c: Component = null_mut();
         let (mut i, mut x, mut n, mut s, mut t) = (0, 0.0, 0, null_mut(), null());
         let mut answers = Vec::new();
-        // SAFETY: the FMU must refuse a NULL instance before it touches anything else; every other
-        // pointer is valid or comes with the length 0. So in the next ones.
+        // SAFETY: the FMU must refuse a NULL instance before it uses anything else. All other pointers are valid or
+        // have the length 0. The same holds for the following calls.
         answers.extend(unsafe {
             answers! { self.common, c;
                 set_debug_logging(0, 0, null()),
@@ -400,7 +400,7 @@ impl Fmu {
                 deserialize_fmu_state(null(), 0, &mut s),
             }
         });
-        // SAFETY: see above.
+        // SAFETY: the same as in the call above.
         answers.extend(unsafe {
             answers! { self.own.functions, c;
                 setup_experiment(0, 0.0, 0.0, 0, 0.0),
@@ -408,10 +408,10 @@ impl Fmu {
                 get_directional_derivative(null(), 0, null(), 0, null(), null_mut()),
             }
         });
-        // SAFETY: see above.
+        // SAFETY: the same as in the call above.
         answers.extend(unsafe { self.own.functions.nothing(c) });
         if let Some(f) = &self.own.stepping {
-            // SAFETY: see above.
+            // SAFETY: the same as in the call above.
             answers.extend(unsafe {
                 answers! { f, c;
                     set_real_input_derivatives(null(), 0, null(), null()),
@@ -427,11 +427,11 @@ impl Fmu {
             });
         }
         let (Some(events), Some(f)) = (&self.own.events, &self.exchange) else { return answers };
-        // SAFETY: see above.
+        // SAFETY: the same as in the call above.
         answers.extend(unsafe {
             answers! { events, c; enter_event_mode(), new_discrete_states(null_mut()) }
         });
-        // SAFETY: see above.
+        // SAFETY: the same as in the call above.
         answers.extend(unsafe {
             answers! { f, c;
                 enter_continuous_time_mode(),
@@ -453,9 +453,9 @@ impl Functions {
     ///
     /// # Safety
     ///
-    /// The component is NULL or an instance of the FMU.
+    /// The component must be NULL or an instance of the FMU.
     unsafe fn nothing(&self, component: Component) -> [(&'static str, Status); 8] {
-        // SAFETY: the FMU must look at the number before it follows a pointer.
+        // SAFETY: the FMU must check the number of variables before it uses a pointer.
         unsafe {
             answers! { self, component;
                 get_real(null(), 0, null_mut()),
@@ -471,13 +471,12 @@ impl Functions {
     }
 }
 
-/// Callbacks that were passed to an FMU. They must live as long as the instance, and are freed
-/// after it.
+/// Callbacks that were passed to an FMU. They must exist as long as the instance, and are freed after it.
 pub struct Given(*mut CallbackFunctions);
 
 impl Drop for Given {
     fn drop(&mut self) {
-        // SAFETY: made by Box::into_raw, freed here alone.
+        // SAFETY: the pointer comes from Box::into_raw, and only this call frees it.
         drop(unsafe { Box::from_raw(self.0) });
     }
 }
@@ -532,7 +531,7 @@ impl<'fmu> Instance<'fmu> {
         stop: Option<f64>,
     ) -> Called {
         let (relative, end) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
-        // SAFETY: plain values.
+        // SAFETY: all arguments are plain values.
         self.call(self.functions().setup_experiment, |f, c| unsafe {
             f(c, tolerance.is_some().into(), relative, start, stop.is_some().into(), end)
         })
@@ -548,13 +547,13 @@ impl<'fmu> Instance<'fmu> {
 
     /// Calls fmi2DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true.
     pub fn do_step(&mut self, time: f64, step: f64) -> Called {
-        // SAFETY: plain values on a live instance.
+        // SAFETY: all arguments are plain values, and the instance is alive.
         self.call(self.stepping().do_step, |f, c| unsafe { f(c, time, step, 1) })
     }
 
     pub fn new_discrete_states(&mut self) -> Called<EventInfo> {
         let mut info = EventInfo::default();
-        // SAFETY: a place for the answer.
+        // SAFETY: the pointer leads to a variable for the result.
         self.call(self.events().new_discrete_states, |f, c| unsafe { f(c, &mut info) })?;
         Ok(info)
     }
@@ -595,7 +594,7 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called {
         let n = references.len();
         assert!(n == orders.len() && n == values.len());
-        // SAFETY: slices of the length given.
+        // SAFETY: the slices have the length that is passed.
         self.call(self.stepping().set_real_input_derivatives, |f, c| unsafe {
             f(c, references.as_ptr(), n, orders.as_ptr(), values.as_ptr())
         })
@@ -609,7 +608,7 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called {
         let n = references.len();
         assert!(n == orders.len() && n == values.len());
-        // SAFETY: slices of the length given.
+        // SAFETY: the slices have the length that is passed.
         self.call(self.stepping().get_real_output_derivatives, |f, c| unsafe {
             f(c, references.as_ptr(), n, orders.as_ptr(), values.as_mut_ptr())
         })
@@ -625,7 +624,7 @@ impl<'fmu> Instance<'fmu> {
         assert_eq!(m, change.len());
         let mut answer = vec![0.0; n];
         let (unknowns, knowns) = (unknowns.as_ptr(), knowns.as_ptr());
-        // SAFETY: slices of the lengths given.
+        // SAFETY: the slices have the lengths that are passed.
         self.call(self.functions().get_directional_derivative, |f, c| unsafe {
             f(c, unknowns, n, knowns, m, change.as_ptr(), answer.as_mut_ptr())
         })?;
@@ -640,7 +639,7 @@ impl<'fmu> Instance<'fmu> {
         kind: i32,
         mut value: T,
     ) -> Called<T> {
-        // SAFETY: a place for the answer.
+        // SAFETY: the pointer leads to a variable for the result.
         self.call(function, |f, c| unsafe { f(c, kind, &mut value) })?;
         Ok(value)
     }
@@ -663,7 +662,7 @@ impl<'fmu> Instance<'fmu> {
 
     pub fn string_status(&mut self, kind: i32) -> Called<String> {
         let text = self.read_status(self.stepping().get_string_status, kind, null())?;
-        // SAFETY: the FMU answered OK, so it points to a terminated string of the FMU.
+        // SAFETY: the FMU has returned OK, so that the pointer leads to a terminated string of the FMU.
         Ok(unsafe { copy_text(text) })
     }
 
@@ -672,24 +671,25 @@ impl<'fmu> Instance<'fmu> {
     /// Calls fmi2GetReal with nvr = `count` and NULL pointers. An FMU must accept 0 and refuse any other
     /// number.
     pub fn get_real_null(&mut self, count: usize) -> Called {
-        // SAFETY: the point of the call is that the FMU looks before it leaps; so in the next four.
+        // SAFETY: the call tests that the FMU checks the number before it uses a NULL pointer. The same holds for
+        // the next four calls.
         self.call(self.functions().get_real, |f, c| unsafe { f(c, null(), count, null_mut()) })
     }
 
     pub fn set_real_null(&mut self, count: usize) -> Called {
-        // SAFETY: see get_real_null.
+        // SAFETY: the same as in `get_real_null`.
         self.call(self.functions().set_real, |f, c| unsafe { f(c, null(), count, null()) })
     }
 
     /// Calls the get and set functions of each type with no variables and NULL pointers, which must succeed.
     pub fn calls_without_variables(&mut self) -> [(&'static str, Status); 8] {
-        // SAFETY: see get_real_null.
+        // SAFETY: the same as in `get_real_null`.
         unsafe { self.functions().nothing(self.component) }
     }
 
     pub fn set_string_null(&mut self, reference: u32) -> Called {
         let text = null::<c_char>();
-        // SAFETY: see get_real_null.
+        // SAFETY: the same as in `get_real_null`.
         self.call(self.functions().set_string, |f, c| unsafe { f(c, &reference, 1, &text) })
     }
 
@@ -699,13 +699,14 @@ impl<'fmu> Instance<'fmu> {
 
     /// Calls fmi2FreeFMUstate with the state itself instead of its address, as fmusim does.
     pub fn free_state_itself(&mut self, state: FmuState) -> Called {
-        // SAFETY: a handle from this FMU, gone after this call; it points to more than a pointer.
+        // SAFETY: the handle comes from this FMU and is not used after this call; it points to something larger than a
+        // pointer.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, state.0.cast()) })
     }
 
     /// Calls fmi2FreeFMUstate with NULL and with a pointer to NULL, both of which must succeed.
     pub fn free_state_null(&mut self) -> Called {
-        // SAFETY: see get_real_null.
+        // SAFETY: the same as in `get_real_null`.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, null_mut()) })?;
         self.free_state(FmuState(null_mut()))
     }

@@ -1,6 +1,6 @@
-//! The part of the C interface that only FMI 3.0 has: its types, the functions whose types differ from FMI
-//! 2.0, and event mode, early return and intermediate update in Co-Simulation. [`crate::c_abi::version`] has
-//! the rest. Functions that only Scheduled Execution needs are not here.
+//! The part of the C interface that only FMI 3.0 has: its types, the functions whose types differ from FMI 2.0, and
+//! event mode, early return and intermediate update in Co-Simulation. The rest is in [`crate::c_abi::version`].
+//! Functions that only Scheduled Execution needs are not declared.
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
@@ -49,8 +49,8 @@ type Derivative = unsafe extern "C" fn(
 ) -> c_int;
 type Intermediate = extern "C" fn(*mut c_void, f64, Byte, Byte, Byte, Byte, *mut Byte, *mut f64);
 
-// Functions of every FMU 3.0 that this host calls, in addition to `Common`. (All 75 functions must be
-// exported; FMI 3.0.2, section 2.5.)
+// Functions of every FMU 3.0 that this host calls, in addition to `Common`. (An FMU must export all 75 functions;
+// FMI 3.0.2, section 2.5.)
 functions! { Functions:
     enter_initialization_mode "fmi3EnterInitializationMode", unsafe extern "C" fn(Component, Byte, f64, f64, Byte, f64) -> c_int;
     get_float32 "fmi3GetFloat32", Get<f32>;
@@ -159,7 +159,7 @@ fn as_text(value: &Value) -> &str {
     if let Value::String(text) = value { text } else { "" }
 }
 
-/// Converts an integer of any C type. A number of more than 63 bits becomes the largest i64.
+/// Converts an integer of any C type. A number of more than 63 bits is replaced by the largest i64.
 fn integer(n: impl TryInto<i64>) -> Value {
     Value::Integer(n.try_into().unwrap_or(i64::MAX))
 }
@@ -177,7 +177,7 @@ exchanged! {
     u64, get_uint64 set_uint64, integer, as_integer;
 }
 
-/// Evaluates an expression with the Rust type that belongs to a numeric C type.
+/// Evaluates an expression with the Rust type of a numeric C type.
 macro_rules! numbers {
     ($c_type:expr, $type:ident => $do:expr, $($others:tt)*) => {
         match $c_type {
@@ -201,7 +201,7 @@ macro_rules! numbers {
 pub struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,
-    /// Callback for points within the step, valid during one call of fmi3DoStep, otherwise NULL.
+    /// Callback for points within the step. The pointer is valid during one call of fmi3DoStep, and otherwise NULL.
     within: Cell<*mut Within<'static>>,
     updates: Cell<usize>,
     line: Cell<Line>,
@@ -227,8 +227,8 @@ extern "C" fn intermediate_update(
     early_return_requested: *mut Byte,
     early_return_time: *mut f64,
 ) {
-    // SAFETY: set for the duration of fmi3DoStep, which is on the stack now, on this thread. The pointer that the FMU
-    // hands back is compared and never followed.
+    // SAFETY: the pointer is set only while fmi3DoStep runs on this thread. The pointer that the FMU passes back is
+    // compared and never dereferenced.
     let stepping = unsafe { STEPPING.get().as_ref() };
     if stepping.is_none_or(|stepping| stepping.environment != environment) {
         c_abi::count_foreign_environment();
@@ -244,10 +244,10 @@ extern "C" fn intermediate_update(
             stepping,
         };
         let within = stepping.within.get();
-        // SAFETY: set for the duration of fmi3DoStep, too.
+        // SAFETY: this pointer, too, is set only while fmi3DoStep runs.
         if within.is_null() { None } else { unsafe { (*within)(&update) } }
     });
-    // SAFETY: two places for the answers, if they are given.
+    // SAFETY: if the pointers are not NULL, they lead to two variables for the results.
     unsafe {
         if !early_return_requested.is_null() {
             *early_return_requested = answer.is_some().into();
@@ -271,7 +271,7 @@ pub struct Update<'a> {
 impl Update<'_> {
     pub fn set(&self, references: &[u32], values: &[f64]) -> Status {
         let n = references.len();
-        // SAFETY: two slices of the lengths given; the FMU has called and expects such a call.
+        // SAFETY: both slices have the lengths that are passed, and the FMU expects such calls within this callback.
         let status = unsafe {
             ((*self.stepping.functions).set_float64.call)(
                 self.stepping.component.get(),
@@ -285,7 +285,7 @@ impl Update<'_> {
     }
 
     pub fn get(&self, references: &[u32], values: &mut [f64]) -> Status {
-        // SAFETY: as in set.
+        // SAFETY: the same as in `set`.
         let status = unsafe {
             ((*self.stepping.functions).get_float64.call)(
                 self.stepping.component.get(),
@@ -304,7 +304,7 @@ impl Update<'_> {
 impl<T> Getter<T> for Get<T> {
     unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int {
         let (n, count) = (references.len(), values.len());
-        // SAFETY: two slices of the lengths given.
+        // SAFETY: both slices have the lengths that are passed.
         unsafe { self(component, references.as_ptr(), n, values.as_mut_ptr(), count) }
     }
 }
@@ -312,7 +312,7 @@ impl<T> Getter<T> for Get<T> {
 impl<T> Setter<T> for Set<T> {
     unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int {
         let (n, count) = (references.len(), values.len());
-        // SAFETY: two slices of the lengths given.
+        // SAFETY: both slices have the lengths that are passed.
         unsafe { self(component, references.as_ptr(), n, values.as_ptr(), count) }
     }
 }
@@ -341,7 +341,7 @@ impl Version for Fmi3 {
     }
 
     unsafe fn load(library: &Library) -> Result<Self, libloading::Error> {
-        // SAFETY: as promised.
+        // SAFETY: the caller has the same obligations.
         unsafe {
             Ok(Fmi3 {
                 functions: Functions::load(library, 0)?,
@@ -351,7 +351,7 @@ impl Version for Fmi3 {
         }
     }
 
-    /// Returns the path of the resources, with a separator at its end (section 2.3.1).
+    /// Returns the path of the resources with a separator at its end (section 2.3.1).
     fn resources(directory: &Path) -> Option<String> {
         let resources = directory.join("resources");
         let separator = std::path::MAIN_SEPARATOR;
@@ -457,7 +457,7 @@ impl Version for Fmi3 {
             CType::String => {
                 instance.read_texts(instance.functions().get_string, &reference, count)?.into_iter().map(Value::String).collect()
             }
-            // Values of these types are not exchanged: `ModelDescription::value` refuses them.
+            // Values of these types are not exchanged, because `ModelDescription::value` refuses them.
             CType::Binary | CType::Clock => Vec::new(),
         })
     }
@@ -499,9 +499,8 @@ impl Fmu {
         all
     }
 
-    /// Returns the arguments of an ordinary instance, which tests of bad calls modify: no event mode and no
-    /// early return. If the FMU provides intermediate update, all inputs that may be set within a step are
-    /// required.
+    /// Returns the arguments of an ordinary instance, without event mode and early return; tests of wrong calls modify
+    /// them. If the FMU provides intermediate update, the arguments request all inputs that may be set within a step.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         let stepping = self.description.co_simulation.as_ref();
         let updates = stepping.is_some_and(|cs| cs.can_interpolate_inputs);
@@ -552,7 +551,7 @@ impl Fmu {
                 let first = if required.is_empty() { null() } else { required.as_ptr() };
                 let (events, early) = (with.event_mode.into(), with.early_return.into());
                 let n = required.len();
-                // SAFETY: strings outlive the call, the environment the instance.
+                // SAFETY: the strings exist until the call has returned, and the environment exists longer than the instance.
                 self.create_instance(f.name, environment, stepping, || unsafe {
                     (f.call)(
                         name, token, resources, 0, logging, events, early, first, n, host, logger,
@@ -563,7 +562,7 @@ impl Fmu {
             Interface::ModelExchange => {
                 let f = self.own.exchange.as_ref().expect("the functions of model exchange");
                 let f = f.instantiate;
-                // SAFETY: see above.
+                // SAFETY: the same as in the call above.
                 self.create_instance(f.name, environment, stepping, || unsafe {
                     (f.call)(name, token, resources, 0, logging, host, logger)
                 })
@@ -574,7 +573,7 @@ impl Fmu {
     }
 }
 
-/// Type of a missing callback, needed to give a NULL pointer a type.
+/// Type of a callback that is missing, because a NULL pointer needs a type.
 type Nobody = fn(&Update) -> Option<f64>;
 
 /// Arguments of fmi3InstantiateCoSimulation or fmi3InstantiateModelExchange; `None` becomes a NULL pointer.
@@ -604,7 +603,7 @@ pub struct Step {
     pub last_time: f64,
 }
 
-/// Value of a result byte before the call. It is neither 0 nor 1, so that a missing result shows.
+/// Value of a result byte before the call. It is neither 0 nor 1, so that a missing result is noticed.
 pub const UNWRITTEN: u8 = 0xa5;
 
 /// Results of fmi3UpdateDiscreteStates: the bytes as the FMU wrote them, or [`UNWRITTEN`].
@@ -648,7 +647,7 @@ impl<'fmu> Instance<'fmu> {
         stop: Option<f64>,
     ) -> Called {
         let (relative, end) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
-        // SAFETY: plain values.
+        // SAFETY: all arguments are plain values.
         self.call(self.functions().enter_initialization_mode, |f, c| unsafe {
             f(c, tolerance.is_some().into(), relative, start, stop.is_some().into(), end)
         })
@@ -670,7 +669,7 @@ impl<'fmu> Instance<'fmu> {
         let mut bytes = [UNWRITTEN; 5];
         let mut next_event_time = f64::NAN;
         let [update, terminate, nominals, values, defined] = &mut bytes;
-        // SAFETY: places for the six answers.
+        // SAFETY: the pointers lead to six variables for the results.
         self.call(self.functions().update_discrete_states, |f, c| unsafe {
             f(c, update, terminate, nominals, values, defined, &mut next_event_time)
         })?;
@@ -699,7 +698,7 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called<Step> {
         if let Some(within) = within {
             let within: *mut Within<'_> = within;
-            // SAFETY: the lifetime alone changes; the pointer is taken back before this function returns.
+            // SAFETY: only the lifetime changes, and the pointer is reset before this function returns.
             let within =
                 unsafe { std::mem::transmute::<*mut Within<'_>, *mut Within<'static>>(within) };
             self.kept.within.set(within);
@@ -708,7 +707,7 @@ impl<'fmu> Instance<'fmu> {
         let mut last_time = f64::NAN;
         let [event, terminate, early_return] = &mut bytes;
         let before = STEPPING.replace(&raw const *self.kept);
-        // SAFETY: places for the four answers.
+        // SAFETY: the pointers lead to four variables for the results.
         let called = self.call(self.stepping().do_step, |f, c| unsafe {
             f(c, time, step, 1, event, terminate, early_return, &mut last_time)
         });
@@ -742,7 +741,7 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called {
         let (n, count) = (references.len(), values.len());
         assert_eq!(n, orders.len());
-        // SAFETY: slices of the lengths given.
+        // SAFETY: the slices have the lengths that are passed.
         self.call(self.stepping().get_output_derivatives, |f, c| unsafe {
             f(c, references.as_ptr(), n, orders.as_ptr(), values.as_mut_ptr(), count)
         })
@@ -785,7 +784,7 @@ impl<'fmu> Instance<'fmu> {
         let mut answer = vec![f64::NAN; count];
         let (n, m) = (unknowns.len(), knowns.len());
         let (unknowns, knowns) = (unknowns.as_ptr(), knowns.as_ptr());
-        // SAFETY: slices of the lengths given.
+        // SAFETY: the slices have the lengths that are passed.
         self.call(function, |f, c| unsafe {
             f(c, unknowns, n, knowns, m, seed.as_ptr(), seed.len(), answer.as_mut_ptr(), count)
         })?;
@@ -802,7 +801,7 @@ impl<'fmu> Instance<'fmu> {
         let (mut own, mut other) = (vec![0usize; n], vec![0usize; n]);
         let (mut independents, mut kinds) = (vec![0u32; n], vec![0 as c_int; n]);
         let (to, from) = (own.as_mut_ptr(), other.as_mut_ptr());
-        // SAFETY: four arrays of the length given.
+        // SAFETY: the four arrays have the length that is passed.
         self.call(self.functions().dependencies, |f, c| unsafe {
             f(c, reference, to, independents.as_mut_ptr(), from, kinds.as_mut_ptr(), n)
         })?;
@@ -831,7 +830,7 @@ impl<'fmu> Instance<'fmu> {
         let exchange = self.fmu.own.exchange.as_ref();
         let function = function(exchange.expect("the FMU exports the functions of model exchange"));
         let mut count = 0;
-        // SAFETY: a place for the answer.
+        // SAFETY: the pointer leads to a variable for the result.
         self.call(function, |f, c| unsafe { f(c, &mut count) })?;
         Ok(count)
     }
@@ -845,14 +844,13 @@ impl<'fmu> Instance<'fmu> {
     }
 }
 
-/// Inputs that change linearly within a step and that an FMU 3.0 receives within the step, by their
-/// value references in the FMU. If one element of an array changes, all its elements are listed.
+/// Inputs that change linearly within a step and that an FMU 3.0 accepts within the step, by their value references in
+/// the FMU. If one element of an array changes, all elements of the array are listed.
 #[derive(Default)]
 struct Line {
     references: Vec<u32>,
     values: Vec<f64>,
-    /// Positions of the values that change within the step, each with the position of its input among the
-    /// arguments.
+    /// Positions of the values that change within the step, each with the position of its input among the arguments.
     moving: Vec<(usize, usize)>,
 }
 
@@ -897,7 +895,7 @@ impl Line {
 fn whole_step(instance: &Instance, done: Step) -> Called {
     let time = done.last_time;
     let (status, mut messages, text) = if done.terminate == 1 {
-        // FMI 2.0 reports the same by the status discard: the step was not completed.
+        // FMI 2.0 reports this by the status fmi2Discard.
         let text = format!("it asks for the end of the simulation at t = {time} s");
         (Status::Discard, instance.take_messages(), text)
     } else if done.early_return == 1 {

@@ -1,8 +1,8 @@
 //! An FMU of either version, for a host that steps it in Co-Simulation or integrates it in Model Exchange.
 //!
-//! In Co-Simulation FMI 3.0 is used without event mode and early return, as FMI 2.0: the FMU handles its
-//! events itself. Inputs that change linearly within a step are passed as derivatives in FMI 2.0, and in
-//! intermediate updates in FMI 3.0 if the FMU provides them.
+//! In Co-Simulation FMI 3.0 is used like FMI 2.0, without event mode and early return: the FMU handles its events
+//! itself. For inputs that change linearly within a step, an FMU 2.0 receives derivatives, and an FMU 3.0 receives
+//! values in intermediate updates if it provides them.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ pub enum Instance<'fmu> {
     V3(fmi3::Instance<'fmu>),
 }
 
-/// Evaluates an expression with the FMU or instance in it, whichever version of FMI it has.
+/// Evaluates an expression with the inner FMU or instance, for both versions of FMI.
 macro_rules! each {
     ($type:ident, $of:expr, $one:ident => $do:expr) => {
         match $of {
@@ -55,8 +55,8 @@ impl Fmu {
         Fmu::open_for(Interface::CoSimulation, path, settings)
     }
 
-    /// Opens an FMU for simulations between communication points: in Model Exchange if it has no
-    /// Co-Simulation. `settings` as in [`Fmu::open_with`].
+    /// Opens an FMU for simulations between communication points: in Co-Simulation, or in Model Exchange if it does not
+    /// offer Co-Simulation. For `settings` see [`Fmu::open_with`].
     pub fn open_to_run(path: impl AsRef<Path>, settings: &[(String, String)]) -> Result<Self> {
         let path = path.as_ref();
         let description = ModelDescription::from_fmu(path)?;
@@ -140,18 +140,17 @@ passed_on! {
     get_real(references: &[u32], values: &mut [f64]) -> Called;
     set_real(references: &[u32], values: &[f64]) -> Called;
     value(variable: &Variable) -> Called<Value>;
-    /// Sets a variable or one element of an array. The other elements keep the values that were set last, or
-    /// their start values.
+    /// Sets a variable or one element of an array. The other elements of the array keep the values that were set last,
+    /// or their start values.
     set_value(variable: &Variable, value: Value) -> Called;
     get(name: &str) -> Result<Value>;
     real(name: &str) -> Result<f64>;
-    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or
-    /// number.
+    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or number.
     ///
     /// # Errors
     ///
-    /// If the text does not fit the type, the FMU refuses the value, or the variable is a structural
-    /// parameter of FMI 3.0 and the value differs from that with which the FMU was opened.
+    /// If the text is not a value of the variable's type, the FMU refuses the value, or the variable is a structural
+    /// parameter of FMI 3.0 and the value differs from the value with which the FMU was opened.
     set(name: &str, text: &str) -> Result<()>;
     /// Enters event mode. This and the following calls need an FMU that was opened for Model Exchange.
     enter_event_mode() -> Called;
@@ -189,8 +188,8 @@ impl<'fmu> Instance<'fmu> {
         each!(Instance, self, instance => Version::set_slopes(instance, references, slopes))
     }
 
-    /// Makes a step in which Real inputs change linearly. They have just been set to `values`; `slopes` are
-    /// their derivatives, per s. An FMU 3.0 receives the inputs in intermediate updates.
+    /// Makes a step in which Real inputs change linearly. The inputs have already been set to `values`; `slopes` are
+    /// their derivatives, per s. An FMU 3.0 receives further values in intermediate updates.
     pub fn do_step_along(
         &mut self,
         time: f64,

@@ -1,18 +1,17 @@
-//! Runs foreign code in a process of its own, with limits. Whatever an FMU's binary does ends with that
-//! process, and the parent reports it.
+//! Runs foreign code in a separate process with limits. If an FMU's binary crashes, hangs or exits, only this process
+//! ends, and the parent reports the reason.
 //!
-//! The parent ([`run`]) starts the process in a process group of its own with a temporary folder, and reads
-//! its output up to a limit. If the process takes too long, the parent kills it and all processes that it has
-//! started. The child calls [`enter`] first and [`done`] last; without [`done`] it has failed, whatever its
-//! exit code. When the first binary is loaded, the child limits its own memory and files and keeps stdout and
-//! stderr for itself; the output of the binary goes to the parent.
+//! The parent ([`run`]) starts the process in a new process group with a temporary folder, and reads its output up to a
+//! limit. If the process takes too long, the parent kills it and all processes that it has started. The child calls
+//! [`enter`] first and [`done`] last; without [`done`] it has failed, whatever its exit code is. When the first binary
+//! is loaded, the child limits its own memory and files, and reserves stdout and stderr for itself; the output of the
+//! binary goes to the parent.
 //!
-//! The child sends messages over a connection ([`channel`]). Each message begins with a nonce that the child
-//! has read before it loads a binary. A binary that writes to the connection, by mistake or to look
-//! successful, is killed.
+//! The child sends messages over a connection ([`channel`]). Each message begins with a nonce that the child has read before
+//! it loads a binary. If a binary writes to the connection, by mistake or to appear successful, the process is killed.
 //!
-//! Linux has all of this. Other Unix systems do not limit memory, and miss processes that leave the group. On
-//! Windows only the process itself is killed.
+//! On Linux all of this works. On other Unix systems memory is not limited, and processes that leave the group are not
+//! found. On Windows only the process itself is killed.
 //!
 //! The guard protects against faults. It is not a sandbox: a malicious binary shares the memory of the child,
 //! where it can find the nonce, and it has the rights of the user.
@@ -52,8 +51,8 @@ pub const FLOOD_SHOWN: u64 = 4 << 30;
 pub struct Limits {
     pub call: Duration,
     pub total: Option<Duration>,
-    /// Limit of the memory that the process may use in addition to what it uses when the first
-    /// binary is loaded, bytes. The same number limits temporary files and shared memory.
+    /// Limit of the memory that the process may use in addition to its memory when the first binary is loaded, bytes.
+    /// The same limit applies to temporary files and to shared memory.
     pub memory: u64,
     pub file: u64,
 }
@@ -70,7 +69,7 @@ pub enum Cause {
     Flood,
     /// The process was killed because its temporary files or its shared memory exceeded [`Limits::memory`].
     Hoard,
-    /// The process was killed because its connection was closed or carried bytes that were not its messages.
+    /// The process was killed because its connection was closed or carried bytes that the program itself had not sent.
     Interfered,
     Panicked(String),
 }
@@ -78,8 +77,7 @@ pub enum Cause {
 #[derive(Debug)]
 pub struct Outcome {
     pub cause: Cause,
-    /// Output to stdout and to stderr, each up to [`PRINTED`] bytes. With [`Output::Shown`] both are in the
-    /// first.
+    /// Output to stdout and to stderr, each up to [`PRINTED`] bytes. With [`Output::Shown`] the first element contains both.
     pub printed: [Vec<u8>; 2],
 }
 
@@ -125,7 +123,7 @@ pub fn run<A: AsRef<OsStr>>(
             command.stdout(first_end).stderr(second_end);
             None
         }
-        // The child uses it in place of stdout and stderr.
+        // The child uses this pipe in place of stdout and stderr for the output of the binary.
         Output::Shown => {
             drop(second_end);
             Some(first_end)
@@ -142,7 +140,7 @@ pub fn run<A: AsRef<OsStr>>(
     let readers = [reader(first, shown), reader(second, shown)];
     let started = Instant::now();
     let child = {
-        // Registered, so that [`end_all`] finds it.
+        // The process is registered, so that [`end_all`] finds it.
         let mut running = lock(&RUNNING);
         let child =
             command.spawn().with_context(|| format!("{} cannot be run", program.display()))?;
@@ -154,7 +152,7 @@ pub fn run<A: AsRef<OsStr>>(
     let floods = || readers.iter().any(|reader| lock(&reader.printed).more > flood);
     let cause = watch(child, &mut news, started, limits, &files, &floods)?;
     let printed = readers.map(|reader| {
-        // A process that could not be found may keep the pipe open.
+        // A process that was not found may keep the pipe open.
         let _ = reader.end.recv_timeout(Duration::from_millis(500));
         let printed = lock(&reader.printed);
         if shown && printed.more > 0 {
@@ -165,7 +163,7 @@ pub fn run<A: AsRef<OsStr>>(
     Ok(Outcome { cause, printed })
 }
 
-/// Waits until a process ends, or kills it when it exceeds a limit. Returns the reason for its end.
+/// Waits until a process ends, or kills it if it exceeds a limit. Returns the reason why it ended.
 fn watch(
     mut child: Child,
     news: &mut Messages<impl FnMut(&[u8])>,
@@ -174,7 +172,7 @@ fn watch(
     files: &Path,
     floods: &dyn Fn() -> bool,
 ) -> Result<Cause> {
-    // A process sends a sign of life four times a second; a process that is stopped does not.
+    // A process sends a sign of life four times a second, but not while it is stopped.
     let silence = limits.call.max(Duration::from_secs(3));
     let (mut done_at, mut closed_at) = (None, None);
     let mut counted_at = started;
@@ -185,7 +183,7 @@ fn watch(
         pause = (pause * 2).min(Duration::from_millis(10));
         let now = Instant::now();
         if news.done.is_some() {
-            // Only the end of the program itself is left.
+            // Only the end of the program is still to come.
             if now - *done_at.get_or_insert(now) > Duration::from_secs(2) {
                 break;
             }
@@ -229,8 +227,7 @@ fn watch(
     Ok(panic.or(cause).unwrap_or(Cause::Ended(status)))
 }
 
-/// Longest time that a process may go on after its connection to the parent has ended, before it is
-/// killed.
+/// Longest time that a process may run after its connection to the parent has ended. Then it is killed.
 const CLOSED: Duration = Duration::from_secs(1);
 
 const COUNTING: Duration = Duration::from_millis(50);
@@ -244,7 +241,7 @@ fn disk_usage(folder: &Path) -> u64 {
             if entries > COUNTED {
                 return u64::MAX;
             }
-            // The size of the link itself, not of its target.
+            // the size of the link, not of its target
             match entry.metadata() {
                 Ok(found) if found.is_dir() => folders.push(entry.path()),
                 Ok(found) => bytes += on_disk(&found),
@@ -265,8 +262,8 @@ fn on_disk(file: &std::fs::Metadata) -> u64 {
     file.len()
 }
 
-/// Returns the memory that a process shares with others, bytes: the larger of the mapped memory and
-/// the size of open files that are in no folder.
+/// Returns the memory that a process shares with other processes, bytes: the mapped memory, or the size of open files
+/// that are in no folder, whichever is larger.
 #[cfg(target_os = "linux")]
 fn shared(id: u32) -> u64 {
     let process = Path::new("/proc").join(id.to_string());
@@ -298,8 +295,8 @@ fn shared(_: u32) -> u64 {
     0
 }
 
-/// Kills a process, its group, and the processes that have left the group, which are recognised by the
-/// temporary folder in their environment.
+/// Kills a process, its group, and the processes that have left the group, which are recognised by the temporary
+/// folder in their environment.
 fn end(id: u32, child: &mut Child, files: &Path) {
     kill_group(id);
     let _ = child.kill(); // it may have ended; either is fine
@@ -311,8 +308,8 @@ fn end(id: u32, child: &mut Child, files: &Path) {
     }
 }
 
-/// Ends all guarded processes when a signal ends this program. They have one second to remove incomplete
-/// files; no new ones can start.
+/// Ends all guarded processes, when a signal ends this program. The processes have one second to remove incomplete
+/// files, and no new process can start.
 pub fn end_all() {
     let running = lock(&RUNNING);
     #[cfg(unix)]
@@ -345,7 +342,7 @@ fn kill_group(id: u32) {
 #[cfg(not(unix))]
 fn kill_group(_: u32) {}
 
-/// Returns true if a process has ended. It is not waited for, so that the system does not give its
+/// Returns true if a process has ended. The function does not wait for it, so that the system does not give its
 /// identifier to another process.
 #[cfg(unix)]
 fn has_ended(child: &mut Child) -> Result<bool> {
@@ -365,8 +362,7 @@ fn has_ended(child: &mut Child) -> Result<bool> {
     Ok(child.try_wait()?.is_some())
 }
 
-/// Kills the processes whose environment names `files` as the temporary folder. Returns true if there were
-/// any.
+/// Kills the processes whose environment names `files` as the temporary folder. Returns true if there was such a process.
 #[cfg(target_os = "linux")]
 fn kill_descendants(files: &Path) -> bool {
     use rustix::process::{Pid, Signal, kill_process};
@@ -405,14 +401,13 @@ struct Messages<F> {
 // Kinds of messages.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
-/// Kind of the message that the first binary is loaded. Its content is the size of the temporary
-/// files, bytes.
+/// Kind of the message that the first binary is going to be loaded. The content is the size of the temporary files, bytes.
 const LOADS: u8 = b'+';
 const ANSWER: u8 = b'>';
-/// Kind of the message that our own code has panicked. Its content is the report of the panic.
+/// Kind of the message that the program itself has panicked. The content is the report of the panic.
 const PANICS: u8 = b'?';
 const CATCHES: u8 = b'-';
-/// Kind of the message that the process has done its work. Its content is the exit code.
+/// Kind of the message that the process has done its work. The content is the exit code.
 const DONE: u8 = b'=';
 
 impl<F: FnMut(&[u8])> Messages<F> {
@@ -453,8 +448,7 @@ struct Reader {
     end: Receiver<()>,
 }
 
-/// Starts a thread. If the system is briefly short of resources (EAGAIN), the call is repeated for up to two
-/// seconds.
+/// Starts a thread. If the system is briefly short of resources (EAGAIN), repeats the attempt for up to two seconds.
 ///
 /// # Panics
 ///
@@ -482,7 +476,7 @@ pub fn spawn(work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
     panic!("a thread could not be started: the system is short of resources");
 }
 
-/// Starts a thread that reads a pipe to its end, so that the writer never waits, and stores the beginning.
+/// Starts a thread that reads a pipe to its end and stores the beginning, so that the writer never has to wait.
 fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
     let (printed, (tell, end)) = (Arc::<Mutex<Printed>>::default(), channel());
     let to = printed.clone();
@@ -514,7 +508,7 @@ struct Guarded {
 
 static GUARDED: OnceLock<Guarded> = OnceLock::new();
 
-/// Makes this process the guarded one that [`run`] has started.
+/// Turns this process into the guarded process that [`run`] has started.
 ///
 /// # Errors
 ///
@@ -576,14 +570,13 @@ pub fn done(code: u8) {
     send(DONE, &[code]);
 }
 
-/// Reports a panic of our own code to the parent. Returns false if this process is not guarded.
+/// Reports a panic of the program itself to the parent. Returns false if this process is not guarded.
 pub fn panics(report: &str) -> bool {
     send(PANICS, report.as_bytes());
     GUARDED.get().is_some()
 }
 
-/// Returns the original stdout and stderr of a guarded process, which the binary cannot reach by their usual
-/// numbers.
+/// Returns the original stdout and stderr of a guarded process, which the binary cannot reach by their usual file descriptors.
 pub fn streams() -> Option<(&'static File, &'static File)> {
     #[cfg(unix)]
     if let Some([_, stdout, stderr]) = GUARDED.get().and_then(|guarded| guarded.streams.as_ref()) {
@@ -616,11 +609,11 @@ fn send_signs_of_life() {
     }
 }
 
-/// Counters of all callers of a binary; each is odd during a call.
+/// Call counters of all users of a binary; a counter is odd during a call.
 static CALLS: Mutex<Vec<Weak<AtomicU64>>> = Mutex::new(Vec::new());
 
-/// Marks the beginnings and ends of the calls that one caller makes, so that the parent notices a
-/// call that does not return.
+/// Marks the beginning and the end of each call by one user of a binary, so that the parent notices a call that does
+/// not return.
 #[derive(Debug)]
 pub(crate) struct Calls(Arc<AtomicU64>);
 
@@ -635,7 +628,7 @@ impl Calls {
         calls
     }
 
-    /// Creates a mark that counts as one call of the binary from now until it is dropped.
+    /// Returns a mark that counts as one call of the binary until the mark is dropped.
     pub(crate) fn one() -> Calls {
         let calls = Calls::new();
         calls.begin();
@@ -651,8 +644,8 @@ impl Calls {
     }
 }
 
-/// Sets the limits, and redirects stdout and stderr for the binary that is loaded next. Acts only once, in a
-/// guarded process.
+/// Sets the limits, and redirects stdout and stderr for the binary that is loaded next. In a guarded process the first
+/// call does this; other calls do nothing.
 pub(crate) fn before_loading() {
     static ONCE: Once = Once::new();
     let Some(guarded) = GUARDED.get() else { return };
@@ -682,8 +675,8 @@ pub(crate) fn before_loading() {
     });
 }
 
-/// Raises the limits of memory and file size of a guarded process by `bytes`, which its own tables
-/// need in addition to the FMU.
+/// Raises the limits of memory and file size of a guarded process by `bytes`, because the program's own tables need
+/// memory in addition to the FMU.
 pub fn allow(bytes: u64) {
     before_loading();
     #[cfg(target_os = "linux")]
@@ -696,8 +689,7 @@ pub fn allow(bytes: u64) {
     let _ = bytes;
 }
 
-/// Sets a soft limit for a resource of this process. It cannot exceed the limit with which the
-/// process was started.
+/// Sets the soft limit of a resource of this process. The limit with which the process was started cannot be exceeded.
 #[cfg(unix)]
 fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let mut limit = rustix::process::getrlimit(resource);
@@ -736,8 +728,8 @@ fn kilobytes(status: &str, kind: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Argument with which a test starts the test program as the guarded process. For the test harness it is the
-    /// name of a test that does not exist.
+    /// Argument with which a test starts the test program as the guarded process. The test harness reads the argument
+    /// as the name of a test, which does not exist.
     const CHILD: &str = "guarded_process";
 
     fn end_of(name: &str, work: fn()) -> Cause {

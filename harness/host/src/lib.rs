@@ -1,7 +1,7 @@
 //! Loads FMUs as any host does: the packed archive, its description and its binary.
 //!
-//! The rest of the harness accesses an FMU only through this crate; no code is shared with a model. Code that
-//! check and pack also need is here too, for example reading binaries of any platform.
+//! The rest of the harness accesses an FMU only through this crate, and no code is shared with a model. Code that the
+//! crates check and pack also need is here, too, for example to read binaries of any platform.
 
 pub mod archive;
 pub mod binary;

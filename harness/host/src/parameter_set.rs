@@ -1,5 +1,5 @@
-//! Reads files of parameters: TOML with `"name" = value`, the parameter set of SSP (.ssv), or the result of
-//! `hubslosh identify` (.json). Both the command line and the Python package read them here.
+//! Reads files of parameters: TOML with `"name" = value`, the parameter set of SSP (.ssv), or the result of `hubslosh
+//! identify` (.json). The command line and the Python package both use this module.
 
 use std::fmt;
 use std::path::Path;
@@ -24,8 +24,7 @@ pub struct ParameterSet {
 pub struct Parameter {
     pub name: String,
     pub value: Value,
-    /// Unit that the file states for the value; without one the value is in the unit of the FMU's
-    /// variable.
+    /// Unit that the file states for the value. A value without a unit is in the unit of the FMU's variable.
     pub unit: Option<Unit>,
     line: u64,
 }
@@ -33,18 +32,17 @@ pub struct Parameter {
 #[derive(Clone, Debug)]
 pub struct Unit {
     pub name: String,
-    /// Definition of the unit by SI base units, if the file has one. Otherwise the unit must be one
-    /// in which the FMU's variable can be given.
+    /// Definition of the unit by SI base units, if the file has one. Without it the unit must be the unit of the FMU's
+    /// variable or one of its display units.
     pub base: Option<BaseUnit>,
 }
 
 impl ParameterSet {
-    /// Reads a file of the format that its ending names.
+    /// Reads a file; the ending of its name determines the format.
     ///
     /// # Errors
     ///
-    /// If the file is not valid, has no parameters, or sets a parameter twice. The message begins with the
-    /// path.
+    /// If the file is not valid, has no parameters, or sets a parameter twice. The message begins with the path.
     pub fn read(path: &Path) -> Result<ParameterSet> {
         let shown = path.display();
         let text = input::text(path).with_context(|| format!("the file {shown} cannot be read"))?;
@@ -64,7 +62,7 @@ impl ParameterSet {
 }
 
 impl Parameter {
-    /// Creates a parameter that is not from a file.
+    /// Creates a parameter that does not come from a file.
     pub fn new(name: &str, value: Value, unit: Option<Unit>) -> Parameter {
         Parameter { name: name.into(), value, unit, line: 0 }
     }
@@ -171,7 +169,7 @@ fn from_toml(text: &str) -> Result<ParameterSet> {
     once(found)
 }
 
-/// A JSON object whose repeated names are an error. (A map would silently keep the last value.)
+/// A JSON object in which a repeated name is an error, whereas a map would silently keep the last value.
 #[derive(Default)]
 struct Entries<T>(Vec<(String, T)>);
 
@@ -214,13 +212,13 @@ struct Identified {
     decided_by_solver: Vec<serde_json::Value>,
 }
 
-/// Reads the result of an identification: first `settings`, then the estimates in `parameters`, which
-/// override settings. The initial states of the recordings are not parameters of the FMU and are not read.
+/// Reads the result of an identification: first its `settings`, then the estimates in `parameters`, which override the
+/// settings. The initial states of the recordings are not read, because they are not parameters of the FMU.
 fn from_json(text: &str) -> Result<ParameterSet> {
     let none = "it is not a result of `hubslosh identify` with parameters of an FMU";
     let found: Identified = serde_json::from_str(text).map_err(|why| match why.classify() {
         Category::Eof => anyhow!("{none}: the file ends too early, in line {}", why.line()),
-        // the shape that the library expects says nothing to a reader
+        // The message of the library describes Rust types, which says nothing to a user.
         Category::Data if why.to_string().contains("expected ") => anyhow!(none),
         _ => anyhow!("{none}: {why}"),
     })?;
@@ -254,9 +252,9 @@ fn from_json(text: &str) -> Result<ParameterSet> {
     Ok(keep_parameters_of_one_run(ParameterSet { parameters, warnings }))
 }
 
-/// Returns those parameters of an identification's result that one simulation can use: the
-/// parameters common to all recordings and, if there is only one recording, its own (`NAME@1`).
-/// With several recordings their own parameters are left out, and a warning names them.
+/// Returns the parameters of an identification that one simulation can use: the parameters common to all recordings
+/// and, if there is only one recording, also its own parameters (`NAME@1`). If there are several recordings, their own
+/// parameters are left out, and a warning names them.
 fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
     let has_others = found.parameters.iter().any(|p| recording(&p.name).is_some_and(|n| n > 1));

@@ -1,8 +1,8 @@
-//! Writes a model description with only part of the variables, for hosts that show every variable. The binary
-//! of the FMU is the same: it reads the array sizes from the GUID, and start values that differ from its own
+//! Writes a model description that contains only part of the variables, for hosts that show every variable to the user.
+//! The binary of the FMU stays the same: it reads the array sizes from the GUID, and start values other than its own
 //! from a file in the resources.
 //!
-//! `fmu/runtime/src/extent.rs` is the other half, with the format of the GUID and of the file.
+//! The other half, with the format of the GUID and of the file, is `fmu/runtime/src/extent.rs`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -19,7 +19,7 @@ pub struct Limit<'a> {
     pub parameter: &'a str,
     pub size: usize,
     pub most: usize,
-    /// True if each element of the arrays has event indicators of its own.
+    /// True if each element of the arrays has its own event indicators.
     pub has_indicators: bool,
     /// The arrays whose size the parameter determines, each with the position of this dimension
     /// among its indices.
@@ -32,11 +32,11 @@ pub struct Part {
     pub start_values: Option<String>,
 }
 
-/// Returns the start values of `settings`, texts as a user writes them, by name in the format of FMI.
+/// Returns start values by name in the format of FMI. `settings` are names and texts as a user writes them.
 ///
 /// # Errors
 ///
-/// If the description has no such variable, or a text is not a value of it.
+/// If the description has no such variable, or a text is not a value of the variable's type.
 pub fn start_values(
     description: &ModelDescription,
     settings: impl IntoIterator<Item = (String, String)>,
@@ -53,13 +53,13 @@ pub fn start_values(
     settings.into_iter().map(start).collect()
 }
 
-/// Returns the description with only the variables within the limits. `starts` has other start values of
-/// parameters by name, in the format of FMI.
+/// Returns the description with only the variables within the limits. `starts` has start values of parameters by name,
+/// in the format of FMI, that replace those of the description.
 ///
 /// # Errors
 ///
-/// If a limit is above the largest value, a parameter in `starts` is not in the reduced description, or
-/// the XML is not a description of scalars from this project.
+/// If a limit is above the largest value, a parameter in `starts` is not in the reduced description, or the XML is not
+/// a description of scalars from this project.
 pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) -> Result<Part> {
     for limit in limits {
         let Limit { parameter, size, most, .. } = limit;
@@ -112,7 +112,7 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
             "the description has no parameter {name} (allowed: parameters of its tanks and modes)"
         );
     }
-    // The derivative may come before its state.
+    // The derivative of a state may precede the state.
     for node in variables.descendants().filter(|node| node.has_attribute("derivative")) {
         if let Some(new) = renumbered.get(node.attribute("derivative").unwrap_or_default()) {
             edits.set(&node, "derivative", new);
@@ -144,7 +144,7 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
     Ok(Part { xml: edits.applied(xml), start_values })
 }
 
-/// Returns the GUID of a reduced description; its format is described in `fmu/runtime/src/extent.rs`.
+/// Returns the GUID of a reduced description. Its format is described in `fmu/runtime/src/extent.rs`.
 fn token_of_part(
     whole: &str,
     limits: &[Limit],
@@ -166,8 +166,8 @@ fn fnv(bytes: &[u8]) -> u128 {
     })
 }
 
-/// Splits a name into the name without indices, as the table has it, and the indices. For example
-/// `tank[1].p[2,3]` becomes `tank[].p` and 1, 2, 3.
+/// Splits a name into its form in the table, without indices, and the indices. For example `tank[1].p[2,3]` becomes
+/// `tank[].p` and 1, 2, 3.
 fn pattern(name: &str) -> (String, Vec<usize>) {
     let (mut text, mut indices, mut rest) = (String::new(), Vec::new(), name);
     while let Some((before, after)) = rest.split_once('[') {
@@ -190,7 +190,7 @@ fn is_within(name: &str, limits: &[Limit]) -> bool {
     })
 }
 
-/// Returns the number of an event indicator of FMI 3.0 from its variable's name.
+/// Returns the number of an event indicator of FMI 3.0 if the name of the variable is that of an indicator.
 fn is_indicator(name: &str) -> Option<usize> {
     name.strip_prefix("event_indicator[")?.strip_suffix(']')?.parse().ok()
 }
@@ -229,7 +229,7 @@ impl Edits {
         self.0.sort_by_key(|(range, _)| range.start);
         let (mut text, mut at) = (String::with_capacity(xml.len()), 0);
         for (range, value) in self.0 {
-            // Skipped is an attribute of an element that is removed.
+            // An attribute of an element that is removed is skipped.
             if range.start < at {
                 continue;
             }

@@ -1,20 +1,19 @@
-//! Communication points of a run, and the inputs between them. The command and the Python package use the
-//! same rules.
+//! Communication points of a run, and the inputs between them. The command line and the Python package follow the same rules.
 //!
-//! An input is a [`History`]: rows that are joined by straight lines or held. The [`Schedule`] of a run has a
-//! communication point at the start, at every row of an input, at every row of the result, and at the stop
-//! time. Therefore a line between two rows is never sampled, and the rows of the result can be chosen freely.
+//! An input is a [`History`]: rows that are joined by straight lines, or held. The [`Schedule`] of a run has a
+//! communication point at the start, at every row of an input, at every row of the result, and at the stop time. The
+//! FMU therefore follows a line between two rows exactly, and the rows of the result can be chosen freely.
 
 use anyhow::{Result, bail, ensure};
 use files::budget;
 
 use crate::description::ModelDescription;
 
-/// A row of the result is moved to a row of an input, or to the stop time, if it differs by less than this
-/// fraction of the row interval, because for example 3 · 0.02 is not exactly 0.06.
+/// A row of the result is moved to a row of an input or to the stop time if the two differ by less than this fraction
+/// of the row interval. This is needed because, for example, 3 · 0.02 is not exactly 0.06.
 const SAME: f64 = 1e-6;
 
-/// Sentence in the metadata of a result file. It states at which time the inputs and the outputs in one row hold.
+/// Sentence in the metadata of a result file. It states the times to which the inputs and the outputs in one row belong.
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 
@@ -34,9 +33,9 @@ pub struct History {
 }
 
 impl History {
-    /// Creates a history with the value `values[k]` at `time[k]` (s). From there to the next row it has the
-    /// slope `slopes[k]` (per s) and may jump at the end of that interval. Without `slopes` two rows are
-    /// joined by a straight line; with `hold` the value is constant between rows.
+    /// Creates a history with the value `values[k]` at `time[k]` (s). From there it has the slope `slopes[k]` (per s)
+    /// until the next row, at which it may jump. Without `slopes` two rows are joined by a straight line; with `hold`
+    /// the value is constant between rows.
     ///
     /// # Errors
     ///
@@ -99,23 +98,22 @@ impl History {
         self.at_row(self.time.partition_point(|row| *row <= t), t)
     }
 
-    /// Returns the value at `t` (s), for a clock with rounding errors: a row that begins up to 1e-9 (1 + |t|) s after `t`
-    /// counts as begun.
+    /// Returns the value at `t` (s) for a clock with rounding errors: a row that begins at most 1e-9 (1 + |t|) s after
+    /// `t` counts as begun.
     pub fn near(&self, t: f64) -> f64 {
         let slack = 1e-9 * (1.0 + t.abs());
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
-    /// Returns the value of the input and its slope, per s, at `t`, s, if `begun` rows of the
-    /// history begin at `t` or before.
+    /// Returns the value of the input and its slope, per s, at `t`, s. `begun` is the number of rows that begin
+    /// at `t` or before.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);
         (if t == self.time[k] { value } else { value + slope * (t - self.time[k]) }, slope)
     }
 
-    /// Returns a cursor that evaluates the history at ascending times, which is faster than searching each
-    /// time.
+    /// Returns a cursor that evaluates the history at ascending times. This is faster than a search for each time.
     pub fn cursor(&self) -> Cursor<'_> {
         Cursor { history: self, begun: 0 }
     }
@@ -127,8 +125,7 @@ pub struct Cursor<'h> {
 }
 
 impl Cursor<'_> {
-    /// Returns the value and the slope (per s) immediately after `t` (s), which must not be before the `t` of the last
-    /// call.
+    /// Returns the value and the slope (per s) immediately after `t` (s). `t` must not be before the `t` of the previous call.
     pub fn after(&mut self, t: f64) -> (f64, f64) {
         let time = &self.history.time;
         while time.get(self.begun).is_some_and(|row| *row <= t) {
@@ -161,7 +158,7 @@ impl Schedule {
         let mut knots: Vec<f64> = Vec::new();
         let mut last: Option<&[f64]> = None;
         for times in inputs {
-            // The inputs of one table have the same rows.
+            // All inputs of one table have the same rows.
             if last != Some(times) {
                 let from = times.partition_point(|t| *t <= start);
                 let to = times.partition_point(|t| *t < stop);
@@ -233,9 +230,9 @@ pub fn interpolates(description: &ModelDescription) -> bool {
         .is_none_or(|co_simulation| co_simulation.can_interpolate_inputs)
 }
 
-/// Refuses inputs with slopes for an FMU that cannot interpolate. If they were held over each step, they
-/// would lag, and a row of the result would have an input together with the response to the previous input.
-/// `hold` is the option by which the user can hold inputs between rows; it is named in the message.
+/// Refuses inputs with slopes for an FMU that cannot interpolate. If such inputs were held over each step, they would
+/// lag, and a row of the result would pair an input with the response to the previous input. `hold` is the option by
+/// which the user can hold inputs between rows, for the message.
 ///
 /// # Errors
 ///
@@ -278,7 +275,7 @@ mod tests {
                 (0.015, false),
                 (0.02, true),
                 (0.04, true),
-                // 3 · 0.02 is 0.06 and an ulp
+                // 3 · 0.02 is 0.06 plus one ulp
                 (0.06, true),
                 (0.07, true)
             ]
@@ -290,7 +287,7 @@ mod tests {
             schedule((-0.02, 0.01), Some(0.02), &[0.0, 0.005]),
             [(-0.02, true), (0.0, true), (0.005, false), (0.01, true)]
         );
-        // a row within 1e-6 of a step before a knot is moved there, not doubled
+        // A row that differs from a row of an input by less than 1e-6 of a step is moved to it, not added.
         let near = [0.0, 0.02 + 1e-9, 0.04 - 1e-9, 0.06];
         let found = schedule((0.0, 0.06), Some(0.02), &near);
         assert_eq!(found, near.map(|t| (t, true)));
@@ -309,7 +306,7 @@ mod tests {
         assert_eq!(at(&lines(false), -1.0), (0.0, 0.0));
         assert_eq!(at(&lines(true), 2.9), (5.0, 0.0));
         assert_eq!(lines(false).held(), lines(true));
-        // 3 · 0.1 lies an ulp after 0.3, 1 - 0.9 three before 0.1
+        // 3 · 0.1 is one ulp above 0.3, and 1 - 0.9 is three ulps below 0.1.
         assert_eq!(lines(true).near(1.0 - 1e-12), 5.0);
         let given = History::new(
             vec![0.0, 1.0, 2.0],

@@ -1,5 +1,5 @@
-//! Makes symbols of libraries readable for messages: names of C++ and Rust functions without mangling and without
-//! arguments.
+//! Makes symbols of libraries readable for messages: returns the names of C++ and Rust functions without
+//! mangling and without arguments.
 
 use std::fmt::{self, Write};
 
@@ -7,8 +7,8 @@ use cpp_demangle::{DemangleOptions, Symbol};
 
 const LONGEST: usize = 60;
 
-/// A text that keeps only the first characters of a symbol's name. Writing to it fails when it is
-/// full, because short symbols of C++ may stand for extremely long names.
+/// A text that stores only the first characters of a symbol's name. Writing fails when it is full, because short
+/// symbols of C++ may stand for extremely long names.
 #[derive(Default)]
 struct Short(String);
 
@@ -25,8 +25,7 @@ impl Write for Short {
     }
 }
 
-/// Returns the name of a symbol, shortened, for a message. `None` if the symbol is mangled and cannot be
-/// decoded.
+/// Returns the readable name of a symbol, shortened, for a message. `None` if the symbol is mangled and cannot be decoded.
 pub fn readable(symbol: &str) -> Option<String> {
     let mut name = Short::default();
     let written = if let Ok(rust) = rustc_demangle::try_demangle(symbol) {

@@ -1,4 +1,4 @@
-//! Reads XML into a tree of elements with line numbers. All XML of the harness is read here.
+//! Reads XML into a tree of elements with line numbers. The harness reads all XML with this module.
 
 use std::borrow::Cow;
 
@@ -15,8 +15,7 @@ pub const MOST_OF_ONE: usize = 200;
 pub const LONGEST_NAME: usize = 1000;
 /// Longest value of an attribute, bytes. The longest values in FMI are lists of dependencies.
 pub const LONGEST_VALUE: usize = 1 << 20;
-/// Largest number of XML namespaces that a file may declare. The time to look up a name grows with
-/// it.
+/// Largest number of XML namespaces that a file may declare. It is limited because the time to look up a name grows with it.
 pub const MOST_NAMESPACES: usize = 100;
 
 /// Reason for refusing a file. All texts except `TooLarge` begin with `line 1, column 1: `.
@@ -110,8 +109,8 @@ impl Element {
         self.children.iter().for_each(|child| child.pack(to));
     }
 
-    /// Reads an element in the format of [`Element::pack`] and removes it from `bytes`. The texts are not
-    /// copied. Returns `None` if the bytes have another format.
+    /// Reads an element in the format of [`Element::pack`] and removes it from `bytes`, without copying its texts.
+    /// Returns `None` if the bytes have another format.
     pub fn unpack(bytes: &mut &'static [u8]) -> Option<Element> {
         fn number(bytes: &mut &'static [u8]) -> Option<usize> {
             let number;
@@ -124,7 +123,7 @@ impl Element {
             (text, *bytes) = bytes.split_at_checked(length)?;
             std::str::from_utf8(text).ok().map(Cow::Borrowed)
         }
-        // Each item has at least 8 bytes, which limits the memory that a wrong number could reserve.
+        // Each item has at least 8 bytes. This limits the memory that a wrong number could reserve.
         fn read_count(bytes: &mut &'static [u8]) -> Option<usize> {
             number(bytes).filter(|count| *count <= bytes.len() / 8)
         }
@@ -163,9 +162,8 @@ impl Element {
     }
 }
 
-/// Returns the first limit that a file exceeds. This is checked before parsing, because the time of some
-/// parsers grows with the square of the depth or of the number of attributes. The file need not be
-/// well-formed; the parser checks that later.
+/// Returns the first limit that a file exceeds. The limits are checked before parsing, because the time of some parsers
+/// grows with the square of the depth or of the number of attributes. The parser checks later if the file is well-formed.
 fn exceeded_budget(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {
@@ -187,7 +185,7 @@ fn exceeded_budget(text: &str) -> Option<String> {
             rest = rest.split_once(end)?.1;
             continue;
         }
-        // A start tag up to its end, which is not within quotes.
+        // the end of the start tag, which must not be within quotes
         let (mut quote, mut attributes, mut empty) = (None, 0, false);
         let (mut name, mut longest_name, mut value, mut longest_value) = (0usize, 0, 0usize, 0);
         let end = rest.bytes().position(|byte| {
@@ -207,7 +205,7 @@ fn exceeded_budget(text: &str) -> Option<String> {
             longest_value = longest_value.max(value);
             false
         });
-        // The parser reports a tag without an end, but the length of its names is checked here.
+        // The parser reports a tag without an end; here only the length of its names is checked.
         let end = end.unwrap_or(rest.len().saturating_sub(1));
         depth += 1;
         elements += 1;
@@ -294,7 +292,7 @@ mod tests {
         assert_eq!(Element::unpack(&mut rest).as_ref(), Some(&root));
         assert!(rest.is_empty());
         assert_eq!(Element::unpack(&mut short), None);
-        // a length that the file does not have, in each place, or another line
+        // a wrong length at each position, or another number of a line
         for at in 0..all.len() - 3 {
             let mut wrong = all.to_vec();
             wrong[at..at + 4].fill(0xff);
@@ -322,7 +320,7 @@ mod tests {
             let fault = Element::parse(wrong.as_bytes()).unwrap_err();
             assert!(matches!(&fault, Fault::TooLarge(why) if why.contains("deeper than")));
         }
-        // neither comments nor texts nor empty elements are levels
+        // Comments, texts and empty elements do not count as levels.
         let flat = ["<b/>", "<b c='>'/>", "<!-- <b> -->", "<![CDATA[<b>]]>", "<?b <b> ?>"];
         let flat = format!("<a>{}</a>", flat.map(|one| one.repeat(300)).concat());
         assert_eq!(Element::parse(flat.as_bytes()).unwrap().children.len(), 600);

@@ -211,7 +211,7 @@ def test_a_second_study_is_refused_while_one_holds_the_folder(tmp_path: Path) ->
     def second(values: dict) -> dict[str, float]:
         with pytest.raises(FmuError) as error:
             study(tmp_path)
-        assert f"is held by another study: process {os.getpid()}, monte_carlo" in str(error.value)
+        assert f"is in use by another study: process {os.getpid()}, monte_carlo" in str(error.value)
         assert "give another folder" in str(error.value)
         return outcome(values)
 
@@ -310,7 +310,7 @@ def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_
                 msvcrt.locking(lock.fileno(), msvcrt.LK_NBLCK, 1)
             else:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            says(False, rf"is held by another {kind}: process \d+, .*, for \d+ s; wait for its end")
+            says(False, rf"is in use by another {kind}: process \d+, .*, for \d+ s; wait for its end")
         says(True)
         changed = "re-running .*: the SHA-256 of the file differs from the one in manifest.sha256"
         for data in (whole[: len(whole) // 2], b"", whole + b" "):

@@ -193,7 +193,7 @@ fn a_second_campaign_in_a_directory_is_refused_with_the_name_of_the_first() {
     let done = campaign(directory, plan).output().unwrap();
     let (_, error) = said(&done);
     assert_eq!(done.status.code(), Some(1), "{error}");
-    for words in ["c is held by another campaign", "the plan \"First\"", "--out DIRECTORY"] {
+    for words in ["c is in use by another campaign", "the plan \"First\"", "--out DIRECTORY"] {
         assert!(error.contains(words), "\"{words}\" is not in: {error}");
     }
     assert!(error.contains(&format!("process {}", std::process::id())), "{error}");

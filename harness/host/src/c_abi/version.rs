@@ -1,6 +1,5 @@
-//! An FMU and its instances, as far as the versions of FMI have them in common. The trait [`Version`]
-//! contains the differences; `fmi2.rs` and `fmi3.rs` implement it and add the calls that only one version
-//! has.
+//! The part of an FMU and its instances that all versions of FMI have in common. The trait [`Version`] contains the
+//! differences; `fmi2.rs` and `fmi3.rs` implement it and add the calls that only one version has.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -60,13 +59,13 @@ functions! { Exchange<B>:
 /// A C function that writes the values of variables into an array of the host.
 pub(crate) trait Getter<T> {
     /// # Safety
-    /// It is a function of the FMU of this instance.
+    /// The function must belong to the FMU of this instance.
     unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int;
 }
 
 pub(crate) trait Setter<T> {
     /// # Safety
-    /// It is a function of the FMU of this instance, and what the values point to is alive.
+    /// The function must belong to the FMU of this instance, and everything that the values point to must exist.
     unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int;
 }
 
@@ -93,10 +92,10 @@ pub struct Updated {
     pub next_event: Option<f64>,
 }
 
-/// Folders of the binaries for the platform of this program in FMI 2.0 (FMI 2.0.5, section 2.3) and in FMI 3.0
-/// (FMI 3.0.2, section 2.5.1.4.1). In FMI 2.0 names with 32 and 64 are for x86, and other processors use the
-/// platform tuples of FMI 3.0. On macOS darwin64 is used for both processors, because hosts look there on both,
-/// and one universal binary serves both.
+/// Folders of the binaries for the platform of this program in FMI 2.0 (FMI 2.0.5, section 2.3) and in FMI 3.0 (FMI
+/// 3.0.2, section 2.5.1.4.1). In FMI 2.0 names with 32 and 64 are for x86, and other processors use the platform
+/// tuples of FMI 3.0. On macOS darwin64 is used for both processors, because hosts look there on both, and one
+/// universal binary serves both.
 pub(crate) const PLATFORM: [&str; 2] = {
     let (is_arm, has_64_bits) = (cfg!(target_arch = "aarch64"), cfg!(target_pointer_width = "64"));
     match (cfg!(target_os = "windows"), cfg!(target_os = "macos"), is_arm) {
@@ -157,8 +156,8 @@ pub trait Version: Sized {
     /// Sets the time derivatives of inputs, per s, if this version has a call for that.
     fn set_slopes(instance: &mut Instance<'_, Self>, references: &[u32], slopes: &[f64]) -> Called;
 
-    /// Makes a step in which inputs change linearly: they are set to `values` at the start of the step and
-    /// have the derivatives `slopes`, per s.
+    /// Makes a step in which inputs change linearly: their values at the start of the step are `values`, and their
+    /// derivatives are `slopes`, per s.
     fn step_along(
         instance: &mut Instance<'_, Self>,
         time: f64,
@@ -207,11 +206,11 @@ pub struct Fmu<V: Version> {
     /// True if all Reals are scalars of type Float64, so that they can be exchanged in one call.
     is_plain: bool,
     plain: Vec<u32>,
-    /// Value references of the Float64 inputs, and of elements of input arrays, that an FMU 3.0 accepts
-    /// within a step; ascending.
+    /// Value references of those Float64 inputs, and elements of input arrays, that an FMU 3.0 accepts within a step;
+    /// ascending.
     pub(crate) taken: Vec<u32>,
     structural: BTreeMap<u32, Value>,
-    // Dropped in this order: first the library, then its files.
+    // The order of these fields is the order in which they are dropped: first the library, then its files.
     library: Option<Library>,
     _directory: Option<temporary::Folder>,
 }
@@ -231,8 +230,8 @@ impl<V: Version> Fmu<V> {
         Fmu::from_archive(&archive, described, path, Interface::CoSimulation, &[])
     }
 
-    /// Loads the FMU in an archive for one interface. Of `settings` only structural parameters of FMI 3.0 are
-    /// used, because they determine the sizes of arrays.
+    /// Loads the FMU in an archive for one interface. Of `settings` only structural parameters of FMI 3.0 are used,
+    /// because they determine the sizes of arrays.
     pub(crate) fn from_archive(
         archive: &Archive,
         (text, description): (String, ModelDescription),
@@ -261,8 +260,8 @@ impl<V: Version> Fmu<V> {
         Ok(fmu)
     }
 
-    /// Loads the binary of an FMU that is unpacked in `directory`, for Co-Simulation if the FMU has it.
-    /// Errors call the FMU `path`. [`Fmu::hash`] is empty, because there is no archive.
+    /// Loads the binary of an FMU that is unpacked in `directory`, for Co-Simulation if the FMU offers it. `path` is
+    /// the FMU's name in error messages. [`Fmu::hash`] is empty, because there is no archive.
     pub fn load(directory: &Path, path: &Path) -> Result<Self> {
         Fmu::load_binary(None, directory, path)
     }
@@ -322,8 +321,8 @@ impl<V: Version> Fmu<V> {
         if !lacking.is_empty() {
             bail!("{binary} in the FMU {name} lacks the functions {}", lacking.join(", "));
         }
-        // SAFETY: the binary says it follows this version of FMI, whose types the tables declare; an FMU of one interface
-        // lacks the other's functions, and nothing is wrong.
+        // SAFETY: by its modelDescription.xml the binary has the functions of this version of FMI, whose types the
+        // tables declare. An FMU with one interface may lack the functions of the other.
         let (common, own, exchange) = unsafe {
             let refused = || format!("{binary} in the FMU {name} cannot be used");
             (
@@ -357,9 +356,9 @@ impl<V: Version> Fmu<V> {
         })
     }
 
-    /// Sets structural parameters to other values than those declared. Every instance of [`Fmu::instantiate`]
-    /// then sets them first, in configuration mode, and [`Fmu::description`] has the resulting array sizes.
-    /// For arrays of another size the start values are read from the FMU. `text` is modelDescription.xml.
+    /// Sets structural parameters to values other than the declared ones. Every instance of [`Fmu::instantiate`] then
+    /// sets them first, in configuration mode, and [`Fmu::description`] has the resulting array sizes. For arrays of
+    /// another size the start values are read from the FMU. `text` is modelDescription.xml.
     ///
     /// # Errors
     ///
@@ -381,7 +380,8 @@ impl<V: Version> Fmu<V> {
         if !is_set {
             return Ok(());
         }
-        // The FMU is asked first, because a size that it refuses may also be too large for a description.
+        // The FMU is asked before the description is parsed, because a size that the FMU refuses may also be too
+        // large for a description.
         let mut instance = self.instantiate("sizes")?;
         let mut description = ModelDescription::from_xml_with(text, &self.structural)?;
         let mut starts = Vec::new();
@@ -424,7 +424,7 @@ impl<V: Version> Fmu<V> {
     }
 
     pub fn version(&self) -> String {
-        // SAFETY: takes nothing, returns a constant string.
+        // SAFETY: the function has no arguments and returns a constant string.
         unsafe { copy_text((self.common.get_version.call)()) }
     }
 
@@ -461,7 +461,7 @@ impl<V: Version> Fmu<V> {
         environment.begin_call();
         let component = make();
         calls.end();
-        // A NULL pointer never reaches the FMU again.
+        // From here on no NULL pointer reaches the FMU.
         let instance = Instance {
             fmu: self,
             component,
@@ -485,8 +485,8 @@ impl<V: Version> Fmu<V> {
     }
 }
 
-/// Returns true if all Reals are scalars of type Float64, and the value references of those Reals
-/// that are, in ascending order.
+/// Returns true if all Reals are scalars of type Float64, and the value references of all Reals that are scalars of
+/// type Float64, in ascending order.
 fn scalar_reals(description: &ModelDescription) -> (bool, Vec<u32>) {
     let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
     let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
@@ -518,8 +518,8 @@ pub struct Instance<'fmu, V: Version> {
     pub(crate) kept: V::Kept,
     warned: Cell<Option<&'static str>>,
     pub(crate) calls: Calls,
-    /// Values of arrays, by value reference, of which single elements were set before the whole
-    /// array could be read from the FMU.
+    /// Values of arrays, by value reference. An array is here if single elements of it were set before the whole array
+    /// could be read from the FMU.
     arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
     one_thread: PhantomData<*mut ()>,
 }
@@ -528,8 +528,8 @@ impl<V: Version> Drop for Instance<'_, V> {
     fn drop(&mut self) {
         if !self.component.is_null() {
             self.begin_call();
-            // SAFETY: made by the FMU, freed here alone; the environment and what is kept go after it, because it may still
-            // log.
+            // SAFETY: the FMU created the instance, and only this call frees it. The environment is dropped later,
+            // because the FMU may still log.
             unsafe { (self.fmu.common.free_instance.call)(self.component) };
             self.calls.end();
         }
@@ -591,12 +591,12 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     }
 
     pub(crate) fn call_plain(&self, function: Function<Call>) -> Called {
-        // SAFETY: plain call on a live instance.
+        // SAFETY: the instance is alive.
         self.call(function, |f, c| unsafe { f(c) })
     }
 
     fn vector(&self, function: Function<GetVector>, x: &mut [f64]) -> Called {
-        // SAFETY: a slice of the length given.
+        // SAFETY: the slice has the length that is passed.
         self.call(function, |f, c| unsafe { f(c, x.as_mut_ptr(), x.len()) })
     }
 
@@ -606,7 +606,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         references: &[u32],
         values: &mut [T],
     ) -> Called {
-        // SAFETY: a function of this FMU.
+        // SAFETY: the function belongs to this FMU.
         self.call(function, |f, c| unsafe { f.get(c, references, values) })
     }
 
@@ -616,7 +616,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         references: &[u32],
         values: &[T],
     ) -> Called {
-        // SAFETY: a function of this FMU.
+        // SAFETY: the function belongs to this FMU.
         self.call(function, |f, c| unsafe { f.set(c, references, values) })
     }
 
@@ -628,7 +628,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     ) -> Called<Vec<String>> {
         let mut pointers: Vec<*const c_char> = vec![null(); count];
         self.read(function, references, &mut pointers)?;
-        // SAFETY: the FMU answered OK, so each points to a terminated string of the FMU.
+        // SAFETY: the FMU has returned OK, so that each pointer leads to a terminated string of the FMU.
         Ok(pointers.into_iter().map(|text| unsafe { copy_text(text) }).collect())
     }
 
@@ -645,7 +645,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Called {
         let (_texts, pointers) = c_strings(categories);
         let start = if pointers.is_empty() { null() } else { pointers.as_ptr() };
-        // SAFETY: pointers to strings that outlive the call.
+        // SAFETY: the pointers lead to strings that exist until the call has returned.
         self.call(self.fmu.common.set_debug_logging, |f, c| unsafe {
             f(c, on.into(), pointers.len(), start)
         })
@@ -711,8 +711,8 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(values.into_iter().nth(index).unwrap_or(Value::String(String::new())))
     }
 
-    /// Sets a variable or one element of an array. The other elements keep the values that were set last, or
-    /// their start values.
+    /// Sets a variable or one element of an array. The other elements of the array keep the values that were set last,
+    /// or their start values.
     pub fn set_value(&mut self, variable: &Variable, value: Value) -> Called {
         let description = &self.fmu.description;
         let Some(element) = description.element(variable.reference) else {
@@ -763,13 +763,12 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         }
     }
 
-    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or
-    /// number.
+    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or number.
     ///
     /// # Errors
     ///
-    /// If the text does not fit the type, the FMU refuses the value, or the variable is a structural
-    /// parameter of FMI 3.0 and the value differs from that with which the FMU was opened.
+    /// If the text is not a value of the variable's type, the FMU refuses the value, or the variable is a structural
+    /// parameter of FMI 3.0 and the value differs from the value with which the FMU was opened.
     pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
         let description = &self.fmu.description;
         let variable = description.variable(name)?;
@@ -796,27 +795,27 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     }
 
     pub fn get_state_into(&mut self, state: &mut FmuState) -> Called {
-        // SAFETY: NULL or a handle from this FMU.
+        // SAFETY: the handle is NULL or comes from this FMU.
         self.call(self.fmu.common.get_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
     pub fn set_state(&mut self, state: &FmuState) -> Called {
-        // SAFETY: a handle from this FMU.
+        // SAFETY: the handle comes from this FMU.
         self.call(self.fmu.common.set_fmu_state, |f, c| unsafe { f(c, state.0) })
     }
 
     pub fn free_state(&mut self, mut state: FmuState) -> Called {
-        // SAFETY: a handle from this FMU, gone after this call.
+        // SAFETY: the handle comes from this FMU and is not used after this call.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
     pub fn serialize(&mut self, state: &FmuState) -> Called<Vec<u8>> {
         let mut size = 0;
         let common = &self.fmu.common;
-        // SAFETY: a handle from this FMU, a place for the size.
+        // SAFETY: the handle comes from this FMU, and there is a variable for the size.
         self.call(common.serialized_fmu_state_size, |f, c| unsafe { f(c, state.0, &mut size) })?;
         let mut bytes = vec![0u8; size];
-        // SAFETY: `size` bytes are there.
+        // SAFETY: the array has `size` bytes.
         self.call(common.serialize_fmu_state, |f, c| unsafe {
             f(c, state.0, bytes.as_mut_ptr(), size)
         })?;
@@ -825,7 +824,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
 
     pub fn deserialize(&mut self, bytes: &[u8]) -> Called<FmuState> {
         let mut state = FmuState(null_mut());
-        // SAFETY: `bytes.len()` bytes are there.
+        // SAFETY: the array has `bytes.len()` bytes.
         self.call(self.fmu.common.deserialize_fmu_state, |f, c| unsafe {
             f(c, bytes.as_ptr(), bytes.len(), &mut state.0)
         })?;
@@ -842,7 +841,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     ///
     /// # Panics
     ///
-    /// If the FMU does not export the functions of Model Exchange; this holds for all calls of this section.
+    /// If the FMU does not export the functions of Model Exchange. This applies to all calls of this section.
     pub fn enter_continuous_time_mode(&mut self) -> Called {
         self.call_plain(self.exchange().enter_continuous_time_mode)
     }
@@ -850,7 +849,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     pub fn completed_integrator_step(&mut self) -> Called<CompletedStep> {
         let no = V::Boolean::default();
         let (mut enter, mut terminate) = (no, no);
-        // SAFETY: places for the answers.
+        // SAFETY: the pointers lead to variables for the results.
         self.call(self.exchange().completed_integrator_step, |f, c| unsafe {
             f(c, true.into(), &mut enter, &mut terminate)
         })?;
@@ -858,12 +857,12 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     }
 
     pub fn set_time(&mut self, time: f64) -> Called {
-        // SAFETY: plain value on a live instance.
+        // SAFETY: the argument is a plain value, and the instance is alive.
         self.call(self.exchange().set_time, |f, c| unsafe { f(c, time) })
     }
 
     pub fn set_continuous_states(&mut self, x: &[f64]) -> Called {
-        // SAFETY: a slice of the length given.
+        // SAFETY: the slice has the length that is passed.
         self.call(self.exchange().set_continuous_states, |f, c| unsafe {
             f(c, x.as_ptr(), x.len())
         })

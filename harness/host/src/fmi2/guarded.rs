@@ -1,5 +1,5 @@
-//! Calls with a margin of known bytes before and after each array, which shows whether an FMU writes outside
-//! an array or into an array that it may only read.
+//! Calls with a margin of known bytes before and after each array. The margins show if an FMU writes outside an array,
+//! and the array itself if an FMU writes into an array that it may only read.
 
 use super::*;
 use crate::c_abi::version::{GetVector, State};
@@ -24,7 +24,7 @@ impl Guarded {
 
     fn input<T: Copy>(values: &[T]) -> Guarded {
         let mut array = Guarded::output::<T>(values.len());
-        // SAFETY: there is room for them, and the two do not overlap.
+        // SAFETY: the array has room for the values, and the two do not overlap.
         unsafe { array.pointer::<T>().copy_from_nonoverlapping(values.as_ptr(), values.len()) };
         array.input = Some(array.content());
         array
@@ -94,8 +94,7 @@ fn lengths(all: usize) -> Vec<usize> {
 }
 
 impl Instance<'_> {
-    /// Makes calls with margins around every array and returns the writes into the margins, whatever the
-    /// status of the calls; for tests.
+    /// Makes calls with margins around every array, and returns the stray writes, also of calls that fail; for tests.
     pub fn find_stray_writes(&mut self, lists: &Lists) -> Vec<StrayWrite> {
         let mut found = Vec::new();
         self.begin_call();
@@ -119,7 +118,7 @@ impl Instance<'_> {
         let (references, values): (Vec<u32>, Vec<f64>) = lists.inputs.iter().copied().unzip();
         for n in lengths(references.len()) {
             let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::input(&values[..n]));
-            // SAFETY: arrays of n values each; so in all calls of this file.
+            // SAFETY: all arrays have n values; the same holds for all calls of this file.
             unsafe { (f.set_real.call)(self.component, vr.pointer(), n, x.pointer()) };
             record_faults(found, f.set_real.name, n, &[("vr", &vr), ("value", &x)]);
         }
@@ -133,7 +132,7 @@ impl Instance<'_> {
     ) {
         for n in lengths(references.len()) {
             let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::output::<T>(n));
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe { (function.call)(self.component, vr.pointer(), n, x.pointer()) };
             record_faults(found, function.name, n, &[("vr", &vr), ("value", &x)]);
         }
@@ -147,7 +146,7 @@ impl Instance<'_> {
                 (Guarded::input(&lists.unknowns[..n]), Guarded::input(&lists.knowns));
             let (mut along, mut answer) =
                 (Guarded::input(&vec![1.0; m]), Guarded::output::<f64>(n));
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe {
                 (f.call)(
                     c,
@@ -173,7 +172,7 @@ impl Instance<'_> {
             let (mut vr, mut order) =
                 (Guarded::input(&lists.outputs[..n]), Guarded::input(&vec![1 as c_int; n]));
             let mut x = Guarded::output::<f64>(n);
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe { (f.call)(c, vr.pointer(), n, order.pointer(), x.pointer()) };
             let arrays = [("vr", &vr), ("order", &order), ("value", &x)];
             record_faults(found, f.name, n, &arrays);
@@ -192,27 +191,27 @@ impl Instance<'_> {
         for (function, count) in vectors {
             let Some(n) = count else { continue };
             let mut x = Guarded::output::<f64>(n);
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe { (function.call)(c, x.pointer(), n) };
             record_faults(found, function.name, n, &[("the vector", &x)]);
         }
         if let Some(n) = lists.states.filter(|n| *n > 0) {
             let mut now = vec![0.0; n];
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe { (f.get_continuous_states.call)(c, now.as_mut_ptr(), n) };
             let mut x = Guarded::input(&now);
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe { (f.set_continuous_states.call)(c, x.pointer(), n) };
             record_faults(found, f.set_continuous_states.name, n, &[("x", &x)]);
         }
         if lists.states.is_some() {
             let (mut enter, mut end) = (Guarded::output::<c_int>(1), Guarded::output::<c_int>(1));
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             unsafe { (f.completed_integrator_step.call)(c, 1, enter.pointer(), end.pointer()) };
             let arrays = [("enterEventMode", &enter), ("terminateSimulation", &end)];
             record_faults(found, f.completed_integrator_step.name, 1, &arrays);
             let mut info = Guarded::output::<EventInfo>(1);
-            // SAFETY: see check_values; the host goes back to continuous-time mode.
+            // SAFETY: the same as in `check_values`; the host returns to continuous-time mode.
             unsafe {
                 (events.enter_event_mode.call)(c);
                 (events.new_discrete_states.call)(c, info.pointer());
@@ -226,19 +225,19 @@ impl Instance<'_> {
         let (f, c) = (&self.fmu.common, self.component);
         let Ok(state) = self.get_state() else { return };
         let mut size = Guarded::output::<usize>(1);
-        // SAFETY: see check_values.
+        // SAFETY: the same as in `check_values`.
         let status = unsafe { (f.serialized_fmu_state_size.call)(c, state.0, size.pointer()) };
         record_faults(found, f.serialized_fmu_state_size.name, 1, &[("size", &size)]);
         let n = size.words[MARGIN / 8] as usize;
         if status == 0 && n < 1 << 30 {
             let mut bytes = Guarded::output::<u8>(n);
-            // SAFETY: see check_values.
+            // SAFETY: the same as in `check_values`.
             let status = unsafe { (f.serialize_fmu_state.call)(c, state.0, bytes.pointer(), n) };
             record_faults(found, f.serialize_fmu_state.name, n, &[("serializedState", &bytes)]);
             if status == 0 {
                 let mut bytes = Guarded::input(&bytes.content());
                 let mut copy: State = null_mut();
-                // SAFETY: see check_values.
+                // SAFETY: the same as in `check_values`.
                 unsafe { (f.deserialize_fmu_state.call)(c, bytes.pointer(), n, &mut copy) };
                 record_faults(
                     found,
@@ -273,18 +272,18 @@ mod tests {
     #[test]
     fn writing_outside_an_array_is_a_fault_and_writing_inside_is_not() {
         let mut array = Guarded::output::<c_int>(3);
-        // SAFETY: inside the array.
+        // SAFETY: the address is inside the array.
         unsafe { array.pointer::<c_int>().add(2).write(7) };
         assert_eq!(array.fault(), None);
-        // SAFETY: inside the margin.
+        // SAFETY: the address is inside the margin.
         unsafe { array.pointer::<u8>().add(12).write(1) };
         assert_eq!(array.fault().as_deref(), Some("it writes up to 1 bytes past its end"));
         let mut array = Guarded::output::<f64>(1);
-        // SAFETY: inside the margin.
+        // SAFETY: the address is inside the margin.
         unsafe { array.pointer::<u8>().sub(8).write(1) };
         assert_eq!(array.fault().as_deref(), Some("it writes up to 8 bytes before its beginning"));
         let mut array = Guarded::input(&[1.0, 2.0]);
-        // SAFETY: inside the array.
+        // SAFETY: the address is inside the array.
         unsafe { array.pointer::<f64>().write(3.0) };
         assert_eq!(array.fault().as_deref(), Some("it changes what it shall only read"));
     }

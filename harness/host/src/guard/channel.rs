@@ -4,9 +4,9 @@
 //! in its memory and begins each message with it. After bytes that do not begin with the nonce the parent
 //! accepts nothing more.
 //!
-//! On Unix the connection is a pair of sockets, of which one is the child's stdin. A socket cannot be opened
-//! through /proc, so that no other process can read the messages. On Windows the standard library cannot pass
-//! on a socket, so the connection is a file, which a binary in the process could read.
+//! On Unix the connection is a pair of sockets, one of which is the child's stdin. A socket cannot be opened through
+//! /proc, so that no other process can read the messages. On Windows the standard library cannot pass a socket to a
+//! child, so that the connection is a file, which a binary in the process could read.
 
 use std::fs::File;
 use std::hash::{BuildHasher, RandomState};
@@ -45,15 +45,14 @@ pub struct Process {
 pub const REQUEST: usize = 3;
 const REQUEST_BYTES: usize = NONCE + 8 * REQUEST;
 
-/// Returns random bytes. They come from the hashers of the standard library's maps, which are seeded by the
-/// system's random numbers.
+/// Returns random bytes from the hashers of the standard library's maps, which are seeded with random numbers of the system.
 fn nonce() -> [u8; NONCE] {
     let half = || u128::from(RandomState::new().hash_one(0));
     (half() << 64 | half()).to_ne_bytes()
 }
 
-/// Creates a connection on which the request already waits. Returns the parent's end, and stdin for the
-/// process.
+/// Creates a connection on which the request is already waiting. Returns the parent's end of the connection, and
+/// stdin for the process.
 #[cfg(unix)]
 pub fn open(
     request: [u64; REQUEST],
@@ -78,8 +77,8 @@ pub fn open(
     Ok((parent, OwnedFd::from(stdin).into()))
 }
 
-/// Creates a connection, a file in `folder`, on which the request already waits. Returns the parent's end,
-/// and stdin for the process.
+/// Creates a connection, which is a file in `folder`, on which the request is already waiting. Returns the parent's end
+/// of the connection, and stdin for the process.
 #[cfg(not(unix))]
 pub fn open(
     request: [u64; REQUEST],
@@ -106,8 +105,8 @@ impl Parent {
         [&self.nonce[..], &numbers.map(u64::to_le_bytes).concat()].concat()
     }
 
-    /// Waits for messages for at most `pause` and passes the kind and the content of each to `hear`. Returns
-    /// false if none has arrived.
+    /// Waits for messages for at most `pause`, and passes the kind and the content of each message to `hear`. Returns
+    /// false if no message has arrived.
     pub fn read(&mut self, pause: Duration, mut hear: impl FnMut(u8, &[u8])) -> bool {
         #[cfg(unix)]
         let _ = self.end.set_read_timeout(Some(pause));
@@ -148,8 +147,8 @@ impl Parent {
 }
 
 impl Process {
-    /// Takes over the connection from stdin, which is empty afterwards. Returns it with the request and the
-    /// attached pipe.
+    /// Takes over the connection from stdin, which is empty afterwards. Returns the connection with the request
+    /// and the attached pipe.
     #[cfg(unix)]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::io::IoSliceMut;
@@ -171,7 +170,7 @@ impl Process {
         let mut pipe = None;
         for message in attached.drain() {
             if let RecvAncillaryMessage::ScmRights(files) = message {
-                // The duplicated handle is closed in programs that this process starts.
+                // Programs that this process starts do not inherit the duplicated handle.
                 pipe = files.last().map(|file| file.try_clone()).transpose()?.map(File::from);
             }
         }
@@ -179,7 +178,7 @@ impl Process {
         Ok((process, numbers, pipe))
     }
 
-    /// Takes over the connection from stdin. Returns it with the request; there is no pipe.
+    /// Takes over the connection from stdin. Returns the connection with the request; there is no pipe on this system.
     #[cfg(not(unix))]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::os::windows::io::AsHandle;
@@ -197,7 +196,7 @@ impl Process {
         (Process { end: Mutex::new(end), nonce }, std::array::from_fn(number))
     }
 
-    /// Sends a message to the parent process. It is lost if the parent has ended.
+    /// Sends a message to the parent process. If the parent has ended, the message is lost.
     pub fn send(&self, kind: u8, content: &[u8]) {
         let length = (content.len() as u32).to_le_bytes();
         let message = [&self.nonce, &[kind][..], &length, content].concat();
