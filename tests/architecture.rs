@@ -1,4 +1,4 @@
-//! The invariants of ARCHITECTURE.md that the compiler does not enforce.
+//! Checks the invariants of ARCHITECTURE.md that the compiler does not enforce.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -32,7 +32,7 @@ fn the_physics_does_not_depend_on_fmi_or_the_runtime_on_physics() {
     assert_eq!(all["runtime"], BTreeSet::new());
 }
 
-/// The build is the check: without the standard library's prelude, a crate that needs it does not compile.
+/// The build itself is the check: a crate that needs the standard library does not compile without its prelude.
 #[test]
 fn the_models_and_their_dependencies_need_no_standard_library() {
     for krate in ["formulas", "taylor", "plant", "craft"] {
@@ -44,8 +44,8 @@ fn the_models_and_their_dependencies_need_no_standard_library() {
     }
 }
 
-/// The packages of the harness, each with the packages of the workspace that it may link. From `fmu/` this is
-/// only `formulas`, which contains no model.
+/// The packages of the harness, each with the packages of the workspace that it may link. Of the packages in `fmu/`
+/// only `formulas` is allowed, because it contains no model.
 const HARNESS: [(&str, &[&str]); 15] = [
     ("files", &[]),
     ("names", &["formulas"]),
@@ -110,8 +110,8 @@ fn the_harness_never_links_a_model_and_its_packages_have_no_cyclic_dependencies(
     }
 }
 
-/// Otherwise `cargo run`, a test that builds the program or `pack::build_native` would compile again what
-/// `cargo test` has compiled.
+/// With further features, `cargo run`, a test that builds the program, and `pack::build_native` would compile packages
+/// again that `cargo test` has already compiled.
 #[test]
 fn tests_and_the_python_package_enable_no_further_features_of_the_program_s_dependencies() {
     let packages = |edges: &str, selection: &[&str]| -> BTreeSet<String> {
@@ -178,9 +178,10 @@ fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
-/// `cargo test` leaves out ignored tests, so that a script in `.ci` has to run each of them. `.ci/long-tests` runs all but those with
-/// one of the parts of names that are listed for the nightly script and for `.ci/fuzz-readers`, and the reason of an ignored test
-/// says which script it is. Each listed part must belong to a test, because `cargo test` also succeeds if it finds no test.
+/// `cargo test` skips ignored tests, so that a script in `.ci` has to run each of them. `.ci/long-tests` runs all
+/// ignored tests except for those whose names contain a part that is listed for the nightly script or for
+/// `.ci/fuzz-readers`; the reason of an ignored test names its script. Each listed part must belong to a test, because
+/// `cargo test` also succeeds if it finds no test.
 #[test]
 fn a_script_runs_every_test_that_is_ignored() {
     let root = pack::root();
@@ -221,7 +222,7 @@ fn a_script_runs_every_test_that_is_ignored() {
     assert!(stale.is_empty(), "no ignored test has these words in its name: {stale:?}");
 }
 
-/// ARCHITECTURE.md and the page of decisions name a file by its path from the root, or by the end of that path.
+/// ARCHITECTURE.md and the page of decisions name a file by its path from the root or by the end of this path.
 #[test]
 fn source_files_named_in_the_architecture_exist() {
     let text: String = ["ARCHITECTURE.md", "book/decisions.md"]
@@ -240,7 +241,7 @@ fn source_files_named_in_the_architecture_exist() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
-/// Two entries that begin alike are two wordings of one change, for example after a merge.
+/// Two entries with the same beginning are two wordings of one change, which can happen in a merge.
 #[test]
 fn each_change_has_one_entry_in_the_changelog() {
     let text = fs::read_to_string(pack::root().join("CHANGELOG.md")).expect("the changelog");
@@ -285,7 +286,7 @@ fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     }
 }
 
-/// Functions of the harness, with the file, whose signature has a text for its error.
+/// Lists the functions in a file of the harness whose errors are plain texts, each with the file.
 fn textual_errors(file: &str, code: &str) -> Vec<String> {
     let tokens = tokens(code);
     let mut found = Vec::new();
@@ -293,7 +294,7 @@ fn textual_errors(file: &str, code: &str) -> Vec<String> {
         if tokens[at] != "Result" || tokens.get(at + 1) != Some(&"<") {
             continue;
         }
-        // the arguments of the type, each as its tokens
+        // the arguments of the type, each as a list of tokens
         let (mut depth, mut arguments) = (1, vec![Vec::new()]);
         for token in &tokens[at + 2..] {
             depth += i32::from(matches!(*token, "<" | "(" | "["));
@@ -386,10 +387,10 @@ const ONE_WAY: [&str; 25] = [
     "harness/native",
 ];
 
-/// A module by its path within the crate: `["methods", "page"]`; the crate's root is `[]`.
+/// A module, as its path within the crate: `["methods", "page"]`. The root of the crate is `[]`.
 type Module = Vec<String>;
 
-/// Collects the modules of a crate with their code, without tests within the files and without comments.
+/// Collects the modules of a crate with their code, without comments and without the tests inside the files.
 fn sources(folder: &Path, module: &[String], all: &mut BTreeMap<Module, String>) {
     for entry in fs::read_dir(folder).expect("a folder of modules").flatten() {
         let path = entry.path();
@@ -428,8 +429,8 @@ fn tokens(code: &str) -> Vec<&str> {
     found
 }
 
-/// Collects every path of the tree that begins at `tokens[0]`: `a::{b, c::d as e}` has `a::b` and `a::c::d`.
-/// Returns the number of tokens of the tree.
+/// Collects every path of the import tree that begins at `tokens[0]`: `a::{b, c::d as e}` has the paths `a::b` and
+/// `a::c::d`. Returns the number of tokens of the tree.
 fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     let mut taken = 1;
     match tokens.first() {
@@ -457,7 +458,7 @@ fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     }
 }
 
-/// Lists the paths that a module names by `crate::`, `self::` and `super::`, from the crate's root.
+/// Lists the paths that a module names with `crate::`, `self::` and `super::`, from the root of the crate.
 fn named(module: &Module, code: &str) -> Vec<Module> {
     let (tokens, mut found) = (tokens(code), Vec::new());
     for at in 0..tokens.len() {
@@ -480,8 +481,8 @@ fn named(module: &Module, code: &str) -> Vec<Module> {
     found
 }
 
-/// Maps names that modules import to the paths for which they stand: a module inside uses them as
-/// `super::Name`, and all others if they are re-exported.
+/// Maps names that modules import to the paths for which they stand. An inner module uses such a name as `super::Name`;
+/// other modules use it if it is re-exported.
 fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
     let mut all = BTreeMap::new();
     for (module, code) in sources {
@@ -500,7 +501,7 @@ fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
             }
             for path in found {
                 let name: Module = module.iter().chain(path.last()).cloned().collect();
-                // a function may have the name of its module
+                // A function may have the name of its module.
                 if !path.starts_with(&name) {
                     all.insert(name, path);
                 }
@@ -522,9 +523,9 @@ fn resolved(mut path: Module, imported: &BTreeMap<Module, Module>) -> Module {
     path
 }
 
-/// Returns the modules of each folder of a crate (a folder counts as one module), each with the modules of
-/// the same folder that it names, directly or through an import of another. Items defined in `mod.rs` or
-/// `lib.rs` belong to the folder and name no module of it.
+/// Returns the modules of each folder of a crate (a subfolder counts as one module), each with the modules of the same
+/// folder that it names, directly or through an import of another module. Items that are defined in `mod.rs` or
+/// `lib.rs` belong to the folder and do not count as uses of a module.
 fn modules(
     sources: &BTreeMap<Module, String>,
 ) -> BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> {
@@ -549,7 +550,7 @@ fn modules(
 }
 
 fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
-    // What uses nothing that is left is not part of a circle.
+    // A module that uses no remaining module is not part of a cycle.
     while let Some(leaf) =
         left.iter().find(|(_, used)| used.is_empty()).map(|(name, _)| name.clone())
     {
@@ -561,8 +562,8 @@ fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTr
     left
 }
 
-/// Crates whose modules name what they use by the place of its definition, not by a re-export of the crate's
-/// root: the root imports every module, so that a module which imports from the root is in a circle with it.
+/// Crates whose modules import an item from the module that defines it, and not through a re-export of the crate's
+/// root. The root imports every module, so that a module which imports from the root would be in a cycle with it.
 const NAMED_AT_HOME: [&str; 17] = [
     "fmu/plant",
     "fmu/craft",
@@ -639,7 +640,7 @@ fn circular_imports_are_found_in_every_form() {
         let found = modules(&crate_of(&files)).remove(&vec!["one".into()]).unwrap_or_default();
         assert_eq!(circles(found).len(), 2, "{way}");
     }
-    // one way, and by way of the folder
+    // an import in one direction, and another through the folder
     let files = [("one/first", "use super::second::C;"), ("one/second", "use super::Kept;")];
     assert!(modules(&crate_of(&files)).into_values().all(|beside| circles(beside).is_empty()));
 }

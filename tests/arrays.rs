@@ -1,5 +1,6 @@
-//! The FMU 3.0 with arrays has the same library, the same variables and bit-identical results as the FMU 3.0 with scalars. The sizes of its
-//! arrays can be set before initialisation. An FMU with only a part of the variables also has identical results.
+//! The FMU 3.0 with arrays has the same library, the same variables and bit-identical results as the FMU 3.0 with
+//! scalars. The sizes of its arrays can be set before initialisation. An FMU with only a part of the variables
+//! also has identical results.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,10 +13,10 @@ use host::part::Limit;
 use host::xml::Element;
 use pack::{Fmi, MODELS, Model, packed_version_for_tests};
 
-/// Identifies a number in the physics: the name without brackets, and all indices.
+/// Identifies a number of the model: the name without brackets, and all indices.
 type Key = (String, Vec<usize>);
 
-/// Returns array and indices for a scalar's name: `tank[1].p[2,3]` is tank.p at 1, 2, 3.
+/// Returns array and indices for the name of a scalar: `tank[1].p[2,3]` gives tank.p and 1, 2, 3.
 fn key(name: &str) -> Key {
     let (mut plain, mut indices) = (String::new(), Vec::new());
     let mut rest = name;
@@ -33,7 +34,7 @@ struct Variable {
     reference: u32,
     kind: String,
     causality: String,
-    /// Lengths of the dimensions, or the value references of the parameters that determine them.
+    /// Lengths of the dimensions, or value references of the parameters that determine the lengths.
     dimensions: Vec<Result<usize, u32>>,
     xml: Element,
 }
@@ -61,7 +62,7 @@ impl Variable {
             .collect()
     }
 
-    /// Returns the elements of the variable, row by row, for these values of the structural parameters.
+    /// Returns the elements of the variable in row-major order for these values of the structural parameters.
     fn keys(&self, sizes: &BTreeMap<u32, usize>) -> Vec<Key> {
         let mut all = vec![Vec::new()];
         for dimension in &self.dimensions {
@@ -70,7 +71,7 @@ impl Variable {
             all = all.iter().flat_map(|head| (1..=length).map(move |n| longer(n)(head))).collect();
         }
         let name = key(&self.name).0;
-        // A scalar of the table keeps its indices in its own name.
+        // The name of a scalar contains its indices.
         let own = key(&self.name).1;
         all.into_iter().map(|indices| (name.clone(), [&own[..], &indices].concat())).collect()
     }
@@ -169,8 +170,8 @@ fn bits(value: &Value) -> u64 {
     }
 }
 
-/// Asserts that the FMU with scalars has everything that the FMU with arrays has, with the same bits; what it
-/// has in addition is beyond the sizes.
+/// Asserts that the FMU with scalars has every value of the FMU with arrays, bit-identical. Further values of the FMU
+/// with scalars must be beyond the sizes of the arrays.
 fn assert_same(arrays: &BTreeMap<Key, u64>, scalars: &BTreeMap<Key, u64>, when: &str) {
     for (key, bits) in arrays {
         assert_eq!(scalars.get(key), Some(bits), "{key:?} {when}");
@@ -196,8 +197,7 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Returns a value that differs from the start value for some parameters, another one for every tank and
-/// mode.
+/// Returns a value that differs from the start value for some parameters, and differs between tanks and modes.
 fn parameter(model: &Model, (name, indices): &Key) -> Option<Value> {
     let real = |x: f64| Some(Value::Real(x));
     let integer = |n: usize| Some(Value::Integer(n as i64));
@@ -250,7 +250,7 @@ fn set_up<'a>(
         two[0].resize(name, size);
         two[1].set(|(key, _)| (key == name).then_some(Value::Integer(size as i64)));
     }
-    // What is beyond the size stays as it starts in both.
+    // Elements beyond the size keep their start values in both FMUs.
     let most = case.size.map_or(1, |(_, size)| size);
     for run in &mut two {
         run.set(|key| {
@@ -308,7 +308,7 @@ fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicator
         }
         let indicators = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
         assert_eq!(indicators[0], indicators[1]);
-        // Euler's method: any will do where the bits are compared.
+        // Euler's method is enough, because only bits are compared.
         for n in 1..50 {
             let time = f64::from(n) * h;
             let all = two.each_mut().map(|run| {
@@ -372,7 +372,7 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     assert_eq!(there[..3], start, "what was set before is gone");
     let far: Vec<f64> = (0..12).map(f64::from).collect();
     run.instance.set_numbers(&[position], &far).unwrap();
-    // The same size again changes nothing, and values that were beyond it do not come back.
+    // Setting the same size again changes nothing, and values that were beyond a smaller size are not restored.
     run.resize("tanks", 4);
     run.instance.get_numbers(&[position], &mut there).unwrap();
     assert_eq!(there, far);
@@ -411,7 +411,7 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
         let (status, text) = refusal(run.instance.set_numbers(&[tanks], &[wrong]));
         assert_eq!(status, Status::Discard);
         assert!(text.contains("tanks = ") && text.contains("(allowed: 0 to 4)"), "{text}");
-        // It can go on.
+        // After the errors the instance can be used.
         run.instance.set_numbers(&[tanks], &[3u64]).unwrap();
         let (_, text) = refusal(run.instance.set_numbers(&[mass], &[1.0]));
         assert!(text.contains("configuration mode"), "{text}");
@@ -438,8 +438,8 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
     );
 }
 
-/// A state of SloshTank with arrays of three modes is restored in an instance with other sizes; SloshTank with scalar
-/// variables refuses this state.
+/// A state of SloshTank with arrays of three modes is restored in an instance with other array sizes. SloshTank with
+/// scalar variables refuses this state.
 #[test]
 fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let opened =
@@ -451,7 +451,7 @@ fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let there = three.everything();
     let state = three.instance.get_state().unwrap();
     let bytes = three.instance.serialize(&state).unwrap();
-    // Into an instance of another size, whose size follows.
+    // restored in an instance of another size, which then gets the size of the state
     let mut one = opened[0].instance(Interface::CoSimulation);
     let state = one.instance.deserialize(&bytes).unwrap();
     one.instance.set_state(&state).unwrap();
@@ -508,7 +508,7 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
         let expected =
             scalars.instance.adjoint_derivative(&of_rows, &of_columns, &weights, columns.len());
         assert_eq!(along.unwrap(), expected.unwrap(), "{}", case.model.name);
-        // Rates of the outputs, an order for each array.
+        // derivatives of the outputs, with an order for each array
         let outputs: Vec<_> =
             unknown.iter().filter(|v| v.causality == "output").map(|v| v.reference).collect();
         let keys = elements(&outputs, arrays);
@@ -521,7 +521,7 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
             .unwrap();
         scalars.instance.output_derivatives(&of_keys, &orders, &mut rates[1]).unwrap();
         assert_eq!(rates[0], rates[1]);
-        // What each element depends on at this point.
+        // the dependencies of each element at this point
         for v in &unknown {
             let found = arrays.instance.dependencies(v.reference).unwrap();
             let own = v.keys(&arrays.sizes);
@@ -539,15 +539,15 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
                     expected.push((key.clone(), name[&d.independent].clone()));
                 }
             }
-            // What is beyond the size is not a variable here.
+            // Elements beyond the size are not variables of this FMU.
             expected.retain(|(_, known)| columns.contains(known));
             assert_eq!(mapped, expected, "{}", v.name);
         }
     }
 }
 
-/// A host ramps the torques of Spacecraft within a communication step by intermediate update, in the FMU with arrays and in
-/// the FMU with scalars. The outputs are equal.
+/// Within a communication step, a host changes the torques of Spacecraft linearly by intermediate update, in the FMU
+/// with arrays and in the FMU with scalars. The outputs of both are equal.
 #[test]
 fn input_arrays_changed_in_intermediate_update_act_as_scalar_inputs() {
     let model = pack::model("Spacecraft").unwrap();
@@ -639,7 +639,7 @@ fn array_elements_have_the_attributes_of_the_scalar_variables() {
                 if !structural {
                     assert_eq!((&v.kind, &v.causality), (&scalar.kind, &scalar.causality));
                 }
-                // A state and its derivative are of one shape, element by element.
+                // A state and its derivative have the same shape.
                 if let Some(state) = v.xml.get("derivative") {
                     let state = &arrays[state.parse::<usize>().unwrap() - 1];
                     assert_eq!(v.dimensions, state.dimensions, "{}", v.name);
@@ -685,7 +685,7 @@ const STARTS: [(&str, f64); 8] = [
     ("solver.max_steps", 5000.0),
 ];
 
-/// `pack --tanks --modes` leaves variables out of the description of Spacecraft; the binary and the motion stay the same.
+/// `pack --tanks --modes` removes variables from the description of Spacecraft. The binary and the motion stay the same.
 #[test]
 fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
     let text = STARTS.map(|(name, x)| (name, x.to_string()));
@@ -711,7 +711,8 @@ fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
                 run.instance.update_discrete_states().unwrap();
                 run.instance.enter_continuous_time_mode().unwrap();
             }
-            // Attitude to dissipation, drained; per tank one mode, liquid, ball and spin; eta and eta_dot.
+            // the states from attitude to dissipation, and drained; for each tank one mode, liquid, ball and
+            // spin; eta and eta_dot
             let counts = two.each_mut().map(|run| run.instance.number_of_states().unwrap());
             assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6 + 3) + 2 * 3, 140]);
             let counts = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
@@ -746,7 +747,7 @@ fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
     }
 }
 
-/// Spacecraft is packed with variables for two tanks: `tanks = 3` and a saved state of the full FMU are refused.
+/// Spacecraft is packed with variables for two tanks. It refuses `tanks = 3` and a saved state of the full FMU.
 #[test]
 fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     let (part, _folder) = part_of_spacecraft(&[]);
@@ -770,8 +771,8 @@ fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     run.instance.set_state(&again).unwrap();
 }
 
-/// A packed FMU has start values of its own in its description and in the file start_values.txt, with a checksum. If the
-/// file is missing or was changed, instantiation is refused.
+/// A packed FMU has its own start values in its description and in the file start_values.txt, with a checksum. If the
+/// file is missing or was changed, the FMU refuses instantiation.
 #[test]
 fn start_values_that_differ_from_the_description_are_refused() {
     let (part, folder) = part_of_spacecraft(&[("craft.mass", "900.0")]);

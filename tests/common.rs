@@ -9,7 +9,7 @@ use runtime::variable::Kind;
 ///
 /// # Panics
 ///
-/// If there is no such variable, or if it is not an enumeration.
+/// If there is no such variable, or if the variable is not an enumeration.
 pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
     let variable = TABLE.variables.iter().find(|v| v.name == name);
     match variable.map(|v| v.kind) {
@@ -22,7 +22,7 @@ pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
 ///
 /// # Panics
 ///
-/// If it fails, with its output and `sentence`.
+/// If the command fails; the message contains `sentence` and the output.
 pub fn run(command: &mut Command, sentence: &str) -> String {
     let why = match command.output() {
         Err(error) => error.to_string(),
@@ -46,11 +46,12 @@ pub fn target() -> &'static Path {
     pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu")
 }
 
-/// Returns the Python interpreter of the tests' virtual environment, which is created if necessary, with the
-/// package's compiled half.
+/// Returns the Python interpreter of the tests' virtual environment, with the package's compiled half. The environment
+/// is created if necessary.
 ///
 /// # Panics
 ///
+/// If the environment cannot be created.
 /// If that fails.
 pub fn python() -> &'static Path {
     static PYTHON: LazyLock<PathBuf> = LazyLock::new(|| {
@@ -69,18 +70,20 @@ pub fn python() -> &'static Path {
     &PYTHON
 }
 
-/// Returns the binary `hubslosh` of the profile with which this test was built. It belongs to another
-/// package, so Cargo does not state its path.
+/// Returns the binary `hubslosh` of the profile with which this test was built. The path is derived, because Cargo does
+/// not state the paths of binaries of other packages.
 pub fn harness() -> &'static Path {
     static HARNESS: LazyLock<PathBuf> = LazyLock::new(|| binary("hubslosh", &[]));
     &HARNESS
 }
 
-/// Builds a binary of the workspace in the profile with which this test was built, and returns its path. `of`
-/// are arguments for Cargo if the binary is not in one of the default members: `--workspace`. Not `-p`: with
+/// Builds a binary of the workspace in the profile with which this test was built, and returns its path. `of` are
+/// further arguments for Cargo: `--workspace` if the binary is not in a default member. `-p` is not used, because with
 /// the features of only one package Cargo would compile most of it again.
 ///
 /// # Panics
+///
+/// If the binary does not compile.
 ///
 /// If it does not build.
 pub fn binary(name: &str, of: &[&str]) -> PathBuf {

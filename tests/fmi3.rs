@@ -1,4 +1,4 @@
-//! Tests of the packed FMUs 3.0 with FMPy, which finds no fault in them and gets the same results as from the FMUs 2.0.
+//! Tests of the packed FMUs 3.0 with FMPy: it finds no fault in them, and gets the same results as from the FMUs 2.0.
 
 use std::io::Read;
 use std::process::Command;
@@ -6,8 +6,8 @@ use std::process::Command;
 use crate::common::{python, run};
 use pack::{Fmi, MODELS, packed_model_for_tests, packed_version_for_tests};
 
-/// The motion is bit-identical to FMI 2.0, in whatever way FMPy handles events. With CVODE it agrees within
-/// the error of a tolerance of 1e-9 over 20 s of stick and slip.
+/// The motion is bit-identical to that of the FMU 2.0, with and without event mode and early return in FMPy. With CVODE
+/// it agrees to within the error of the tolerance 1e-9 over 20 s of stick and slip.
 const FMPY: &str = r#"
 import sys
 import numpy as np
@@ -82,7 +82,7 @@ fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_in_every_event_config
     }
 }
 
-/// Tests arrays as FMPy passes them, and sized by hand in configuration mode, which FMPy leaves to its users.
+/// Tests arrays as FMPy passes them, and with sizes set in configuration mode, which FMPy leaves to its users.
 const FMPY_ARRAYS: &str = r#"
 import shutil
 import sys
@@ -180,7 +180,7 @@ fn an_fmu_3_has_the_platform_tuple_the_icon_and_the_list_of_its_references() {
     ] {
         assert!(names.iter().any(|there| there == name), "{name}");
     }
-    // Every file that the list names is there.
+    // Every file in the list exists.
     let mut manifest = String::new();
     let folder = "extra/org.fmi-standard.fmi-ls-ref";
     archive

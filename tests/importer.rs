@@ -1,6 +1,6 @@
-//! A second importer, independent of ours: the crate `fmi` opens the packed FMU and gets the same
-//! bits from it. Its bindings are made by bindgen from the official headers, so this needs
-//! libclang; `.ci/importers` gets it and runs this test.
+//! A second importer, independent of ours: the crate `fmi` opens the packed FMU and gets bit-identical results.
+//! bindgen makes its bindings from the official headers, so that this test needs libclang; `.ci/importers` installs it
+//! and runs this test.
 
 use HubSlosh::table::TABLE;
 use fmi::EventFlags;
@@ -27,7 +27,7 @@ fn start(instance: &mut impl Common, fmu: &Fmu) {
     instance.set_real(&references(fmu, &names), &START.map(|(_, value)| value)).unwrap();
     instance.set_integer(&references(fmu, &["slosh.model"]), &[SPHERICAL]).unwrap();
     instance.setup_experiment(Some(1e-9), 0.0, Some(100.0)).unwrap();
-    // The crate has two of each, this one for FMI 2.0.
+    // The crate has two functions of this name; this one is for FMI 2.0.
     Common::enter_initialization_mode(instance).unwrap();
     Common::exit_initialization_mode(instance).unwrap();
 }
@@ -87,7 +87,7 @@ fn the_importer_crate_fmi_gets_bit_identical_outputs_in_co_simulation() {
     assert_eq!(theirs.last_successful_time().unwrap(), 999.0 * 0.02 + 0.02);
     assert!(!theirs.terminated().unwrap());
 
-    // Their bytes go on in an instance of ours.
+    // The bytes of the crate restore the state in an instance of our host.
     let mut other = fmu.instantiate("other").unwrap();
     let state = other.deserialize(&saved).unwrap();
     other.set_state(&state).unwrap();
@@ -115,7 +115,7 @@ fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
     theirs.enter_continuous_time_mode().unwrap();
     ours.enter_continuous_time_mode().unwrap();
 
-    // Euler, the same in both.
+    // Euler's method in both
     let (mut x, mut y) = ([0.0; STATES], [0.0; STATES]);
     let (mut dx, mut dy) = ([0.0; STATES], [0.0; STATES]);
     let (mut z, mut w) = ([0.0; INDICATORS], [0.0; INDICATORS]);
@@ -148,7 +148,7 @@ fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
             ours.enter_continuous_time_mode().unwrap();
         }
     }
-    // As many unknowns as knowns: the crate takes nothing else.
+    // The crate requires as many unknowns as knowns.
     let (unknowns, knowns) = (references(&fmu, &["omega_dot"]), references(&fmu, &["tau_cmd"]));
     let mut answer = [0.0];
     theirs.get_directional_derivative(&unknowns, &knowns, &[1.0], &mut answer).unwrap();
@@ -175,8 +175,8 @@ mod fmi3 {
 
     use super::{SPHERICAL, bits, started};
 
-    /// Imports the FMU by the crate fmi. Version 0.8 of its schema does not know units and nominal values of
-    /// variables, which the standard has (2.4.7.5), so it gets a copy without them.
+    /// Imports the FMU with the crate fmi. It gets a copy of the description without units and nominal values of variables,
+    /// because version 0.8 of the crate's schema does not know these attributes, which the standard defines (2.4.7.5).
     fn import(model: &Model) -> (Fmi3Import, ModelDescription) {
         let packed = packed_version_for_tests(model, Fmi::V3);
         let copy = tempfile::NamedTempFile::new().unwrap();
@@ -198,7 +198,7 @@ mod fmi3 {
                     let attributes = ["unit=", "displayUnit=", "nominal="];
                     !is_real || !attributes.iter().any(|name| part.starts_with(name))
                 };
-                // Within a text there is no quote behind a space and a name.
+                // Inside a text no quote follows a space and a name.
                 let parts: Vec<&str> = line.split(' ').filter(known).collect();
                 writeln!(to, "{}", parts.join(" ")).unwrap();
             }
@@ -212,7 +212,7 @@ mod fmi3 {
         names.iter().map(|name| description.variable(name).unwrap().reference).collect()
     }
 
-    /// Passes through event mode, in which nothing may happen.
+    /// Enters and leaves event mode, in which nothing may happen.
     fn handle(instance: &mut impl Common) {
         let mut flags = EventFlags::default();
         instance.update_discrete_states(&mut flags).unwrap();
@@ -227,8 +227,8 @@ mod fmi3 {
         }
     }
 
-    /// The crate `fmi`, an importer that is independent of this project, runs the FMI 3.0 FMUs in Co-Simulation; the
-    /// harness runs the FMI 2.0 FMUs.
+    /// The crate `fmi`, an importer that is independent of this project, runs the FMUs 3.0 in Co-Simulation; the
+    /// harness runs the FMUs 2.0.
     #[test]
     fn the_importer_crate_fmi_gets_bit_identical_outputs_from_both_versions_with_and_without_event_mode()
      {

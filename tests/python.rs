@@ -1,5 +1,5 @@
-//! The FMU in Python's hands: runs the tests of `harness/python`, the studies' short forms and the examples with pytest,
-//! in a virtual environment of their own in the target directory.
+//! Runs the tests of `harness/python`, the short forms of the studies, and the examples with pytest, in a virtual
+//! environment in the target directory.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,32 +8,32 @@ use pack::{Fmi, MODELS};
 
 use crate::common::{binary, harness, python, run, target};
 
-/// Runs pytest in the tests' environment, and checks how many tests passed.
+/// Runs pytest in the tests' environment, and checks the number of tests that passed.
 ///
 /// # Panics
 ///
-/// If a test fails, or is not run.
+/// If a test fails or is not run.
 fn pytest(arguments: &mut Command, sentence: &str) {
     let settings = pack::root().join("harness/python/pyproject.toml");
     let said = run(
         arguments
             .args(["--quiet", "-p", "no:cacheprovider"])
             .args([Path::new("-c"), &settings])
-            // Other tests run on the other processors, where threads of NumPy's would only wait for each other.
+            // Other tests use the other processors, for which NumPy's threads would only compete.
             .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"].map(|name| (name, "1")))
-            // the source tree stays as it is, and no process compiles a package again
+            // Python writes no bytecode into the source tree, and no process compiles a package again.
             .env("PYTHONPYCACHEPREFIX", target().join("python").join("bytecode")),
         sentence,
     );
-    // pytest's last line, "61 passed in 20.07s"
+    // the last line of pytest, such as "61 passed in 20.07s"
     let last = said.trim_end().lines().last().unwrap_or_default();
     let left_out = ["skipped", "deselected", "xfailed"].iter().any(|word| last.contains(word));
     assert!(last.contains(" passed") && !left_out, "pytest did not run every test:\n{said}");
     println!("{last}");
 }
 
-/// Test files of `harness/python` that need only HubSlosh. Together they take as long as all other files, so that both halves
-/// run in parallel.
+/// Test files of `harness/python` that need only the FMU HubSlosh. They take as long as all other files together, so
+/// that both halves run in parallel.
 const BESIDE: [&str; 6] = [
     "test_liquid.py",
     "test_model_exchange.py",
@@ -43,7 +43,7 @@ const BESIDE: [&str; 6] = [
     "test_uncertain.py",
 ];
 
-/// Returns the command for pytest with the options of the package's tests: FMU and command.
+/// Returns the pytest command with the options that the tests of the package need: the FMU and the command `hubslosh`.
 fn of_the_package() -> Command {
     let mut command = Command::new(python());
     command
@@ -53,14 +53,14 @@ fn of_the_package() -> Command {
     command
 }
 
-/// Packs every FMU in each version of FMI, as the tests of the package expect them in one folder.
+/// Packs every FMU in each version of FMI into one folder, as the tests of the package expect.
 fn fmus() -> Vec<&'static Path> {
     let all = Fmi::ALL
         .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));
     all.concat()
 }
 
-/// Runs pytest on harness/python, except six files that need only HubSlosh.
+/// Runs pytest on harness/python, except for the six files that need only HubSlosh.
 #[test]
 fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     let tests = pack::root().join("harness/python");
@@ -73,8 +73,8 @@ fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     pytest(&mut command, "the tests in Python failed");
 }
 
-/// Runs the tests of the package that take seconds each: type checkers, the code of pages, docstrings and
-/// notebooks with the wheel, 22 sweeps of 45 minutes with each of six slosh models.
+/// Runs the tests of the package that take seconds each: type checkers; the code of pages, docstrings and notebooks
+/// with the wheel; 22 sweeps of 45 minutes with each of six slosh models.
 #[test]
 #[ignore = "minutes: .ci/long-tests"]
 fn long_tests_of_the_package_pass() {
@@ -97,7 +97,7 @@ fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     );
 }
 
-/// Runs the tests of the studies that have results within seconds: features from their definitions, and the benchmark.
+/// Runs those tests of the studies that take only seconds: features computed from their definitions, and the benchmark.
 #[test]
 fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
     for model in &MODELS {
@@ -122,7 +122,7 @@ fn the_studies_compute_the_numbers_of_the_book() {
 /// Runs the examples in Python and the loop in Rust with the packed FMUs.
 #[test]
 fn the_examples_give_the_results_that_their_readmes_state() {
-    // all in one folder
+    // all FMUs in one folder
     let [fmu, ..] = pack::MODELS.each_ref().map(pack::packed_model_for_tests);
     let folder = fmu.with_file_name("one-loop");
     std::fs::create_dir_all(&folder).expect("a folder in the target directory");

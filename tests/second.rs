@@ -1,5 +1,5 @@
-//! A second FMU through the same runtime: the mass on a spring of `tests/spring`, packed, checked
-//! and simulated by fmpy, in Co-Simulation and in Model Exchange.
+//! A minimal second FMU on the same runtime: the mass on a spring of `tests/spring`. It is packed, checked, and
+//! simulated by FMPy in Co-Simulation and in Model Exchange.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -24,7 +24,7 @@ fn packed() -> PathBuf {
     out
 }
 
-/// Compares with the exact motion of m x'' + d x' + k x = F from x0 at rest under a constant force.
+/// Compares with the exact motion of m x'' + d x' + k x = F from x0 at rest, under a constant force.
 const FMPY: &str = r#"
 import sys
 import numpy as np
@@ -59,7 +59,7 @@ fn a_minimal_fmu_needs_only_a_table_and_a_model() {
         Command::new(harness()).arg("check").arg(&fmu),
         "hubslosh check found errors in the second FMU",
     );
-    // Built for this machine alone, it needs a newer glibc than the release does.
+    // It is built for this machine only, so that it may need a newer glibc than the released FMUs.
     assert!(report.contains(" 0 errors, "), "{report}");
     run(Command::new(python()).args(["-c", FMPY]).arg(&fmu), "fmpy and the second FMU disagree");
 }

@@ -1,4 +1,4 @@
-//! Tests of the whole project in one binary: `cargo test` links once.
+//! Tests of the whole project in one binary, which `cargo test` has to link only once.
 
 mod abi {
     mod abuse;
@@ -16,7 +16,7 @@ mod life {
     mod instance;
 }
 mod physics {
-    // As it stands in the crate `plant`.
+    // the file of the crate `plant`, unchanged
     #[path = "../../fmu/plant/tests/plant/free_oscillation.rs"]
     mod free_oscillation;
     mod liquid;
@@ -32,10 +32,10 @@ mod six {
     mod hubslosh;
     mod models;
     mod steps;
-    // Random tanks at the limits of their models
+    // random tanks at the limits of their models
     #[path = "../../fmu/craft/tests/craft/limit_cases.rs"]
     mod limit_cases;
-    // Random craft and reference records of the crate `craft`
+    // random craft and reference records of the crate `craft`
     #[path = "../../fmu/craft/tests/craft/random.rs"]
     mod random;
     #[path = "../../fmu/craft/tests/craft/records.rs"]

@@ -1,11 +1,11 @@
-//! Abuse of the packed FMU: a hostile host that calls anything with anything, thousands of
-//! instances at once, loading and unloading; noise in saved states and in values.
+//! Misuse of the packed FMU: a hostile host that makes any calls with any arguments, thousands of instances at the same
+//! time, repeated loading and unloading, and random bytes in saved states and values.
 //!
-//! The hosts are C programs with the FMI's official headers, linked with the binary that users
-//! get, each compiled for FMI 2.0 and for 3.0 (`fmi.h`). What is tried with many values is divided between the versions,
-//! whose calls end in the same instance; `abuse_tests_run_in_both_versions_of_fmi` tries everything with each. `.ci/valgrind` runs them
-//! under valgrind (it sets `HUBSLOSH_VALGRIND`). Random inputs are few here: `.ci/fuzz` gives each FMU a thousand and more of
-//! calls, clocks, saved states and values.
+//! The hosts are C programs with FMI's official headers. They load the binary that users get, and each is compiled for
+//! FMI 2.0 and for FMI 3.0 (`fmi.h`). Tests with many values divide the values between the versions, because calls of
+//! both versions lead to the same instance; `abuse_tests_run_in_both_versions_of_fmi` tries all values with each
+//! version. `.ci/valgrind` runs the tests under valgrind and sets `HUBSLOSH_VALGRIND`. The tests make few random
+//! inputs, because `.ci/fuzz` tries a thousand and more calls, clocks, saved states and values on each FMU.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -69,7 +69,7 @@ impl Unpacked {
         let program = self.directory.path().join(name);
         let sources = sources.iter().map(|source| root().join(source));
         let version = if self.fmi == Fmi::V2 { 2 } else { 3 };
-        // valgrind has an allocator of its own
+        // valgrind has another allocator
         let counts = (!under_valgrind()).then_some("-DCOUNT_ALLOCATIONS");
         if !program.exists() {
             run(
@@ -113,7 +113,7 @@ fn letter(variable: &Variable) -> char {
 #[derive(Clone, Copy)]
 struct Share {
     of: &'static str,
-    /// Number of instances at the same time, and number of loads of the library.
+    /// Number of instances that exist at the same time, and number of times the library is loaded.
     lives: [&'static str; 2],
     pairs: usize,
 }
@@ -125,7 +125,7 @@ fn under_valgrind() -> bool {
     std::env::var_os("HUBSLOSH_VALGRIND").is_some()
 }
 
-/// Returns the folder with fmi2Functions.h and fmi3Functions.h; fmpy contains the official headers.
+/// Returns the folder with fmi2Functions.h and fmi3Functions.h. FMPy contains these official headers.
 fn headers() -> &'static Path {
     static HEADERS: LazyLock<PathBuf> = LazyLock::new(|| {
         let script = "import importlib.util; print(importlib.util.find_spec('fmpy').origin)";
@@ -142,9 +142,9 @@ fn number(said: &str, word: &str) -> f64 {
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
 }
 
-/// Thousands of instances step in turns, and each has the same results as alone. The library is loaded
-/// hundreds of times and is gone after unloading. States are saved and restored, Model Exchange handles its
-/// events, and steps take no memory.
+/// Thousands of instances are stepped in turns, and each has the results that it has by itself. The library is loaded
+/// hundreds of times, and is no longer mapped after it is unloaded. States are saved and restored, Model Exchange
+/// handles its events, and steps allocate no memory.
 fn a_whole_life(fmi: Fmi, share: Share) {
     let fmu = Unpacked::new(HUBSLOSH, fmi);
     let [instances, loads] = match std::env::var("HUBSLOSH_VALGRIND").as_deref() {
@@ -165,8 +165,8 @@ fn a_whole_life(fmi: Fmi, share: Share) {
     );
     print!("{said}");
     if !under_valgrind() {
-        // An instance has some 10 KiB: one left behind by each of the 270 loads that count would
-        // be 2.6 MiB. malloc's own coming and going is far below one.
+        // An instance has some 10 KiB. If each of the 270 counted loads left one instance behind, the memory would grow
+        // by 2.6 MiB. Fluctuations of malloc are far smaller.
         assert!(number(&said, " KiB") < 1024.0, "{said}");
     }
     assert_eq!(number(&said, " more descriptors"), 0.0, "{said}");
@@ -179,8 +179,8 @@ fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
     }
 }
 
-/// Tests which functions are allowed in which mode (`modes.c`). `names` are an output, a variable that
-/// depends directly on an input, that input, an Integer, an enumeration and a Boolean.
+/// Tests which functions are allowed in which mode (`modes.c`). `names` are an output, a variable that depends directly
+/// on an input, this input, an Integer, an enumeration and a Boolean.
 fn functions_answer_as_the_table_has_it(model: &pack::Model, names: [&str; 6], sets: bool) {
     let fmu = Unpacked::new(model, Fmi::V3);
     run(
@@ -217,7 +217,7 @@ fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
 }
 
 /// Makes random calls, or the calls of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in both versions of FMI.
-/// `host.c` lists what must not happen, for example floating-point exceptions in calls that succeed.
+/// `host.c` lists the faults, for example floating-point exceptions in calls that succeed.
 fn no_calls_break<M: runtime::Model>(inputs: u32) {
     let name = M::table().about.model;
     let fmu = Unpacked::new(pack::model(name).unwrap(), Fmi::V2);
@@ -230,7 +230,7 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
         let mut host = fmu.host("replay", &sources, &[&fmu.library, Path::new(&path)]);
         host.args([M::table().guid(), M::table().token(layout)])
             .args(hubslosh_fuzz::sizes::<M>(layout).map(|n| n.to_string()));
-        // Under valgrind time passes otherwise; without, no call may take longer than 10 s.
+        // Under valgrind the program is much slower. Otherwise no call may take longer than 10 s.
         host.arg(if under_valgrind() { "1000" } else { "10" });
         match std::env::var_os("HUBSLOSH_CORPUS") {
             Some(corpus) => {
@@ -245,7 +245,7 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
         }
         let said = run(&mut host, "the hostile host broke the FMU, or the FMU broke its promise");
         print!("{name}, {layout:?}: {said}");
-        // Noise that reaches nothing would prove nothing.
+        // If few calls were accepted, the random calls would prove nothing.
         assert!(number(&said, " accepted") > 0.1 * number(&said, " calls"), "{said}");
     }
 }
@@ -265,12 +265,12 @@ fn no_calls_break_the_packed_binary_of_sloshtank() {
     no_calls_break::<SloshTank::Model>(600);
 }
 
-/// The host traps division by zero, invalid operations and overflow, as hosts do that search for the first
-/// NaN. No slosh model, friction law or gyro causes one, in either interface.
+/// The host traps division by zero, invalid operations and overflow, as hosts do to find the first NaN. No slosh model,
+/// friction law or gyro may cause such an exception in either interface.
 #[cfg(target_os = "linux")]
 fn no_model_traps(fmi: Fmi, share: Share) {
     if under_valgrind() {
-        return; // which has no such traps
+        return; // valgrind does not support such traps
     }
     let fmu = Unpacked::new(HUBSLOSH, fmi);
     let items = |name: &str| fmu.description.items(fmu.variable(name)).len().to_string();
@@ -304,10 +304,10 @@ fn no_model_traps(fmi: Fmi, share: Share) {
         "a floating-point exception was raised",
     );
     print!("{said}");
-    // 5 slosh models, 4 friction laws, 3 gyros, 8 scenes, 2 interfaces at the least
+    // at least 5 slosh models, 4 friction laws, 3 gyros, 8 scenes and 2 interfaces
     let runs = if share.of == "all" { 960.0 } else { 480.0 };
     assert!(number(&said, " runs") >= runs, "{said}");
-    // LuGre refuses the one scene without dry friction
+    // LuGre refuses the only scene without dry friction.
     assert!(number(&said, " refused") <= 0.03 * number(&said, " runs"), "{said}");
 }
 
@@ -321,7 +321,7 @@ fn no_model_raises_a_floating_point_exception() {
     }
 }
 
-/// Writes the file that `ranges.c` reads: each variable with its allowed values, and the scenes.
+/// Writes the file for `ranges.c`: each variable with its allowed values, and the scenes.
 fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> String {
     let number = |text: &str| match text {
         "true" => "1".to_string(),
@@ -331,7 +331,7 @@ fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> Strin
     let mut lines = Vec::new();
     for v in &description.variables {
         let causality = match v.causality.as_str() {
-            // one that has no slope in FMI 3.0 is set as a parameter is
+            // An input without intermediate update has no slope in FMI 3.0, and is set like a parameter.
             "input" if description.is_fmi3() && !v.intermediate => 'p',
             "parameter" => 'p',
             "input" => 'i',
@@ -359,13 +359,13 @@ fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> Strin
     lines.join("\n") + "\n"
 }
 
-/// Sets every parameter and input to min and max in every scene, and random pairs, with floating-point traps,
-/// in both interfaces; each Real also to NaN and infinity. Scenes limit the integrator's steps, because the
-/// test is about numbers, not about run time.
+/// Sets every parameter and input to min and to max in every scene, and random pairs of values, with floating-point
+/// traps and in both interfaces; also sets each Real to NaN and to infinity. Scenes limit the integrator's steps,
+/// because the test is about numbers and not about run time.
 #[cfg(target_os = "linux")]
 fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     if under_valgrind() {
-        return; // which has no such traps
+        return; // valgrind does not support such traps
     }
     let fmu = Unpacked::new(pack::model(model).unwrap(), fmi);
     let path = fmu.directory.path().join("ranges.txt");
@@ -386,7 +386,7 @@ fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     let settings = match share.of {
         // min, start and max
         "all" => 3 * settable * scenes.len(),
-        // min and max in one scene by either version, and one start in each
+        // min and max in one scene by each version, and the start value in each scene
         _ => {
             let ends = |scene: usize| (0..2 * settable).map(move |k| scene + k / 2 + k % 2);
             let is_set = |place: &usize| place % (scenes.len() + 1) == version % 2;
@@ -396,7 +396,7 @@ fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     let expected = 2 * (settings + share.pairs);
     assert_eq!(number(&said, " runs"), expected as f64, "{said}");
     assert!(number(&said, " with no number") > 0.0, "{said}");
-    // Refusals are of what a model does not take together; more would prove less.
+    // A model may refuse contradicting values. If more were refused, the test would prove less.
     assert!(number(&said, " refused") <= 0.5 * number(&said, " runs"), "{said}");
 }
 
@@ -455,7 +455,7 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
                 ("friction.asymmetry", "0.1"),
             ],
         ],
-        // Four tanks: one constant, one by its dimensions, one that drains, one by its frequency.
+        // four tanks: one constant, one given by its dimensions, one that drains, one given by its frequency
         "Spacecraft" => {
             let four_tanks = vec![
                 few,
@@ -488,7 +488,7 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
                 ("tank[1].p_dot_0[1,1]", "0.1"),
                 ("force[1]", "10"),
             ];
-            // Zeros in the tables of unused tanks, of points and of modes that are not used.
+            // zeros in the tables of tanks, points and modes that are not used
             let unused_tanks = vec![
                 few,
                 ("tank[2].fill.points", "6"),
@@ -582,7 +582,7 @@ fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
     }
 }
 
-/// In `cargo test` the six-axis equations are under traps in SloshTank.
+/// `cargo test` already runs the equations of six axes with traps in SloshTank.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
@@ -600,8 +600,8 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// Runs all tests of this file in both versions of FMI, whereas the suite runs each test in one version. The run takes
-/// minutes and is started by hand.
+/// Runs all tests of this file in both versions of FMI, whereas `cargo test` runs each test in one version. The run
+/// takes minutes and is started by hand.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
@@ -619,13 +619,13 @@ fn abuse_tests_run_in_both_versions_of_fmi() {
     });
 }
 
-/// Passes a handle of HubSlosh to the functions of all other FMUs, and other wrong handles (`handles.c`).
+/// Passes a handle of HubSlosh, and other wrong handles (`handles.c`), to the functions of all other FMUs.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() {
     if under_valgrind() {
-        return; // which reports that the mark of a freed instance is read
+        return; // valgrind would report the read of a freed instance's mark
     }
     for fmi in VERSIONS {
         let all: Vec<Unpacked> =
@@ -648,20 +648,20 @@ fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() 
     }
 }
 
-/// Stack that an FMU needs, kB: to instantiate and initialise, and for steps. The book's page on real time
-/// has these numbers. They depend on the compiler, so they are a quarter above the measured values.
+/// Stack that an FMU needs, kB: to instantiate and initialise, and for steps. The book's page on real time states these
+/// numbers. They depend on the compiler, so that they are a quarter above the measured values.
 #[cfg(target_os = "linux")]
 const STACK: [(&str, [u32; 2]); 3] =
     [("HubSlosh", [64, 23]), ("Spacecraft", [156, 112]), ("SloshTank", [122, 66])];
 
-/// The page book/real_time.md states the largest stack of each FMU; the stack is measured in several runs and in both
-/// versions of FMI.
+/// The page book/real_time.md states the largest stack of each FMU. The stack is measured in several runs and in
+/// both versions of FMI.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn the_stack_that_an_fmu_needs_is_no_more_than_the_book_says() {
     if under_valgrind() {
-        return; // which has a stack of its own
+        return; // valgrind uses another stack
     }
     let page = std::fs::read_to_string(root().join("book/real_time.md")).unwrap();
     for (name, limits) in STACK {
@@ -706,13 +706,12 @@ const STEPS: usize = 250;
 
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
-/// Returns the bits of all Reals, ten times in 5 s of a motion, under a host's floating-point environment.
-/// The motion is the same in both versions of FMI, to the last bit, whether the FMU handles events or, in
-/// 3.0, the host.
+/// Returns the bits of all Reals, ten times in 5 s of a motion, in a host with another floating-point environment. The
+/// motion is bit-identical in both versions of FMI, whether the FMU handles events or, in FMI 3.0, the host.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
     if under_valgrind() {
-        return; // which rounds to nearest and flushes nothing
+        return; // valgrind always rounds to nearest and keeps subnormal numbers
     }
     let two = Unpacked::new(pack::model(model).unwrap(), Fmi::V2);
     let three = Unpacked::new(pack::model(model).unwrap(), Fmi::V3);
@@ -752,7 +751,7 @@ fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
             let other = motion(fmu, mode);
             assert_ne!(other, nearest, "{what}: the mode is in effect");
             for (i, (x, y)) in nearest.iter().zip(&other).enumerate() {
-                // Some 1e5 operations, each off by up to 2e-16 in the same direction, make 2e-11; 1e-12 is seen.
+                // Some 1e5 operations, each with an error of up to 2e-16 of the same sign, cause 2e-11; 1e-12 is observed.
                 let allowed = 1e-10 * f64::max(peak(i % names.len()), f64::MIN_POSITIVE);
                 assert!(
                     (x - y).abs() <= allowed,
@@ -822,16 +821,16 @@ fn values<M: runtime::Model>(runs: usize) {
     }
 }
 
-/// Random bytes decide which variables are set, to which values, and how long the steps are.
+/// Random bytes determine the variables that are set, their values, and the lengths of the steps.
 #[test]
 fn random_values_of_variables_give_finite_results_or_an_error() {
     values::<HubSlosh::HubSlosh>(200);
-    // Stiff ones use up the integrator's steps: half a second each.
+    // Stiff models use all steps that the integrator may make: half a second each.
     values::<Spacecraft::Model>(8);
     values::<SloshTank::Model>(8);
 }
 
-/// Runs sequences of calls by hosts whose clocks differ (`fmu/fuzz/src/clocks.rs`).
+/// Runs sequences of calls by hosts whose clocks have different rounding errors (`fmu/fuzz/src/clocks.rs`).
 fn clocks(sequences: [usize; 3]) {
     fn play<M: runtime::Model>(sequences: usize) {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -846,7 +845,8 @@ fn clocks(sequences: [usize; 3]) {
     });
 }
 
-/// Hosts that add up their communication points, or multiply them, have other rounding errors in the time than the FMU.
+/// Hosts add up their communication steps or multiply them, so that their times have other rounding errors than the
+/// FMU's time.
 #[test]
 fn hosts_whose_times_have_rounding_errors_get_the_same_outputs() {
     clocks([20, 2, 4]);

@@ -1,5 +1,5 @@
-//! The packed FMU through its C interface, called as hosts call it, well and
-//! badly. Every test works on the file that users get.
+//! Calls the packed FMU through its C interface, as hosts do, correctly and incorrectly. Every test uses the
+//! file that users get.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -112,7 +112,7 @@ fn archive() -> zip::ZipArchive<File> {
     zip::ZipArchive::new(File::open(packed_for_tests()).unwrap()).unwrap()
 }
 
-/// All files of HubSlosh.fmu are stored or deflated, the two methods of zip that every importer can unpack.
+/// All files of HubSlosh.fmu are stored or deflated, the two zip methods that every importer can unpack.
 #[test]
 fn archive_begins_with_the_model_description_and_is_plain() {
     let mut archive = archive();
@@ -138,7 +138,7 @@ fn the_same_source_gives_the_same_archive() {
     let directory = tempfile();
     let again = directory.path().join("again.fmu");
     pack::pack(pack::HUBSLOSH, pack::Fmi::V2, &again).unwrap();
-    // Cargo builds once for both; what packing adds is the same each time.
+    // Cargo builds the library once for both archives; the rest of the packing must be the same each time.
     assert!(std::fs::read(again).unwrap() == std::fs::read(packed_for_tests()).unwrap());
 }
 
@@ -182,7 +182,7 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
         .map(|s| s.to_string())
         .collect();
     assert_eq!(expected.len(), 44);
-    // The library serves both versions; a model description says which one a host uses.
+    // The library serves both versions; the model description determines the version that a host uses.
     let expected = &expected | &fmi3_functions();
     for name in binaries {
         let mut bytes = Vec::new();
@@ -192,7 +192,7 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
             .exports()
             .unwrap()
             .iter()
-            // Mach-O puts an underscore before every C name.
+            // In Mach-O files an underscore precedes every C name.
             .map(|export| String::from_utf8_lossy(export.name()).trim_start_matches('_').into())
             .collect();
         assert_eq!(exported, expected, "{name}");
@@ -223,13 +223,13 @@ fn the_binary_can_be_loaded_and_unloaded_many_times() {
         let fmu = open();
         let mut instance = stepping(&fmu, &[]);
         instance.do_step(0.0, 0.1).unwrap();
-        // A panic hook or anything else left behind would point to code that is gone.
+        // A panic hook that was left behind would point to code that is no longer loaded.
         refused(instance.do_step(f64::NAN, 0.1), &[]);
     }
 }
 
-/// 20 instances of two loaded copies of HubSlosh take turns step by step. Each has the results of an instance that runs
-/// alone.
+/// 20 instances of two loaded copies of HubSlosh are stepped in turns. Each has the results of an instance that runs by
+/// itself.
 #[test]
 fn several_copies_and_instances_do_not_disturb_each_other() {
     let (first, second) = (open(), open());
@@ -239,7 +239,7 @@ fn several_copies_and_instances_do_not_disturb_each_other() {
     let mut instances: Vec<_> =
         [&first, &second].into_iter().cycle().take(20).map(|fmu| stepping(fmu, LIVELY)).collect();
     let torque = [reference(&first, "tau_cmd")];
-    // In turns: each step of `drive` in all of them.
+    // in turns: each step of `drive` in all instances
     let mut at = 0.0;
     for (n, h) in [0.01, 0.14, 0.2, 0.05, 0.3, 0.3].into_iter().enumerate() {
         for instance in &mut instances {
@@ -330,9 +330,9 @@ fn every_callback_and_the_resource_location_may_be_null() {
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();
     instance.do_step(0.0, 0.1).unwrap();
-    // Has something to say, and nobody to say it to.
+    // An error must be reported, but there is no logger.
     assert!(instance.do_step(0.0, -0.1).is_err());
-    // Neither has a failing fmi2Instantiate.
+    // A failing fmi2Instantiate has no logger either.
     with.guid = None;
     assert!(fmu.instantiate_with(&with).is_err());
 }
@@ -422,7 +422,7 @@ fn only_messages_of_the_enabled_log_categories_are_logged() {
     assert_eq!(messages(&mut instance), 11);
 }
 
-/// With the category logEvents the log has a message for each time at which the hub comes to rest or begins to slip.
+/// With the category logEvents the FMU logs a message for each time at which the hub comes to rest or begins to slip.
 #[test]
 fn stick_and_slip_are_logged_on_request() {
     let fmu = open();
@@ -440,8 +440,8 @@ fn stick_and_slip_are_logged_on_request() {
     assert!(texts[1].contains("broke away backwards at t = 20.0 s"), "{texts:?}");
 }
 
-/// A host with logging on that sets a tolerance receives no message and no warning, because some hosts take
-/// everything except fmi2OK for a failure.
+/// A host enables logging and sets a tolerance. It receives no message and no warning, because some hosts treat
+/// everything except fmi2OK as a failure.
 #[test]
 fn a_correct_run_logs_no_message() {
     let fmu = open();
@@ -617,7 +617,8 @@ fn inputs_that_are_nan_or_out_of_range_are_refused_by_the_call_that_sets_them() 
     let mut instance = stepping(&fmu, LIVELY);
     let before = state(&mut instance);
     let inputs = ["tau_cmd", "tau_ext", "g_axial"].map(|n| reference(&fmu, n));
-    // Every number that the plant makes of one within is finite: ±1e308 was not.
+    // The range is so narrow that every number which the plant computes from an allowed value is finite; ±1e308
+    // did not ensure this.
     for (n, value, allowed) in [
         (0, f64::NAN, "-1000000000000.0 N.m to 1000000000000.0 N.m"),
         (0, 1e308, "-1000000000000.0 N.m to 1000000000000.0 N.m"),
@@ -643,7 +644,7 @@ fn inputs_that_are_nan_or_out_of_range_are_refused_by_the_call_that_sets_them() 
 // ---- Steps ----
 
 /// HubSlosh refuses a communication step that is not positive or not finite, and a communication point that is not the
-/// present time. Its state stays as before.
+/// present time. Its state does not change.
 #[test]
 fn steps_of_no_positive_length_are_refused_and_change_nothing() {
     let fmu = open();
@@ -660,7 +661,7 @@ fn steps_of_no_positive_length_are_refused_and_change_nothing() {
     instance.do_step(0.5, 0.1).unwrap();
 }
 
-/// Hosts compute n h or add up h; both differ from the exact time by a few ulps.
+/// Hosts compute n h, or add up h. Both differ from the exact time by a few ulps.
 #[test]
 fn communication_points_off_by_rounding_are_reached_exactly() {
     let fmu = open();
@@ -716,12 +717,12 @@ fn an_experiment_with_invalid_times_is_refused() {
     instance.setup_experiment(Some(1e-6), 0.0, Some(1.0)).unwrap();
 }
 
-/// A torque of 1e12 N·m for 1e200 s needs more integration steps than `solver.max_steps`: fmi2DoStep returns fmi2Error, the
-/// state stays at the start, and the instance can only be terminated or reset.
+/// A torque of 1e12 N·m for 1e200 s needs more integration steps than `solver.max_steps` allows: fmi2DoStep returns
+/// fmi2Error, the state stays that of the start, and the instance can only be terminated or reset.
 #[test]
 fn a_diverging_run_is_an_error() {
     let fmu = open();
-    // So fast, and for so long, that no number of steps is enough.
+    // The motion is so fast and so long that no number of integration steps is enough.
     let mut instance = stepping(&fmu, &[("slosh.model", "frozen"), ("tau_cmd", "1e12")]);
     refused(instance.do_step(0.0, 1e200), &["failed: the step stopped at", "solver.max_steps"]);
     assert_eq!(instance.status(DO_STEP_STATUS).unwrap(), 3, "fmi2Error");
@@ -731,7 +732,7 @@ fn a_diverging_run_is_an_error() {
     instance.terminate().unwrap();
 }
 
-/// fmi2GetStatus and fmi2GetRealStatus give fmi2OK and the end of the step; queries for pending steps are refused.
+/// fmi2GetStatus and fmi2GetRealStatus return fmi2OK and the end of the step. Queries about pending steps are refused.
 #[test]
 fn the_status_of_the_last_step_can_be_queried() {
     let fmu = open();
@@ -771,7 +772,7 @@ fn reset_from_every_state_is_a_fresh_instance_bit_for_bit() {
     for mut instance in [fresh, initializing, stepped, terminated, failed] {
         instance.reset().unwrap();
         assert_eq!(state(&mut instance), expected);
-        // And it lives as a fresh one.
+        // The reset instance behaves like a new one.
         let mut other = stepping(&fmu, LIVELY);
         for (name, value) in LIVELY {
             instance.set(name, value).unwrap();
@@ -846,7 +847,7 @@ fn a_handle_of_a_saved_state_can_be_reused_and_a_null_handle_can_be_freed() {
     refused(instance.set_state_null(), &["FMUstate is NULL"]);
 }
 
-/// fmusim 0.0.39 makes this mistake, which would end its run with an error.
+/// fmusim 0.0.39 passes the state itself. Refusing it would end its run with an error.
 #[test]
 fn a_saved_state_is_freed_by_itself_as_by_its_address() {
     let fmu = open();

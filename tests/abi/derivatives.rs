@@ -1,5 +1,6 @@
-//! Directional and adjoint derivatives of the packed FMUs 3.0 at random operating points, through the functions that hosts call.
-//! One is the transpose of the other, and both equal differences of the FMU's values.
+//! Directional and adjoint derivatives of the packed FMUs 3.0 at random operating points, through the functions that
+//! hosts call. The adjoint derivatives are the transpose of the directional ones, and both equal finite differences
+//! of the FMU's values.
 
 use fastrand::Rng;
 use host::causality::{Causality, Variability};
@@ -7,11 +8,11 @@ use host::description::{ModelDescription, Type, Value, Variable};
 use host::fmi3::{Fmu, Instance, Interface};
 use pack::{Fmi, model, packed_version_for_tests};
 
-/// Rounding error of a sum, relative to the sum of its products' magnitudes: there are up to 100 products,
-/// and each number of the Jacobian is itself rounded.
+/// Rounding error of a sum, relative to the sum of the magnitudes of its products. There are up to 100 products, and
+/// each number of the Jacobian is itself rounded.
 const ROUNDING: f64 = 1e-13;
-/// Error of central differences of order 4 over 1e-3 of a known's size: they leave out (1e-3)^4 of the fifth
-/// derivative and lose 1e-16/1e-3 to rounding, or more where large terms cancel in a value.
+/// Error of central differences of order 4 with a step of 1e-3 of a known's size. The truncation error is (1e-3)^4 of
+/// the fifth derivative; the rounding error is 1e-16/1e-3, or more if large terms cancel in a value.
 const DIFFERENCES: f64 = 1e-6;
 
 fn open(name: &str) -> Fmu {
@@ -23,7 +24,7 @@ fn open(name: &str) -> Fmu {
 struct Sides {
     unknowns: Vec<u32>,
     knowns: Vec<u32>,
-    /// Number of knowns that are inputs; these come first, then the states.
+    /// Number of knowns that are inputs. The inputs come first, then the states.
     inputs: usize,
     names: Vec<String>,
 }
@@ -57,7 +58,7 @@ impl Sides {
     }
 }
 
-/// An operating point of an instance. `x` has its inputs and states, `sizes` their typical magnitudes.
+/// An operating point of an instance. `x` has the values of its inputs and states, `sizes` their typical magnitudes.
 struct Point<'a, 'fmu> {
     sides: &'a Sides,
     instance: Instance<'fmu>,
@@ -73,7 +74,7 @@ impl Point<'_, '_> {
         values
     }
 
-    /// Returns the unknowns if the knowns are moved by `s` in a direction.
+    /// Returns the unknowns at the point whose knowns are moved by `s` in a direction.
     fn at(&mut self, s: f64, direction: &[f64]) -> Vec<f64> {
         let there: Vec<f64> = self.x.iter().zip(direction).map(|(x, d)| x + s * d).collect();
         self.go(&there, direction);
@@ -105,8 +106,8 @@ impl Point<'_, '_> {
             .unwrap_or_else(|error| panic!("{}: {error}", self.what))
     }
 
-    /// Compares both kinds of derivatives with each other, and with differences by the knowns at the
-    /// positions `moved`.
+    /// Compares both kinds of derivatives with each other, and with finite differences with respect to the knowns
+    /// at the positions `moved`.
     fn check(&mut self, rng: &mut Rng, moved: &[usize]) {
         let sides = self.sides;
         let y = self.values();
@@ -114,9 +115,9 @@ impl Point<'_, '_> {
             sizes.iter().map(|size| size * (2.0 * rng.f64() - 1.0)).collect()
         };
         let direction = random(&self.sizes);
-        // Each unknown weighs in proportion to what it does along the direction.
+        // Each unknown is weighted by the inverse of its change along the direction.
         let forward = self.forward(&direction);
-        // Derivatives are linear in the seed. A factor of two is exact in every product.
+        // Derivatives are linear in the seed; a factor of two is exact in every product.
         let none = self.forward(&vec![0.0; direction.len()]);
         let twice = self.forward(&direction.iter().map(|d| 2.0 * d).collect::<Vec<_>>());
         for (i, name) in sides.names.iter().enumerate() {
@@ -128,7 +129,7 @@ impl Point<'_, '_> {
         let weights = random(&weigh);
         let adjoint = self.adjoint(&weights);
 
-        // w.(J v) = (J^T w).v, and J itself column by column.
+        // w.(J v) = (J^T w).v, and J itself, column by column
         let mut columns = Vec::new();
         for j in 0..sides.knowns.len() {
             let mut one = vec![0.0; sides.knowns.len()];
@@ -156,7 +157,7 @@ impl Point<'_, '_> {
             self.what
         );
 
-        // Both against differences, the adjoint ones by each known alone.
+        // both kinds against finite differences, the adjoint derivatives for each known separately
         const H: f64 = 1e-3;
         let directions = moved.iter().map(|j| {
             let mut one = vec![0.0; sides.knowns.len()];
@@ -173,7 +174,7 @@ impl Point<'_, '_> {
             let (mut by_differences, mut size) = (0.0, 0.0);
             let mut by_forward = 0.0;
             for i in 0..forward.len() {
-                // A cone: differences across its tip mean nothing.
+                // The function has the shape of a cone here; differences across its tip have no meaning.
                 let is_tip = [&p2, &p1, &m1, &m2].iter().any(|p| p[i] < 5e-3);
                 if sides.names[i] == "wave_height" && is_tip {
                     by_forward += weights[i] * forward[i];
@@ -204,8 +205,7 @@ impl Point<'_, '_> {
 /// Start time, s. It is not 0, so that outputs that are times differ from their derivatives.
 const START: f64 = 1.0;
 
-/// Returns an instance for Model Exchange in continuous-time mode with its inputs set, at the states of its
-/// start.
+/// Returns an instance for Model Exchange in continuous-time mode, with its inputs set and with the states of the start.
 fn exchange<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> (Instance<'fmu>, Vec<f64>) {
     let mut with = fmu.instantiation("one");
     with.interface = Interface::ModelExchange;
@@ -246,9 +246,9 @@ fn setting(name: impl Into<String>, value: impl ToString) -> (String, String) {
     (name.into(), value.to_string())
 }
 
-/// Checks the derivatives at three points: at the start of Model Exchange with `settings`; at this point with states moved
-/// by random numbers in the ranges of `scatter`; and at the point that Co-Simulation reaches after 0.3 s, where a host can
-/// change only inputs. Inputs whose jumps are impulses are left out there, because they move states.
+/// Checks the derivatives at three points: at the start of Model Exchange with `settings`; at this point with states that
+/// are moved by random numbers in the ranges of `scatter`; and at the point that Co-Simulation reaches after 0.3 s, where
+/// a host can change only inputs. Inputs whose jumps are impulses are not moved there, because they would change states.
 fn check(
     fmu: &Fmu,
     rng: &mut Rng,
@@ -289,8 +289,8 @@ fn check(
     Point { sides: &sides, instance, x, sizes, what }.check(rng, &moved);
 }
 
-/// Tests every slosh model with every friction law while the hub slips, a stuck hub, and the wheel at the
-/// limits of its torque and of its speed.
+/// Tests every slosh model with every friction law while the hub slips, a stuck hub, and the wheel at the limits of its
+/// torque and of its speed.
 #[test]
 fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_stick_and_at_wheel_limits()
  {
@@ -304,7 +304,7 @@ fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_sti
     let (models, frictions) = (names("slosh.model"), names("friction.model"));
     let wheels = ["none", "torque", "speed"];
     for model in models {
-        // Of an angle; with liquid of a length, the third mode's pendulum's being 9 mm.
+        // States are angles; in the model `liquid` they are lengths, and the pendulum of the third mode is 9 mm long.
         let unit = if model == "liquid" { 0.009 } else { 1.0 };
         for (k, friction) in frictions.iter().copied().chain(["stick"]).enumerate() {
             let is_stuck = friction == "stick";
@@ -316,7 +316,7 @@ fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_sti
                 setting("slosh.model", model),
                 setting("slosh.modes", modes),
                 setting("friction.model", friction),
-                // The default, 1e-5, bends within less than differences can resolve.
+                // With the default of 1e-5 the friction curve bends within a range that differences cannot resolve.
                 setting("friction.eps", 0.05),
                 setting("friction.forward_cos1", between(&mut rng, -0.2, 0.2)),
                 setting("friction.asymmetry", between(&mut rng, -0.2, 0.2)),
@@ -327,7 +327,7 @@ fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_sti
                 setting("g_axial", between(&mut rng, 5.0, 20.0)),
                 setting("wheel.enabled", wheel != "none"),
             ];
-            // What the hub feels of the wheel stays within what friction holds.
+            // The torque of the wheel on the hub must stay below the limit of the friction.
             match wheel {
                 "torque" => settings
                     .extend([setting("wheel.tau_max", torque / 2.0), setting("tau_cmd", torque)]),
@@ -346,8 +346,8 @@ fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_sti
                 _ if name.starts_with("slosh.") => 0.3 * unit,
                 _ => 1.0,
             };
-            // Events are the host's: within continuous-time mode states may be anywhere.
-            // At its very limit the wheel's torque jumps with its speed: the host has gone past it.
+            // The host handles events, so that states may have any values within continuous-time mode. Exactly at its
+            // limit the wheel's torque jumps with its speed; the host has passed this limit.
             let scatter = |name: &str| match name {
                 "theta" => [-3.0, 3.0],
                 "omega" if !is_stuck => [-0.1, 0.1],
@@ -419,7 +419,7 @@ fn of_craft(name: &str) -> f64 {
     }
 }
 
-/// Adds the tank's wrench to the host, as a host does, with the tank's masses added to the host's.
+/// Adds the tank's wrench to the equations of the host, and the tank's masses to the masses of the host.
 #[test]
 fn adjoint_and_directional_derivatives_of_sloshtank_equal_differences() {
     let fmu = open("SloshTank");

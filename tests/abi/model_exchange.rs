@@ -1,4 +1,4 @@
-//! Model Exchange: a host that integrates the equations of the packed FMU gets the same motion and events as in Co-Simulation.
+//! Model Exchange: a host that integrates the equations of the packed FMU gets the motion and the events of Co-Simulation.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,7 @@ fn set_up<'fmu>(fmu: &'fmu Fmu, kind: i32, settings: &[(&str, &str)]) -> Instanc
     instance
 }
 
-/// A host with a fixed step, Runge-Kutta of order 4, and bisection for events.
+/// A host with a fixed step: Runge-Kutta of order 4, and bisection for events.
 struct Host<'fmu> {
     instance: Instance<'fmu>,
     time: f64,
@@ -99,7 +99,7 @@ impl<'fmu> Host<'fmu> {
             let is_due = due <= (self.time + h).min(end);
             let goal = if is_due { due } else { (self.time + h).min(end) };
             let before = self.indicators(self.time, &self.x.clone());
-            // A sign change that begins at zero is one that has just been handled.
+            // A sign change that begins at zero has just been handled.
             let crosses =
                 |z: &[f64; INDICATORS]| before.iter().zip(z).any(|(before, z)| before * z < 0.0);
             let mut length = goal - self.time;
@@ -147,8 +147,7 @@ fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()
 }
 
-/// Runs the host and Co-Simulation to `end`, compares everything once a second, and returns the host's
-/// numbers of events.
+/// Runs the host and Co-Simulation to `end`, compares all values once a second, and returns the numbers of events of the host.
 fn compare(
     settings: &[(&str, &str)],
     changes: Changes,
@@ -191,8 +190,8 @@ fn compare(
     (host.events, count as i32)
 }
 
-/// At 15 rad/s, order 4 with 0.5 ms is late by omega (omega h)^4/120 = 4e-10 rad per second, 1e-8 after 20 s.
-/// Forces are some newtons, slosh rates some rad/s.
+/// At 15 rad/s, order 4 with 0.5 ms has a phase lag of omega (omega h)^4/120 = 4e-10 rad per second, that is 1e-8 after
+/// 20 s. Forces are some newtons, slosh rates some rad/s.
 #[test]
 fn a_model_exchange_host_equals_co_simulation_with_stick_and_slip() {
     for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
@@ -226,7 +225,7 @@ fn a_model_exchange_host_equals_co_simulation_with_every_friction_law() {
     }
 }
 
-/// The wheel saturates in torque and speed; the gyro's samples are time events. The noise is bit-identical,
+/// The wheel saturates in torque and in speed, and the gyro's samples are time events. The noise is bit-identical, and
 /// the rate agrees to 1e-7.
 #[test]
 fn wheel_and_gyro_are_events_of_model_exchange() {
@@ -247,7 +246,7 @@ fn wheel_and_gyro_are_events_of_model_exchange() {
     assert_eq!(events[1], 15 * 7);
 }
 
-/// Large waves leave the linear regime; this is a step event, which is noticed at the end of a step.
+/// Large waves end the linear regime. This is a step event, which the FMU notices at the end of a step.
 #[test]
 fn the_regime_changes_only_at_events() {
     let fmu = open();
@@ -270,7 +269,7 @@ fn the_regime_changes_only_at_events() {
     }
     assert!(host.events[2] > 5 && seen.contains(&1) && seen.contains(&3), "{:?}", host.events);
 
-    // Between events it stays, whatever the states are.
+    // Between events the regime does not change, for any values of the states.
     let mut x = host.x;
     let before = host.instance.get("regime").unwrap();
     x[6..].fill(0.0);
@@ -297,7 +296,7 @@ fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
             host.time = n as f64 * h;
             host.instance.set_time(host.time).unwrap();
             host.instance.set_continuous_states(&host.x.clone()).unwrap();
-            // The FMU says when a change is overdue.
+            // The FMU requests event mode when a change is overdue.
             if host.instance.completed_integrator_step().unwrap().enter_event_mode {
                 events += 1;
                 host.instance.enter_event_mode().unwrap();
@@ -308,7 +307,7 @@ fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
         let got = host.instance.real("theta").unwrap();
         worst.push((got - own.real("theta").unwrap()).abs());
     }
-    // (omega_1 h)/2 of energy a radian: a per cent at 50 us after 5 s.
+    // (omega_1 h)/2 of the energy per radian: one per cent at 50 us after 5 s
     assert!(worst[1] < 1e-3 && worst[1] < 0.7 * worst[0], "{worst:?}");
 }
 
@@ -367,7 +366,7 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     assert_eq!(error.status, Status::Discard);
     instance.continuous_states(&mut x).unwrap();
     assert_eq!(x, before);
-    // Inputs may change, parameters not.
+    // Inputs may change, but parameters may not.
     instance.set("tau_cmd", "0.1").unwrap();
     let error = instance.set("friction.c", "0.02").unwrap_err();
     assert!(format!("{error:#}").contains("event mode"), "{error:#}");
@@ -380,18 +379,18 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     refused!(instance.enter_event_mode(), "\"instantiated\"");
 }
 
-/// Returns Booleans as OpenModelica up to 1.27 passes them. Its array of bytes is read as an array of fmi2Boolean, four bytes
-/// each, with zeros behind it (fmi2SetBoolean_OMC in its FMI2Common.c).
+/// Returns Booleans as OpenModelica up to 1.27 passes them: it passes an array of bytes, which the FMU reads as an
+/// array of fmi2Boolean with four bytes each, followed by zeros (fmi2SetBoolean_OMC in its FMI2Common.c).
 fn misread(booleans: &[i32]) -> Vec<i32> {
     let mut bytes: Vec<u8> = booleans.iter().map(|b| *b as u8).collect();
     bytes.resize(4 * booleans.len(), 0);
     bytes.chunks_exact(4).map(|four| i32::from_le_bytes(four.try_into().unwrap())).collect()
 }
 
-/// OpenModelica 1.21 to 1.27 ends the initialization first and then sets all parameters except enumerations.
-/// It sets states, and enters event mode, in the event mode in which it already is (issue 12893 of its
-/// tracker; the template importFMU2ModelExchange of its CodegenFMU.tpl). Booleans arrive as noise, so their
-/// integer twins decide, as for enumerations.
+/// OpenModelica 1.21 to 1.27 ends the initialization first and then sets all parameters except enumerations. It does
+/// this, and enters event mode, when the instance already is in event mode (issue 12893 of its tracker; the template
+/// importFMU2ModelExchange of its CodegenFMU.tpl). Booleans arrive as random numbers, so that their integer twins
+/// determine the values, as for enumerations.
 #[test]
 fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     let settings = [
@@ -434,10 +433,10 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     instance.set_integer(&references, &given).unwrap();
     let (references, given): (Vec<_>, Vec<_>) = booleans.into_iter().unzip();
     instance.set_boolean(&references, &misread(&given)).unwrap();
-    // slosh.zeta_from_correlation is true, its integer says false.
+    // slosh.zeta_from_correlation is true, but its integer twin is false.
     assert!(misread(&given)[0] != 0, "the first Boolean arrives as any of the first four");
 
-    // Which comes first, states or inputs, is up to how it sorts equations.
+    // OpenModelica sets states or inputs first, depending on how it sorts the equations.
     let mut host =
         Host { instance, time: 0.0, x: [0.0; STATES], events: [0; 3], next: EventInfo::default() };
     host.instance.continuous_states(&mut host.x).unwrap();
@@ -449,7 +448,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     host.indicators(0.0, &host.x.clone());
     host.instance.enter_event_mode().unwrap();
     host.event_iteration();
-    // Not at an instant of the gyro's samples.
+    // a time at which the gyro takes no sample
     host.run(5.01, 5e-4);
 
     let meant = [
@@ -471,13 +470,13 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     }
     for (name, expected) in values(&mut own) {
         let got = exchanged[&name];
-        // as with stick and slip above
+        // the tolerance of the test with stick and slip above
         let allowed = 1e-7 * expected.abs().max(1.0);
         assert!((got - expected).abs() <= allowed, "{name}: {got} {expected}");
     }
 }
 
-/// A host that leaves out the start value of an input sets 0; OpenModelica does so after the initialization.
+/// A host that omits the start value of an input sets 0. OpenModelica does so after the initialization.
 #[test]
 fn a_warning_names_a_weightless_tank_without_restoring_force() {
     let fmu = open();
@@ -513,7 +512,7 @@ fn a_warning_names_a_weightless_tank_without_restoring_force() {
         assert_eq!(started(restored), "", "{restored:?}");
     }
 
-    // Set late: the warning is of what the motion begins with, and comes once.
+    // The parameter is set late. The warning is about the values with which the motion begins, and comes only once.
     let mut late = set_up(&fmu, MODEL_EXCHANGE, &[]);
     late.set("g_axial", "0").unwrap();
     assert_eq!(said(&mut late).len(), 0);
@@ -536,7 +535,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     late.set("init.slosh_angle", "0.3").unwrap();
     let error = late.set("tank.h", "-1").unwrap_err();
     assert!(format!("{error:#}").contains("tank.h = -1.0 m (allowed: "), "{error:#}");
-    // The limits, set one after the other, contradict each other for a moment.
+    // While the limits are set one after the other, they contradict each other for a moment.
     late.set("wheel.speed_min", "400").unwrap();
     let error = late.new_discrete_states().unwrap_err();
     assert!(error.text().contains("wheel.speed_max"), "{error}");
@@ -557,7 +556,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     late.new_discrete_states().unwrap();
     assert_eq!(values(&mut late), values(&mut early));
     assert_eq!(late.get("event_count").unwrap(), Value::Integer(0));
-    // Now it is an event as any other; going back brings the first one back.
+    // This is now an event like any other; restoring a state restores the first event mode.
     assert!(late.set("init.slosh_angle", "0.2").is_err());
     let bytes = late.serialize(&saved).unwrap();
     let read = late.deserialize(&bytes).unwrap();
@@ -569,7 +568,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     }
 }
 
-/// Reading creates the plant; setting something after that creates it again.
+/// Reading a value creates the plant; setting a parameter afterwards creates it again.
 #[test]
 fn after_initialization_the_order_of_setting_and_reading_does_not_matter() {
     let fmu = open();
@@ -602,7 +601,7 @@ fn a_refused_event_leaves_the_parameters_to_be_corrected() {
     with.kind = MODEL_EXCHANGE;
     let mut instance = fmu.instantiate_with(&with).unwrap();
     instance.set("imu.enabled", "true").unwrap();
-    // so late that a sample later is no other time
+    // so late that a step to the next sample does not change the time
     instance.setup_experiment(None, 1e16, None).unwrap();
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();
@@ -631,14 +630,14 @@ fn in_model_exchange_a_completed_step_after_the_stop_time_is_refused_and_a_trial
     instance.completed_integrator_step().unwrap();
 }
 
-/// In Model Exchange a host sets a slosh mass of the slosh model `liquid` to a place outside the model's range:
+/// In Model Exchange a host moves a slosh mass of the model `liquid` outside the model's range.
 /// fmi2CompletedIntegratorStep returns an error that names the mode, and the instance refuses further calls.
 #[test]
 fn states_out_of_the_models_range_end_the_run() {
     let fmu = open();
     let mut host = Host::new(&fmu, &[("slosh.model", "liquid")]);
     let mut x = host.x;
-    // slosh.q_radial[1]; the length is 4.5 cm.
+    // slosh.q_radial[1]; the pendulum is 4.5 cm long
     x[plant::x::SLOSH] = 0.1;
     host.instance.set_continuous_states(&x).unwrap();
     let error = host.instance.completed_integrator_step().unwrap_err();
@@ -647,8 +646,7 @@ fn states_out_of_the_models_range_end_the_run() {
     host.instance.terminate().unwrap();
 }
 
-/// The state is saved in continuous-time mode and restored into a new instance, which continues with the same
-/// bits.
+/// The state is saved in continuous-time mode and restored in a new instance, which continues bit-identically.
 #[test]
 fn a_saved_state_of_model_exchange_continues_bit_for_bit() {
     let fmu = open();

@@ -1,5 +1,4 @@
-//! Stepping takes no memory from the host's heap: no lock, no waiting, no leak,
-//! however long the run.
+//! Steps allocate no memory on the host's heap, so that they never wait for the allocator's lock, and long runs do not leak.
 
 use crate::common::items;
 use HubSlosh::Instance;

@@ -1,4 +1,4 @@
-//! Parameters without effect: no warning names one that changes an output.
+//! Warnings about parameters without effect: no warning names a parameter that changes an output.
 
 use runtime::Model;
 use runtime::call::{CType, Interface};
@@ -17,7 +17,7 @@ fn value_of<M: Model>(scalar: &Scalar<M>, x: f64) -> Value {
     }
 }
 
-/// Returns the bits of the outputs at the start and after each of four steps, and the warnings; `None` if the
+/// Returns the bits of the outputs at the start and after each of four steps, and the warnings. `None` if the
 /// FMU refuses the values.
 fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Vec<String>)> {
     let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
@@ -55,7 +55,7 @@ fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Ve
     Some((bits, warnings))
 }
 
-/// Lists other values of a parameter, of which the first one that the FMU accepts is used.
+/// Lists other values for a parameter. The test uses the first one that the FMU accepts.
 fn others<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
     match (value, scalar.variable.kind) {
         (Value::Boolean(b), _) => vec![Value::Boolean(!b)],
@@ -72,7 +72,7 @@ fn others<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
     }
 }
 
-/// Changes each parameter alone, and asserts that no warning calls a parameter without effect that changes an output.
+/// Changes each parameter separately, and asserts that no warning names a parameter that changes an output.
 fn check<M: Model>(base: Values) {
     let scalar = |name: &str| {
         let n = M::table().find(name).unwrap_or_else(|| panic!("no variable {name}"));
@@ -117,7 +117,7 @@ fn no_warning_names_a_parameter_of_hubslosh_that_changes_an_output() {
     let moving = [("init.omega", 0.3), ("tau_cmd", 0.3), ("tau_ext", -0.5)];
     let with =
         |more: &[(&'static str, f64)]| -> Vec<(&'static str, f64)> { [&moving[..], more].concat() };
-    // each friction law and each slosh model once
+    // each friction law and each slosh model at least once
     for n in 1..=5 {
         let (friction, slosh) = (f64::from(n), f64::from(1 + n % 5));
         let models = [("friction.model", friction), ("slosh.model", slosh), ("slosh.modes", 1.0)];
@@ -137,7 +137,7 @@ fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);
 }
 
-/// For some parameters that have no effect because another parameter replaces them, the warning must name the reason.
+/// If another parameter replaces a parameter, which therefore has no effect, the warning must say so.
 #[test]
 fn a_warning_names_parameters_that_others_replace() {
     fn said<M: Model>(values: Values) -> Vec<String> {

@@ -1,5 +1,5 @@
-//! The life cycle of one instance: which calls are allowed in which state, that a refused call changes nothing, and that a saved state is
-//! complete.
+//! The life cycle of one instance: each call is allowed only in certain states, a refused call changes nothing, and a
+//! saved state is complete.
 
 use crate::common::items;
 use HubSlosh::table::TABLE;
@@ -138,7 +138,7 @@ fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization
     assert_eq!(real(&mut instance, "tank.h"), 0.08);
 }
 
-/// The natural frequency belongs to the specific force at the end of the initialization.
+/// The natural frequency is computed with the specific force at the end of the initialization.
 #[test]
 fn inputs_set_in_initialization_mode_count_from_the_start() {
     let mut instance = fresh();
@@ -147,7 +147,7 @@ fn inputs_set_in_initialization_mode_count_from_the_start() {
     set(&mut instance, &[("g_axial", Value::Real(9.81 / 4.0))]);
     instance.exit_initialization_mode().unwrap();
     let quarter = real(&mut instance, "slosh.frequency[1]");
-    // sqrt(g/l): two roundings.
+    // sqrt(g/l) has two rounding errors.
     assert!((quarter / on_earth - 0.5).abs() < 1e-15);
 }
 
@@ -211,7 +211,7 @@ fn wrong_inputs_are_refused_by_the_call_that_sets_them() {
         let fault = try_set(&mut instance, name, Value::Real(value)).unwrap_err();
         assert!(fault.text.contains(name), "{}", fault.text);
     }
-    // One wrong value among good ones: none is taken.
+    // If one of several values is wrong, none of them is set.
     let references = [reference("tau_cmd"), reference("tau_ext")];
     assert!(instance.set(&SET_REAL, &references, |n| Value::Real([1.0, f64::NAN][n])).is_err());
     assert!(instance.set_input_derivatives(&references, &[1, 1], &[1.0, f64::NAN]).is_err());
@@ -264,8 +264,8 @@ fn invalid_steps_are_refused_and_change_nothing() {
     instance.do_step(0.25, 0.75).unwrap();
 }
 
-/// Hosts compute the time as n h or add up h. Both times, and the stop time, differ from the exact value by some units in
-/// the last place.
+/// Hosts compute the time as n h, or add up h. Both times, and the stop time, differ from the exact value by some units
+/// in the last place.
 #[test]
 fn communication_points_may_be_off_by_rounding() {
     let h = 0.1;
@@ -282,8 +282,8 @@ fn communication_points_may_be_off_by_rounding() {
     }
 }
 
-/// With a slope, one long step sees the same input as many short ones. The results of the long step and of the short steps
-/// have a relative error below the tolerance 1e-8.
+/// An input with a slope has the same course in one long step as in many short steps. The results of both agree
+/// to the tolerance 1e-8.
 #[test]
 fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     let run = |cuts: u32| {
@@ -295,7 +295,7 @@ fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
             instance.set_input_derivatives(&command, &[1], &[0.1]).unwrap();
             instance.do_step(f64::from(n) * h, h).unwrap();
         }
-        // It stands where the ramp ended, and stays there.
+        // The input has the value at the end of the ramp, and keeps it.
         assert!((real(&mut instance, "tau_cmd") - 0.05).abs() < 1e-15);
         instance.do_step(1.0, 1.0).unwrap();
         assert!((real(&mut instance, "tau_cmd") - 0.05).abs() < 1e-15);
@@ -305,7 +305,8 @@ fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     assert!((whole - cut).abs() < 1e-7 * whole.abs(), "{whole} {cut}");
 }
 
-/// g_axial falls by input derivatives. A step in which g_axial would become negative is refused and changes nothing.
+/// g_axial falls because of its input derivative. A step in which g_axial would become negative is refused and changes
+/// nothing.
 #[test]
 fn the_axial_specific_force_may_fall_to_zero_but_not_below() {
     let down = |slope: f64| {
@@ -321,7 +322,7 @@ fn the_axial_specific_force_may_fall_to_zero_but_not_below() {
         }
         Ok(real(&mut instance, "g_axial"))
     };
-    // Three steps of 0.1 s: 9.81 / 0.3 per second hits 0 up to rounding.
+    // Three steps of 0.1 s at 9.81 / 0.3 per second reach 0 up to rounding.
     let end = down(-9.81 / 0.3).unwrap();
     assert!((0.0..1e-14).contains(&end), "{end}");
     let fault = down(-33.0).unwrap_err();
@@ -427,7 +428,7 @@ fn rollback_is_exact_in_a_thousand_random_sequences() {
             ("friction.model", number(law)),
             ("slosh.modes", number(rng.i32(1..=4))),
             ("friction.eps", Value::Real(1e-3)),
-            // passive with whatever Coulomb torque is tuned
+            // LuGre friction stays passive with every tunable Coulomb torque.
             ("friction.sigma1", Value::Real(0.0)),
             ("init.omega", Value::Real(0.1 * rng.f64())),
             ("init.slosh_angle", Value::Real(0.2 * rng.f64())),
@@ -515,8 +516,8 @@ fn random_calls_never_panic() {
     }
 }
 
-/// New, initialising, stepping, failed and terminated instances of HubSlosh are saved to bytes and read back; the instance
-/// state and the bytes are equal.
+/// Instances of HubSlosh that are new, initialising, stepping, failed or terminated are saved to bytes and restored.
+/// Their instance state and their bytes are then equal.
 #[test]
 fn a_state_can_be_saved_in_every_instance_state() {
     let mut initializing = fresh();
@@ -553,9 +554,9 @@ fn bytes_that_are_no_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
-/// A sample is due at the end of each of these steps. In an earlier version it came a step late from 52 s on,
-/// because the sum of the steps had drifted from the host's clock by 1e-11 s. The rate changes by 1e-3 rad/s
-/// per step; the allowed part of a period causes 1e-6 of that.
+/// A gyro sample is due at the end of each of these steps. It must not come one step late because of the difference
+/// between the sum of the steps and the host's clock, 1e-11 s after 52 s. The rate changes by 1e-3 rad/s per step; the
+/// allowed part of a period causes 1e-6 of this change.
 #[test]
 fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies() {
     let h = 0.01;
@@ -601,8 +602,7 @@ fn an_input_out_of_range_in_saved_bytes_is_refused() {
     assert!(why.contains("g_axial = -9.123456"), "{why}");
 }
 
-/// A ring wider than the tank's radius is within the range of its variable, but is refused in combination
-/// with the tank.
+/// A ring wider than the tank's radius is within the range of its variable, but contradicts the tank.
 #[test]
 fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     let width = 0.0123456;
@@ -615,8 +615,8 @@ fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     assert!(from_bytes(&with_number(bytes, width, 1.9)).is_err());
 }
 
-/// A step of 1 us shows the derivative up to (1 us)^2 of the third derivative, which is at most 1e3/s^3 of a
-/// signal's size here, and up to the rounding 1e-16 / 1e-6.
+/// A finite difference over 1 us has an error of (1 us)^2 times the third derivative, which is at most 1e3/s^3 of the
+/// signal's size here, plus the rounding error 1e-16 / 1e-6.
 #[test]
 fn output_derivatives_equal_differences_of_the_outputs() {
     for slosh_model in items("slosh.model") {
@@ -641,10 +641,10 @@ fn output_derivatives_equal_differences_of_the_outputs() {
                 after.push(real(&mut other, scalar.variable.name));
             }
             let now = real(&mut instance, scalar.variable.name);
-            // Second order, forwards.
+            // one-sided difference of second order
             let moved = (4.0 * (after[0] - now) - (after[1] - now)) / (2.0 * h);
             let size = derivative.abs().max(now.abs()).max(1e-3);
-            // The gyro takes no sample meanwhile.
+            // The gyro takes no sample during this time.
             assert!(
                 (moved - derivative).abs() < 1e-5 * size,
                 "{} {slosh_model}: {derivative} {moved}",
@@ -678,7 +678,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
             ("slosh.model", number(slosh_model)),
             ("slosh.modes", number(3)),
             ("friction.model", number(friction_model)),
-            // The default, 1e-5, bends within less than differences can resolve.
+            // With the default of 1e-5 the friction curve bends within a range that differences cannot resolve.
             ("friction.eps", Value::Real(0.05)),
             ("friction.forward_cos1", Value::Real(between(-0.2, 0.2))),
             ("friction.asymmetry", Value::Real(between(-0.2, 0.2))),
@@ -688,12 +688,12 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
             ("g_axial", Value::Real(between(1.0, 20.0))),
         ],
     );
-    // A start time other than 0: outputs that are times then differ from their derivatives.
+    // The start time is not 0, so that outputs that are times differ from their derivatives.
     instance.setup_experiment(None, 1.0, None).unwrap();
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();
     instance.enter_continuous_time_mode().unwrap();
-    // Of an angle; with liquid of a length, the third mode's pendulum's being 9 mm.
+    // States are angles; in the model `liquid` they are lengths, and the pendulum of the third mode is 9 mm long.
     let unit = if slosh_model == 5 { 0.009 } else { 1.0 };
     let mut states = [0.0; STATES];
     for (n, x) in states.iter_mut().enumerate() {
@@ -728,8 +728,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     assert!(answers.iter().all(|d| *d == 0.0), "derivatives along the seed 0: {answers:?}");
     instance.directional_derivative(&unknowns, &knowns, &direction, &mut answers).unwrap();
 
-    // Central differences with Richardson's extrapolation: 1e-12 is left out, rounding
-    // is 1e-13.
+    // Central differences with Richardson extrapolation: truncation error 1e-12, rounding error 1e-13.
     let h = 1e-3;
     let start: Vec<f64> = inputs
         .iter()
@@ -753,7 +752,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|k| at(k * h));
     for (n, answer) in answers.iter().enumerate() {
         let name = TABLE.scalars[unknowns[n] as usize].name();
-        // A cone: differences across its tip mean nothing.
+        // The function has the shape of a cone here; differences across its tip have no meaning.
         if name == "wave_height" && [p2[n], p1[n], m1[n], m2[n]].iter().any(|x| *x < 5e-3) {
             continue;
         }
@@ -766,8 +765,9 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
 }
 
-/// The tested derivatives are known: sqrt(g/l)/2 pi by g, theta by its start value, and the hub's
-/// acceleration by the torque, which is the inverse of the inertia of hub and liquid if nothing else moves.
+/// The known derivatives are those of sqrt(g/l)/2 pi with respect to g, of theta with respect to its start value,
+/// and of the hub's acceleration with respect to the torque. The last is the inverse of the inertia of hub and
+/// liquid if nothing else moves.
 #[test]
 fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and_parameters() {
     let mut instance = fresh();
@@ -836,11 +836,11 @@ fn only_friction_parameters_can_be_changed_between_steps() {
         assert!(try_set(&mut instance, name, value).is_err(), "{name}");
         assert_eq!(to_bytes(&instance), before, "{name}");
     }
-    // A brake.
+    // brakes the hub
     set(&mut instance, &[("friction.c", Value::Real(10.0))]);
     instance.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut instance, "omega"), 0.0);
-    // It goes into the saved state, and back out of it.
+    // The changed parameter is part of a saved state, and is restored from it.
     let mut other = HubSlosh::instance(Interface::CoSimulation);
     other.restore(&from_bytes(&to_bytes(&instance)).unwrap()).unwrap();
     for instance in [&mut instance, &mut other] {
@@ -864,12 +864,12 @@ fn a_state_of_the_other_interface_is_refused() {
     assert_eq!(exchange.interface(), Interface::ModelExchange);
 }
 
-/// The model description declares these dependencies, and an importer breaks algebraic loops by them.
+/// The model description declares these dependencies, with which an importer breaks algebraic loops.
 #[test]
 fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
-            // Moving, and stuck right at the start.
+            // a moving hub, and a hub that is stuck at the start
             let mut moving = lively(slosh_model, friction_model);
             moving.do_step(0.0, 0.5).unwrap();
             let stuck = stepping(&[
@@ -934,13 +934,13 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
             let refused = match (slosh_model, source) {
                 (_, 1) => false,
                 (_, _) => {
-                    // A length is given; number 1 is not the table.
+                    // If a length is given, the frequency has no effect; if source_kind is 1, the table is not used.
                     ["slosh.table.frequency[1]", "slosh.source_kind"]
                         .contains(&parameter.name().as_str())
-                        // Linear and planar start along the direction of mode 1.
+                        // The models linear and planar start along the direction of mode 1.
                         || [2, 3].contains(&slosh_model)
                             && parameter.name() == "slosh.table.direction[1]"
-                        // Spherical and liquid move along both axes.
+                        // The models spherical and liquid move along both axes.
                         || [4, 5].contains(&slosh_model)
                             && ["slosh.table.one_axis", "slosh.table.direction"]
                                 .iter()
@@ -962,7 +962,7 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
                     (Value::Boolean(b), _) => Value::Boolean(!b),
                 };
             set(&mut other, &[(&parameter.name(), value)]);
-            // Together with another item of the enumeration it would be an error.
+            // Together with another item of the enumeration the integer would be a contradiction.
             if let Some(group) = parameter.variable.name.strip_suffix(".kind") {
                 let model = TABLE.scalars[reference_of_model(group) as usize];
                 set(&mut other, &[(&model.name(), model.start().unwrap())]);
@@ -984,8 +984,8 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
     }
 }
 
-/// Each continuous state is changed by itself; if a variable then changes, the model description must list the state as a
-/// dependency: a host's solver may leave entries of the Jacobian that are not listed at 0.
+/// Changes each continuous state separately. If a variable then changes, the model description must list the state as a
+/// dependency, because a host's solver may set entries of the Jacobian that are not listed to 0.
 #[test]
 fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
@@ -1037,7 +1037,8 @@ fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
     }
 }
 
-/// OpenModelica's import, ecos and libcosim set no enumerations; OMSimulator sets none called model.
+/// OpenModelica's import, ecos and libcosim do not set enumerations; OMSimulator does not set enumerations with the
+/// name `model`.
 #[test]
 fn integer_twins_have_the_effect_of_the_enumerations() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
@@ -1063,7 +1064,7 @@ fn integer_twins_have_the_effect_of_the_enumerations() {
     }
 }
 
-/// OpenModelica up to 1.27 sets Booleans to noise.
+/// OpenModelica up to 1.27 sets Booleans to random numbers.
 #[test]
 fn integer_twins_override_the_booleans() {
     for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]
@@ -1099,7 +1100,8 @@ fn kinds_that_contradict_the_enumerations_are_all_reported() {
     for text in ["slosh.kind = 4", "slosh.model = 3", "friction.kind = 2", "friction.model = 1"] {
         assert!(fault.text.contains(text), "{text} is not in: {}", fault.text);
     }
-    // The same number twice is not a contradiction, nor is the start value, which many hosts set.
+    // If both are set to the same number, they do not contradict each other. Neither does an enumeration at its start
+    // value, which many hosts set.
     for (model, kind) in [(4, 4), (2, 4)] {
         stepping(&[("slosh.model", number(model)), ("slosh.kind", number(kind))]);
     }

@@ -1,4 +1,4 @@
-//! Tanks that `hubslosh tank` has computed, through the plant's table of modes.
+//! Tanks that `hubslosh tank` has computed, simulated with the plant's table of modes.
 
 use hubslosh_tank::Tank;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
@@ -36,9 +36,9 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The bench's cylinder is described by its dimensions, by the closed form of `hubslosh tank`, and by its
-/// contour through the boundary integral equation. Masses and lengths agree to 1e-11, and the motion over 10
-/// s to the integrator's tolerance times the growth of a small change in rotary motion.
+/// The bench's cylinder is described in three ways: by its dimensions, by the closed form of `hubslosh tank`, and by
+/// its contour through the boundary integral equation. Masses and lengths agree to 1e-11, and the motion over 10 s to
+/// the integrator's tolerance times the growth of a small change in rotary motion.
 #[test]
 fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
     for model in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
@@ -62,8 +62,8 @@ fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
     }
 }
 
-/// A box carries its liquid along in a rotation about its vertical axis (`tank.I_own`), which makes it harder
-/// to turn. For a square of 0.1 m the effective inertia is 0.1565 of the rigid one.
+/// A box that rotates about its vertical axis takes liquid along (`tank.I_own`), which increases its inertia. For a
+/// square box of 0.1 m the effective inertia is 0.1565 of that of rigid liquid.
 #[test]
 fn a_box_drags_liquid_about_its_axis() {
     let tank = Tank::parse("density = 1000\nbox = [0.1, 0.1]", std::path::Path::new("")).unwrap();
@@ -81,7 +81,7 @@ fn a_box_drags_liquid_about_its_axis() {
         let inputs = Inputs { tau_cmd: Ramp::held(1e-3), ..Inputs::default() };
         Plant::new(&p, &inputs, 0.0, 1e-9).unwrap().outputs(&inputs).omega_dot
     };
-    // On the axis itself only the liquid's own inertia counts.
+    // If the tank is on the axis itself, only the liquid's own inertia counts.
     let [without, with] = [0.0, own].map(acceleration);
     assert!((without - 1.0).abs() < 1e-12, "{without}");
     assert!((with * (1e-3 + own) / 1e-3 - 1.0).abs() < 1e-12, "{with}");

@@ -1,4 +1,5 @@
-//! The packed FMUs compute the same bits as the crate `craft`, so what the crate's tests show of its motion holds for the FMUs.
+//! The packed FMUs compute bit-identical results to the crate `craft`, so that the results of the crate's tests
+//! hold for the FMUs.
 
 use craft::{
     BallState, Coupling, INPUTS, Inputs, Line, Mount, Parameters, Ramp, Ranges, STATES, TankInputs,
@@ -14,10 +15,10 @@ use super::records::{
 
 const TOLERANCE: f64 = 1e-10;
 
-/// Number of communication steps of a random run of 2 s; its inputs jump every half second.
+/// Number of communication steps of a random run of 2 s, whose inputs jump every half second.
 const COUNT: usize = 100;
 
-/// Returns the outputs of a tank without those that `component` does not read.
+/// Returns the outputs of a tank, with those that `component` does not read set to 0.
 fn read(out: TankOutputs) -> TankOutputs {
     TankOutputs {
         axial: 0.0,
@@ -30,8 +31,7 @@ fn read(out: TankOutputs) -> TankOutputs {
     }
 }
 
-/// Compares the outputs after every step, then the derivatives and their directional derivative for a host
-/// that integrates itself.
+/// Compares the outputs after every step, then the derivatives and their directional derivative in Model Exchange.
 fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: usize) {
     let start = input(0);
     let mut own = craft::Spacecraft::new(p, &start, 0.0, TOLERANCE).unwrap();
@@ -48,7 +48,7 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
     let x = own.continuous_states();
     assert_eq!(packed.continuous_states(), x, "{what}");
 
-    // The FMU has no slopes of inputs in Model Exchange.
+    // In Model Exchange the FMU receives no slopes of inputs.
     let held = |ramp: Ramp| Ramp::held(ramp.value);
     let u = Inputs {
         force: held(start.force),
@@ -66,8 +66,8 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
     assert_eq!(packed.directional_derivative(&u, &dx, &du), expected, "{what}");
 }
 
-/// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every
-/// damping law, draining, appendages, and liquid that spins.
+/// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every damping law,
+/// draining, appendages, and liquid that spins.
 #[test]
 fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     for seed in 0..40 {
@@ -113,8 +113,8 @@ fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     }
 }
 
-/// The records' inputs bring both craft to the same place; the crate's test `reference` compares that with
-/// the records.
+/// The inputs of a record bring the FMU and the crate to the same state, bit for bit. The crate's test `reference`
+/// compares this state with the record.
 #[test]
 fn spacecraft_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("craft") {

@@ -1,8 +1,8 @@
-//! Spacecraft.fmu and SloshTank.fmu with the interface of the crate `craft`.
+//! Wraps Spacecraft.fmu and SloshTank.fmu in the interface of the crate `craft`.
 //!
-//! All is done by calls of the C interface: parameters and inputs by name, input derivatives for the
-//! slopes, fmi2DoStep, fmi2GetReal of whatever is looked at, fmi2GetDirectionalDerivative. The first
-//! time that states are set the instance gives way to one for Model Exchange.
+//! Only calls of the C interface are used: parameters and inputs are set by name, slopes as input derivatives; then
+//! follow fmi2DoStep, fmi2GetReal for each requested output, and fmi2GetDirectionalDerivative. When states are set for
+//! the first time, the instance is replaced by one for Model Exchange.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -25,8 +25,8 @@ pub fn load(name: &str) -> Fmu {
     Fmu::load(directory.path(), packed).unwrap()
 }
 
-/// A loaded FMU with the value references of its variables, because a search of the description for each of the hundreds
-/// of parameters takes most of the time of an instantiation.
+/// A loaded FMU with the value references of its variables. Searching the description for each of the hundreds of
+/// parameters would take most of the time of an instantiation.
 struct Loaded {
     fmu: Fmu,
     references: HashMap<String, u32>,
@@ -375,7 +375,7 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
         wave_height: next.one(),
         spin_ratio: next.one(),
         spin_number: next.one(),
-        // Not read: what tests compare is forces and motion.
+        // Not read, because tests compare only forces and motion.
         axial: 0.0,
         turning: 0.0,
         ranges: craft::Ranges::default(),
@@ -385,7 +385,7 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
     }
 }
 
-/// Returns value and slope of three vectors, each as nine numbers.
+/// Returns the values and the slopes of three vectors, each as nine numbers.
 fn flat(ramps: [&Ramp; 3]) -> [[f64; 9]; 2] {
     [|ramp: &Ramp| ramp.value, |ramp: &Ramp| ramp.slope].map(|part| {
         let vectors = ramps.map(part);

@@ -1,7 +1,8 @@
-//! A tank hung on somebody else's rigid body, exchanging signals once per communication step H.
+//! A tank on a rigid body that another program simulates; both exchange signals once per communication step H.
 //!
-//! lambda: largest eigenvalue of M_body^-1 M_a. w_0, w_p: slosh frequency with the body held, with
-//! the body free. Of the total wrench, which contains -M_a [a; w'], a delayed copy makes
+//! lambda is the largest eigenvalue of M_body^-1 M_a; w_0 and w_p are the slosh frequencies with a fixed and with a
+//! free body. The total wrench contains -M_a [a; w']. If the body receives a delayed copy of it, errors grow from step
+//! to step by a factor z with
 //!
 //! ```text
 //! Gauss-Seidel (body first), forces held                 z + lambda = 0             lambda < 1
@@ -9,11 +10,12 @@
 //! Jacobi, both extrapolate                               z^4 + lambda (2 z - 1)^2 = 0   0.1547
 //! ```
 //!
-//! whatever H. With added mass and bias split there is no such loop; held values then give the
-//! slosh mode a growth of (w_p^2 - w_0^2) H/4, thrice that in Jacobi's order.
+//! for every H; the last column is the limit of stability. If added mass and bias are exchanged separately, there
+//! is no such loop. Held values then make the slosh mode grow at the rate (w_p^2 - w_0^2) H/4, and three times as
+//! fast in Jacobi's order.
 //!
-//! Source: the recurrences follow from one eigendirection of the exchange; delays of the
-//! restoring force by H/2 and 3 H/2 give the growth.
+//! Source: the recurrences follow from one eigendirection of the exchange; the growth rates follow from delays of the
+//! restoring force by H/2 and 3 H/2.
 
 use craft::{
     Coupling, Craft, DampingLaw, Inertia, Inputs, Parameters, Ramp, SloshTankOutputs, Tank,
@@ -25,7 +27,7 @@ use super::component::{SloshTank, Spacecraft};
 
 const THRUST: f64 = 2400.0;
 
-/// How the tank's force is passed to the body.
+/// The form in which the body receives the tank's force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Exchange {
     Total,
@@ -34,18 +36,18 @@ enum Exchange {
     Lumped,
     /// The lumped mass is part of the body itself.
     RigidBody,
-    /// The added mass at rest is constant, and its share is taken out of the wrench.
+    /// The added mass at rest is a constant matrix, and its share is subtracted from the wrench.
     Constant,
 }
 
-/// How exchanged values continue within a step, and the order of the two FMUs.
+/// The course of exchanged values within a step, and the order in which the two FMUs are stepped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     GaussSeidelHeld,
     GaussSeidelLinear,
     JacobiHeld,
     JacobiLinear,
-    /// `GaussSeidelLinear`, then both steps again with the tank's values at the end.
+    /// As `GaussSeidelLinear`; then both steps are repeated with the tank's values at the end of the step.
     Repeated,
 }
 use Order::*;
@@ -109,7 +111,7 @@ impl Pair {
         mass_matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-arm * mass));
         mass_matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&(arm * mass));
         mass_matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
-        // It starts with the acceleration that the craft as a whole has.
+        // The body starts with the acceleration of the whole craft.
         let force = Ramp::held([0.0, 0.0, THRUST]);
         let u = Inputs { force, ..Inputs::default() };
         let start = Spacecraft::new(p, &u, 0.0, 1e-9).unwrap().outputs(&u);
@@ -141,7 +143,8 @@ impl Pair {
         TankInputs { a: ramp(0), omega: self.w.into(), omega_dot: ramp(3), ..TankInputs::default() }
     }
 
-    /// Returns the terms of the equation that the body solves: (M_body + matrix) x = rest + right-hand side.
+    /// Returns the matrix and the right-hand side of the tank in the equation that the body solves: (M_body + matrix) x
+    /// = rest + right-hand side.
     fn look(&mut self, u: &TankInputs) -> Given {
         let SloshTankOutputs { tank, bias, added_mass, .. } = self.tank.outputs(u);
         let wrench = Vector6::from_column_slice(&[tank.force, tank.torque].concat());
@@ -179,8 +182,8 @@ impl Pair {
         (self.mass_matrix + matrix).lu().solve(&rest).unwrap()
     }
 
-    /// Makes the body's step by Runge-Kutta on its rate, while matrix and right-hand side change linearly to
-    /// `end`. Returns [a; w'] at both ends, and the rate.
+    /// Makes the body's step by Runge-Kutta for its rate, while matrix and right-hand side change linearly to `end`.
+    /// Returns [a; w'] at both ends, and the rate.
     fn move_body(&self, end: &Given, h: f64) -> ([Vector6<f64>; 2], Vector3<f64>) {
         let now = &self.given[1];
         let rate = |share: f64, w: Vector3<f64>| {
@@ -198,7 +201,7 @@ impl Pair {
         ([from, to], w)
     }
 
-    /// Makes the tank's step with the rate that the body has had, and returns the tank's terms at the end.
+    /// Makes the tank's step with the rates of the body at both ends, and returns the tank's terms at the end.
     fn move_tank(&mut self, ends: [Vector6<f64>; 2], h: f64) -> Given {
         self.tank.step(&self.input(ends, h), h).unwrap();
         self.look(&self.input([ends[1], ends[1]], h))
@@ -237,7 +240,7 @@ impl Pair {
     }
 }
 
-/// Returns true if a disturbance of 1e-6 of the wrench grows about ten thousand times within 1500 steps.
+/// Returns true if a disturbance of 1e-6 of the wrench grows to about ten thousand times its size within 1500 steps.
 fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
     let tank = Tank::default();
     let p = parameters(ratio(tank) / lambda, tank);
@@ -292,7 +295,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     let mut tank = Tank { zeta: [0.0; 3], ..Tank::default() };
     tank.p_0[0] = [0.01, 0.0, -1.0];
     let p = parameters(share, tank);
-    // w_p^2, w_0^2 by the closed forms for one tank on the axis.
+    // w_p^2 and w_0^2 by the closed forms for one tank on the axis
     let mass = p.craft.mass + tank.m_0;
     let z_0 = tank.position[2] + tank.h_0;
     let center = (p.craft.mass * p.craft.r[2] + tank.m_0 * z_0) / mass;
@@ -311,7 +314,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
         let [p, p_d] = pair.slosh();
         f64::hypot(p, p_d / f64::sqrt(w_p_2))
     };
-    // Peaks of the amplitude over a period average out what the delay makes of the phase.
+    // The mean of the peaks over a period removes the effect of the delay on the phase.
     let mut means = [0.0; 2];
     let steps = |t: f64| (t / h).round() as usize;
     let period = std::f64::consts::TAU / f64::sqrt(w_p_2);
@@ -333,11 +336,11 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     (f64::ln(means[1] / means[0]) / 50.0, formula)
 }
 
-/// Share for a body of 300 kg: lambda = 1.3.
+/// Fraction for a body of 300 kg: lambda = 1.3.
 const LIGHT: f64 = 300.0 / 1180.0;
 
-/// Two FMUs, tank and craft, exchange force and acceleration once in a communication step (Jacobi or Gauss-Seidel order).
-/// The growth rate of the slosh mode equals the growth rate that follows from the delay.
+/// Tank and craft are two FMUs that exchange force and acceleration once in a communication step, in Jacobi or
+/// Gauss-Seidel order. The growth rate of the slosh mode equals the rate that follows from the delay.
 #[test]
 fn coupling_two_fmus_with_a_delay_makes_the_slosh_mode_grow_as_predicted() {
     for (share, order, h) in [
@@ -383,8 +386,8 @@ fn error(share: f64, exchange: Exchange, order: Order, h: f64) -> f64 {
     error_of(share, tank, exchange, order, h)
 }
 
-/// Returns the largest difference, within 20 s, of the coupled craft's rate from the rate of the craft as one FMU, relative
-/// to the rate of the one FMU.
+/// Returns the largest difference, within 20 s, between the rate of the coupled craft and the rate of the craft as one
+/// FMU, relative to the latter.
 fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) -> f64 {
     let p = parameters(share, tank);
     let mut pair = Pair::new(&p, exchange, order);
@@ -402,9 +405,9 @@ fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) ->
     worst / largest
 }
 
-/// Held values give first order, linearly extrapolated ones second. The total wrench converges only at the
-/// lower mass ratio, and in first order. The constant matrix leaves a delayed share of the wrench, m
-/// sin(angle) [a; w'], which is of first order once the second order has become small.
+/// Held values converge with first order, linearly extrapolated values with second order. The total wrench converges
+/// only at the lower mass ratio, and with first order. With the constant matrix a share of the wrench, m sin(angle) [a;
+/// w'], is still delayed; its error of first order shows when the error of second order has become small.
 #[test]
 fn coupling_converges_with_its_order() {
     use Exchange::*;
@@ -433,9 +436,9 @@ fn coupling_converges_with_its_order() {
     }
 }
 
-/// A box moves in both of its planes, with m_0 below 0. With lumped coupling its modes count twice, so a
-/// larger part is a step late. Held values then remove more damping: at lambda 8 and 20 ms the pair diverges.
-/// Extrapolated values do not diverge.
+/// The box moves in both of its planes, and m_0 is below 0. With lumped coupling its modes count twice, so that a
+/// larger share of the force is one step late. Held values then remove more damping: at lambda = 8 and 20 ms the
+/// simulation diverges. Extrapolated values do not diverge.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     let lambda = ratio(a_box());
@@ -457,8 +460,8 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     }
 }
 
-/// The lumped matrix is on the body's side, in the equations that it solves or in the body itself, and bias^ comes from
-/// outside. The coupling is stable at any mass ratio, and at least of first order.
+/// The lumped matrix is on the side of the body: in the equations that it solves, or in the body itself; bias^ comes
+/// from the tank. The coupling is stable at any mass ratio, and converges at least with first order.
 #[test]
 fn lumped_coupling_is_stable_and_converges_up_to_lambda_6() {
     let lambda = ratio(Tank::default());

@@ -1,9 +1,9 @@
 //! Waves of finite amplitude through the packed SloshTank and, on a heavy craft, the packed Spacecraft, compared with fully
 //! nonlinear potential flow, which has no expansion in steepness.
 //!
-//! The force on the craft accelerates craft and tank as the tank alone is accelerated, except for the recoil: a slosh mass
-//! of mass m that swings pushes a craft of mass M. It raises the frequency by m/(2 M), 4e-12 here, and each test compares
-//! the FMUs to 1e-9.
+//! A force on the craft gives craft and tank the acceleration of the tank by itself, except for the recoil: a slosh
+//! mass m that swings pushes a craft of mass M. The recoil raises the frequency by m/(2 M), which is 4e-12 here; each
+//! test compares the two FMUs to 1e-9.
 
 use std::f64::consts::TAU;
 
@@ -13,11 +13,11 @@ use formulas::energy_terms::energy_terms;
 use super::component::{SloshTank, Spacecraft};
 use super::waves::{G, Moved, TOLERANCE, bench, circular, linear_frequency, planar, sideways};
 
-/// Mass (kg) and moments of inertia (kg.m2) of the craft. Its weight is near the largest force that the FMU
-/// accepts.
+/// Mass (kg) and moments of inertia (kg.m2) of the craft. The force that accelerates it is near the largest one
+/// that the FMU accepts.
 const HEAVY: f64 = 1e11;
 
-/// A tank at the centre of mass of a craft in free flight, which a force at the same place accelerates.
+/// A tank at the centre of mass of a craft in free flight. A force at this point accelerates the craft.
 struct Carried {
     craft: Spacecraft,
     mass: f64,
@@ -68,7 +68,7 @@ fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
 }
 
-/// The numbers are the first mode's angle in degrees, and its frequency divided by the frequency of small waves.
+/// Each row has the angle of the first mode in degrees, and its frequency divided by the frequency of small waves.
 #[test]
 fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
     type Frequency = fn(Tank, f64) -> f64;
@@ -91,8 +91,8 @@ fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
     }
 }
 
-/// A slosh mass started on a circle with the frequency that the coefficients s and kappa predict returns to its start after
-/// one period, in Spacecraft and in SloshTank.
+/// A slosh mass starts on a circle with the frequency that the coefficients s and kappa predict. After one period it
+/// returns to its start, in Spacecraft and in SloshTank.
 #[test]
 fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
     fn end<T: Moved>(tank: &Tank, a: f64, w: f64) -> f64 {
@@ -109,9 +109,9 @@ fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
     assert!(off.iter().all(|off| *off < 1e-9), "{off:?}");
 }
 
-/// Returns the largest angles along and across in degrees and the force along x in N over the last tenth of
-/// 150 periods of a tank that moves sideways by -stroke cos(w t), from rest, with 0.01 rad across. The last
-/// value is the largest difference of both FMUs over all periods, with a craft of mass `heavy`.
+/// Simulates a tank that moves sideways by -stroke cos(w t), from rest, with 0.01 rad across, for 150 periods. Returns,
+/// over the last tenth, the largest angles along and across in degrees and the largest force along x in N; and the
+/// largest difference between SloshTank and Spacecraft with a craft of mass `heavy` over all periods.
 fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     let mut tank = Tank { p_0: [[0.0, 0.01, -1.0]; MODES], ..bench(1.227) };
     tank.zeta[0] = 0.005;
@@ -136,9 +136,9 @@ fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     (largest, off)
 }
 
-/// Forced waves near resonance in SloshTank and Spacecraft with large-wave coefficients equal waves of potential flow; a
-/// pendulum without these coefficients is wrong by up to a factor of two. In the last case the motion across the forcing
-/// decays.
+/// Forced waves near resonance, in SloshTank and in Spacecraft with large-wave coefficients, equal waves of
+/// potential flow; a pendulum without these coefficients is wrong by up to a factor of two. In the last case the
+/// motion across the forcing decays.
 #[test]
 fn forced_waves_near_resonance_equal_those_of_potential_flow_in_both_fmus() {
     for (ratio, stroke, along, across, force) in [
@@ -246,19 +246,19 @@ fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     }
 }
 
-/// The difference of both FMUs is the recoil, which falls as 1/M.
+/// The two FMUs differ by the recoil, which falls as 1/M.
 #[test]
 fn a_lighter_craft_recoils_more_by_the_ratio_of_the_masses() {
     let (tank, heavy) = (bench(1.227), 1e6);
     let period = TAU / linear_frequency(&tank);
     let released = Tank { p_0: [[0.02, 0.0, -1.0]; MODES], ..tank };
-    // A quarter of a period later the bob is early by the gain in phase, pi/2 times that in frequency.
+    // After a quarter of a period the slosh mass is ahead in phase by pi/2 times the gain in frequency.
     let (mut alone, mut carried) = (SloshTank::start(&released), Carried::by(heavy, &released));
     Moved::step(&mut alone, [0.0; 2], period / 4.0);
     carried.step([0.0; 2], period / 4.0);
     let gain = (alone.bob()[0] - carried.bob()[0]) / (0.02 * TAU / 4.0);
     let expected = tank.mass[0] / (2.0 * heavy);
-    // of second order in the angle
+    // the error is of second order in the angle
     assert!((gain / expected - 1.0).abs() < 1e-2, "{gain:e} {expected:e}");
 
     let [lighter, heavier] = [1e9, HEAVY].map(|heavy| forced(0.985, 0.18097e-3, heavy).1);

@@ -1,4 +1,4 @@
-//! One axis: Spacecraft.fmu and SloshTank.fmu against HubSlosh.fmu's spherical model.
+//! Motion about one axis: Spacecraft.fmu and SloshTank.fmu compared with HubSlosh.fmu's spherical model.
 
 use craft::{Inertia, Inputs, Parameters, Ramp, Tank, TankInputs, TankParameters};
 use host::fmi2::{Fmu, Instance};
@@ -48,7 +48,7 @@ fn step(bench: &mut Instance, k: usize) {
     bench.do_step(k as f64 * KNOT, KNOT).unwrap();
 }
 
-/// Returns the bench's tank: upright, on the x axis. Heights and I_0 have no effect on one axis.
+/// Returns the tank of the bench: upright, on the x axis. For motion about one axis its heights and I_0 have no effect.
 fn tank(bench: &mut Instance) -> Tank {
     let mut get = |name: &str| bench.real(name).unwrap();
     let mut tank = Tank {
@@ -79,7 +79,8 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// A mass of 1e11 kg and corresponding moments of inertia hold the craft to one axis; its remaining motion falls as 1/M.
+/// A mass of 1e11 kg and corresponding moments of inertia allow the craft to move only about one axis; the other
+/// motion falls as 1/M.
 #[test]
 fn spacecraft_held_to_one_axis_is_hubslosh() {
     let fmu = load("HubSlosh");
@@ -111,18 +112,18 @@ fn spacecraft_held_to_one_axis_is_hubslosh() {
             ] {
                 assert_close(got, bench.real(name).unwrap(), allowed, name);
             }
-            // Of some 10 N m/(kg m2) and 2 N m.
+            // relative to some 10 N m/(kg m2) and 2 N m
             let [omega_dot, tau] = ["omega_dot", "tau_fluid"].map(|name| bench.real(name).unwrap());
             assert_close(out.omega_dot[2], omega_dot, 10.0 * allowed, "omega_dot");
             assert_close(out.slosh_torque[2], tau, 10.0 * allowed, "tau_fluid");
         }
-        // Nonlinear enough to mean something.
+        // The motion must be clearly nonlinear.
         assert!(most > 0.3, "{most}");
     }
 }
 
-/// The host solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage of its integrator. The
-/// error of Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
+/// The host solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage of its integrator. The error of
+/// Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
 #[test]
 fn slosh_tank_on_a_hub_is_hubslosh() {
     const STEPS: usize = 40;
@@ -141,7 +142,7 @@ fn slosh_tank_on_a_hub_is_hubslosh() {
         let a = Ramp::held([0.0, 0.0, G]);
         let mut u = TankInputs { a, omega: [0.0, 0.0, x[0]], ..TankInputs::default() };
         let out = tank.outputs(&u);
-        // Elements 36 and 66 of the upper triangle by rows.
+        // elements 36 and 66 of the upper triangle, in row-major order
         let (m_36, m_66) = (out.added_mass[14], out.added_mass[20]);
         let w_d = (tau + out.bias[5] - m_36 * G) / (i_hub + m_66);
         u.omega_dot = Ramp::held([0.0, 0.0, w_d]);

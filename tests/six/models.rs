@@ -1,4 +1,4 @@
-//! Events that are due after a step of Spacecraft or SloshTank, and warnings, as the models report them to the runtime.
+//! Events after a step of Spacecraft or SloshTank, and warnings, as the models report them to the runtime.
 
 use SloshTank::model as sloshtank;
 use Spacecraft::model as spacecraft;
@@ -10,8 +10,8 @@ use spacecraft::Model as CraftModel;
 
 const STEP: f64 = 0.01;
 
-/// Simulates one second with a host's Euler steps, with h_wheels[2] and the torque about y as functions of time.
-/// Returns true if the FMU warns.
+/// Simulates one second with Euler steps of a host; h_wheels[2] and the torque about y are functions of time. Returns
+/// true if the FMU warns.
 fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool) -> bool {
     let inputs = |t: f64| {
         let mut inputs = Inputs::default();
@@ -34,14 +34,14 @@ fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool
         }
         model.set_time(Instant { time: t + STEP, since_start: None, resolution: 0.0 });
         model.set_continuous_states(&x);
-        // Inputs that jump at events are held between them.
+        // Inputs that jump at events are constant between them.
         model.accept_step(&inputs(if with_events { t } else { t + STEP })).unwrap();
     }
     model.step_warning().is_some()
 }
 
-/// Inputs are a history of the wheels' angular momentum and a torque. Spacecraft warns unless the torque is the reaction to
-/// the change.
+/// The inputs are a history of the wheels' angular momentum and a torque. Spacecraft warns unless the torque is the
+/// reaction to the change of the momentum.
 #[test]
 fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_torque() {
     let sine = |t: f64| f64::sin(3.0 * t);
@@ -50,16 +50,16 @@ fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_to
     assert!(!is_warned(sine, reaction, false));
     assert!(!is_warned(sine, |_| 0.0, true), "jumps at events turn the craft by impulses");
     assert!(!is_warned(|_| 5.0, |_| 0.0, false), "wheels that hold their momentum");
-    // A ramp between two knots, with a reaction only within the ramp.
+    // a ramp between two knots, with a reaction torque only during the ramp
     let ramp = |t: f64| (10.0 * (t - 0.5)).clamp(0.0, 1.0);
     let reaction = |t: f64| if (0.5..0.6).contains(&t) { -10.0 } else { 0.0 };
     assert!(!is_warned(ramp, reaction, false));
     assert!(is_warned(ramp, |_| 0.0, false));
 }
 
-/// Thrust is reversed, so that the liquid detaches. Then the host, which integrates the FMU, puts the liquid half a
-/// metre above its tank. Only if the liquid moves further outwards does the end of the step ask for an event, which
-/// reverses its speed.
+/// The thrust is reversed, so that the liquid detaches. The host, which integrates the FMU, then moves the liquid to
+/// half a metre above its tank. Only if the liquid moves further outwards does the FMU request an event at the end of
+/// the step; the event reverses the liquid's velocity.
 #[test]
 fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     let mut parameters = spacecraft::Parameters::default();
@@ -86,8 +86,8 @@ fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     assert!(!model.accept_step(&inputs).unwrap());
 }
 
-/// Pushes the host backwards while the liquid is half a metre above its tank, as a host that integrates the FMU may put
-/// it.
+/// Accelerates the host backwards while the liquid is half a metre above its tank, to which a host that integrates the
+/// FMU can move it.
 #[test]
 fn a_step_of_slosh_tank_that_ends_with_the_liquid_outside_asks_for_an_event() {
     let mut parameters = sloshtank::Parameters::default();
@@ -99,7 +99,7 @@ fn a_step_of_slosh_tank_that_ends_with_the_liquid_outside_asks_for_an_event() {
     assert!(model.accept_step(&inputs).unwrap(), "liquid that has to leave its bottom");
     model.handle_event(&inputs).unwrap();
     assert!(!model.accept_step(&inputs).unwrap());
-    // place and velocity of the flying liquid, before the three states of the spin
+    // position and velocity of the detached liquid, which precede the three states of the spin
     let ball = TANK_STATES - 9;
     let mut x = model.continuous_states().to_vec();
     x[ball + 2] += 1.1;

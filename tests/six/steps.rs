@@ -1,4 +1,4 @@
-//! Communication steps of both FMUs: their outputs after a step, and that results do not depend on the number of steps.
+//! Communication steps of Spacecraft and SloshTank: outputs after a step, and independence of the number of steps.
 
 use craft::{Inputs, Line, Parameters, Ramp, TankInputs, TankParameters};
 use host::fmi2::{CallError, MODEL_EXCHANGE, Status};
@@ -12,8 +12,8 @@ use super::component::{SloshTank, Spacecraft, load};
 use super::random::{Random, draining_tank};
 use super::records::{STEP, at_end, motion_at_end};
 
-/// Directly after a step the outputs are limits from the left: they include the torque of wheels that have
-/// accelerated, and the rate of a host that has turned.
+/// Directly after a step the outputs are limits from the left: they include the torque of wheels that have accelerated
+/// and the rate of a host that has rotated.
 #[test]
 fn outputs_after_a_step_hold_at_its_end() {
     for seed in 0..10 {
@@ -41,7 +41,7 @@ fn outputs_after_a_step_hold_at_its_end() {
     }
 }
 
-/// Makes steps of random craft and tanks with any inputs, one in twenty of extreme magnitude. The results are
+/// Makes steps of random craft and tanks with random inputs, one in twenty of extreme magnitude. Each step must give
 /// finite numbers, or fmi2Error with a message. Returns the number of refused steps.
 fn random_steps(count: usize, seed: u64) -> usize {
     let mut random = Random::new(seed);
@@ -49,7 +49,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
     while steps < count {
         let mut p = random.parameters();
         p.init.omega = [(); 3].map(|()| random.magnitude(1e-6, 1e2));
-        // Every third drains.
+        // every third tank drains
         if random.below(3) == 0 {
             p.tank[0] = draining_tank(&mut random, 2);
         }
@@ -57,7 +57,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
         let tolerance = random.magnitude(1e-14, 1e-1);
         let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap();
         let mut tank = SloshTank::new(&alone, &TankInputs::default(), 0.0, tolerance).unwrap();
-        // After fmi2Error an instance makes no more steps.
+        // After fmi2Error an instance makes no further steps.
         let [mut craft_goes_on, mut tank_goes_on] = [true; 2];
         for _ in 0..100 {
             let nonsense = random.below(20) == 0;
@@ -119,7 +119,7 @@ fn a_million_random_steps_give_finite_results_or_a_clear_error() {
     random_steps(1_000_000, 8);
 }
 
-/// omega follows from omega_dot in a step and must not leave its range there.
+/// The FMU computes the course of omega within a step from omega_dot; omega must not leave its range.
 #[test]
 fn a_step_in_which_an_input_would_leave_its_range_is_refused_and_changes_nothing() {
     let mut tank = Instance::<::SloshTank::Model, Fmi2>::new(Interface::CoSimulation);
@@ -134,8 +134,8 @@ fn a_step_in_which_an_input_would_leave_its_range_is_refused_and_changes_nothing
     assert!(to_bytes(&tank) == before);
 }
 
-/// Returns an output of an instance whose enumeration and integer twin have been set, or the reason for its
-/// refusal.
+/// Returns an output of an instance in which an enumeration and its integer twin were set, or the reason why
+/// the FMU refused them.
 fn with_kind<M: runtime::Model>(
     settings: &[(&str, i32)],
     shown: &str,
@@ -162,14 +162,15 @@ fn with_kind<M: runtime::Model>(
 fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_enumerations() {
     type Craft = ::Spacecraft::Model;
     type Tank = ::SloshTank::Model;
-    // On a pivot an accelerometer reads minus gravity.
+    // On a pivot an accelerometer measures minus the specific force of gravity.
     let a = |settings: &[(&str, i32)]| with_kind::<Craft>(settings, "specific_force[3]");
     assert_eq!(a(&[("mount_kind", 2)]).unwrap(), Value::Real(9.81));
     assert_eq!(a(&[("mount", 2), ("mount_kind", 2)]).unwrap(), Value::Real(9.81));
     assert_eq!(a(&[("mount_kind", 1)]).unwrap(), Value::Real(0.0));
     let why = a(&[("mount", 2), ("mount_kind", 1)]).unwrap_err().text;
     assert!(why.contains("mount_kind = 1 contradicts mount = 2"), "{why}");
-    // At rest, the bob straight down: its mass is in the added mass along z only, lumped along x, too.
+    // At rest with the slosh mass straight below its hinge: the added mass contains the slosh mass only along z, with
+    // `lumped` also along x.
     let m = |settings: &[(&str, i32)]| with_kind::<Tank>(settings, "added_mass[1]");
     assert_eq!(m(&[("coupling_kind", 1)]).unwrap(), Value::Real(253.493));
     for kind in [2, 3] {
@@ -179,8 +180,7 @@ fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_
     assert!(why.contains("coupling_kind = 3 contradicts coupling = 2"), "{why}");
 }
 
-/// A host that integrates itself moves the wheels and applies no torque: there is one warning, however many
-/// steps follow.
+/// A host that integrates the FMU moves the wheels and applies no torque. There is one warning, however many steps follow.
 #[test]
 fn a_warning_names_wheels_that_move_without_a_torque_once_in_model_exchange() {
     let fmu = load("Spacecraft");
@@ -266,8 +266,8 @@ fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
     assert!(impulses >= 4, "{impulses}");
 }
 
-/// `canInterpolateInputs` refers to all Real inputs, so hosts set the derivatives of all. The derivative of
-/// omega is accepted without effect, because omega changes within the step by omega_dot.
+/// `canInterpolateInputs` refers to all Real inputs, so that hosts set the derivatives of all. The derivative of omega
+/// is accepted without effect, because omega changes by omega_dot within the step.
 #[test]
 fn an_input_derivative_set_for_omega_is_accepted_and_ignored() {
     let table = &::SloshTank::table::TABLE;

@@ -1,5 +1,5 @@
-//! Tests that modelDescription.xml of FMI 3.0 describes every variable as the one of FMI 2.0 does, and has what FMI 3.0
-//! requires in addition.
+//! modelDescription.xml of FMI 3.0 describes every variable in the same way as that of FMI 2.0, and has the additional
+//! data that FMI 3.0 requires.
 
 use std::collections::BTreeMap;
 
@@ -46,10 +46,10 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
         {
             assert_eq!(kind.get(attribute), new.get(attribute), "{name} {attribute}");
         }
-        // Inputs have none in either: exact is the default, and CasADi takes nothing else.
+        // Inputs have no attribute `initial` in either version: exact is the default, and CasADi accepts no other form.
         assert_eq!(old.get("initial"), new.get("initial"), "{name}");
         assert_eq!(new.get("initial").is_none(), new.get("causality") == Some("input"), "{name}");
-        // Places count from 1 in both: a reference in 3.0 is the place.
+        // Positions count from 1 in both versions: the value reference in FMI 3.0 is the position.
         let reference = (place + 1).to_string();
         assert_eq!(new.get("valueReference"), Some(&*reference), "{name}");
         assert_eq!(kind.get("derivative"), new.get("derivative"), "{name}");
@@ -93,8 +93,8 @@ fn an_input_follows_others_exactly_where_the_model_sets_its_slope<M: Model>() {
     }
 }
 
-/// If an input is the derivative of another input, the model sets the slope of the other input, and a host cannot change
-/// the other input within a step.
+/// If an input is the derivative of another input, the model itself changes the other input within a step, so
+/// that a host cannot.
 #[test]
 fn only_inputs_whose_slopes_the_model_sets_lack_intermediate_update() {
     an_input_follows_others_exactly_where_the_model_sets_its_slope::<HubSlosh::HubSlosh>();
@@ -120,7 +120,7 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
         let new: Vec<_> = new.map(|unknown| of(unknown, "valueReference")).collect();
         assert_eq!(old.len(), new.len(), "{list}");
         for (old, new) in old.iter().zip(&new) {
-            // of long lists of initial values FMI 2.0 has none but those of some outputs, and FMI 3.0 has no kinds
+            // In long lists of initial values, FMI 2.0 has dependencies only for some outputs, and FMI 3.0 has no kinds.
             let has_kinds = new[2].is_some();
             let known = if has_kinds { 3 } else { 1 + usize::from(old[1].is_some()) };
             let is_long = new[1].as_ref().is_some_and(|list| list.split(' ').count() > 100);

@@ -1,4 +1,5 @@
-//! Committed files that are generated equal the output of their generators, and the icon has the size and format that importers expect.
+//! Committed files that are generated equal the output of their generators, and the icon has the size and
+//! format that importers expect.
 
 use std::path::Path;
 
@@ -34,7 +35,7 @@ fn up_to_date<M: Model>() {
     }
 }
 
-/// The row of an array must have the start value of every component, as the XML has it.
+/// The row of an array on the page must have the start value of every element, as the XML has.
 #[test]
 fn pages_of_variables_have_the_start_values_of_all_components() {
     let row = |page: &str, name: &str| {
@@ -55,10 +56,10 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
     assert_eq!(row(&page, "a[1..3]"), "0");
 }
 
-/// Returns the number of scalar parameters, and the number of those that a craft with one tank of one mode and
-/// without appendages has.
+/// Returns the number of scalar parameters, and the number of those that a craft with one tank of one mode and without
+/// appendages has.
 fn parameters<M: Model>() -> [usize; 2] {
-    /// Arrays of a tank whose first index is the mode.
+    /// arrays of a tank whose first index is the number of the mode
     const OF_MODES: [&str; 32] = [
         "mass",
         "length",

@@ -1,4 +1,4 @@
-//! The statements of modelDescription.xml agree with the binary, and are valid by the standard.
+//! modelDescription.xml agrees with the binary, and is valid by the standard.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -95,8 +95,8 @@ fn start_values_are_within_min_and_max() {
     }
 }
 
-/// For example, an input is continuous if it is Real, and has a start value; a parameter is fixed, except tunable friction,
-/// and has a start value.
+/// For example, an input is continuous if it is Real, and has a start value; a parameter has a start value and is
+/// fixed, except for friction parameters, which are tunable.
 #[test]
 fn causality_determines_variability_initial_and_start() {
     for (variable, kind) in variables() {
@@ -105,7 +105,7 @@ fn causality_determines_variability_initial_and_start() {
         let expected = match variable.get("causality").unwrap() {
             "input" => (moving, None, true),
             "output" | "local" => (moving, Some("calculated"), false),
-            // Friction can change while it runs.
+            // Friction can change during a run.
             "parameter" if name.starts_with("friction.") => ("tunable", Some("exact"), true),
             "parameter" => ("fixed", Some("exact"), true),
             "calculatedParameter" => ("fixed", Some("calculated"), false),
@@ -127,7 +127,7 @@ fn names_and_value_references_are_unique() {
     }
 }
 
-/// Simulink turns dotted ports into buses, and cuts names of parameters after 55 characters.
+/// Simulink turns ports whose names contain dots into buses, and cuts names of parameters after 55 characters.
 #[test]
 fn inputs_and_outputs_have_names_without_dots_and_parameters_short_names() {
     for (variable, _) in variables() {
@@ -154,7 +154,7 @@ fn every_unit_and_display_unit_is_defined() {
     for (variable, kind) in variables() {
         if kind.name == "Real" {
             let name = variable.get("name").unwrap();
-            // The unit of the slosh modes' coordinates depends on the model.
+            // The unit of the slosh modes' coordinates depends on the slosh model.
             let Some(unit) = kind.get("unit") else {
                 assert!(name.contains("slosh.q_") || name.contains("slosh.v_"), "{name}");
                 continue;
@@ -182,7 +182,7 @@ fn enumerations_are_declared() {
     }
 }
 
-/// The items must have the numbers of the physics crate's own enumerations, by which they are set.
+/// The items must have the numbers of the physics crate's enumerations, because they are set by these numbers.
 #[test]
 fn enumerations_name_the_physics_own_items_in_their_order() {
     fn compare<T: std::fmt::Debug>(variable: &str, all: &[T]) {
@@ -222,8 +222,8 @@ fn every_slosh_model_and_friction_law_is_in_the_documentation() {
     }
 }
 
-/// ModelStructure lists each output and each state derivative once, and lists as initial unknowns all variables that are
-/// computed during initialisation.
+/// ModelStructure lists each output and each state derivative once. Its initial unknowns are all variables that
+/// are computed during initialisation.
 #[test]
 fn structure_lists_every_output_once_and_what_is_computed_at_the_start() {
     let with = |causalities: &[&str]| -> Vec<usize> {
@@ -279,8 +279,7 @@ fn states_are_continuous_each_has_one_derivative_and_only_states_are_reinitialis
     assert_eq!(indicators, plant::INDICATORS);
 }
 
-/// An importer takes missing dependencies for a dependency on everything, and sees algebraic loops where
-/// there are none.
+/// An importer treats missing dependencies as a dependency on everything, and sees algebraic loops where there are none.
 #[test]
 fn every_dependency_list_is_given_and_contains_only_inputs_parameters_and_states() {
     let all = variables();
@@ -299,7 +298,7 @@ fn every_dependency_list_is_given_and_contains_only_inputs_parameters_and_states
             assert!(dependencies.is_sorted_by(|a, b| a < b));
             assert!(dependencies.iter().all(|index| allowed.contains(&kind(index))));
             let Some(kinds) = unknown.get("dependenciesKind") else {
-                // An initial value that depends on nearly everything.
+                // an initial value that depends on nearly everything
                 assert!(list == "InitialUnknowns" && unknown.get("dependencies").is_none());
                 continue;
             };

@@ -1,4 +1,4 @@
-//! A mass on a spring, m x'' = F - d x' - k x, by Runge-Kutta 4 in steps of 1 ms at most.
+//! A mass on a spring, m x'' = F - d x' - k x, integrated by Runge-Kutta 4 with steps of at most 1 ms.
 
 use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
