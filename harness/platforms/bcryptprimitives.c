@@ -1,4 +1,4 @@
-/* The one function of Windows' bcryptprimitives.dll that Rust's standard library calls, for a wine that is too old to have it. */
+/* The only function of Windows' bcryptprimitives.dll that Rust's standard library calls, for versions of wine that lack it. */
 #include <windows.h>
 #include <ntsecapi.h>
 

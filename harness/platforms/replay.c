@@ -1,8 +1,6 @@
-/* A small host: plays a list of FMI calls to one FMU binary and prints the
- * bits of what it answers. Numbers travel as the hexadecimal digits of their
- * bits, so that neither this program nor the C library of a platform computes
- * or converts any. harness/platforms/compare writes the list and runs the same
- * one on every platform.
+/* A small host that makes the FMI calls of a list to one FMU binary, and prints the bits of the results. Numbers are
+ * passed as the hexadecimal digits of their bits, so that neither this program nor the C library of a platform computes
+ * or converts numbers. harness/platforms/compare writes the list and plays the same list on every platform.
  *
  *   replay LIBRARY GUID < calls
  *   replay LIBRARY TOKEN INPUT... < calls         by the functions of FMI 3.0
@@ -11,14 +9,13 @@
  *   real REFERENCE X | integer REFERENCE NUMBER | item REFERENCE NUMBER
  *                                                 set a variable; item: an enumeration
  *   slope REFERENCE X                             first derivative of an input (FMI 2.0)
- *   end REFERENCE X                               what one of INPUT is at the end of the next step,
+ *   end REFERENCE X                               value of one of INPUT at the end of the next step,
  *                                                 set in intermediate update (FMI 3.0)
- *   outputs COUNT REFERENCE...                    what is read after each step
+ *   outputs COUNT REFERENCE...                    variables that are read after each step
  *   start T                                       set up and initialise
  *   step T H                                      one step
- *   print NAME                                    bits of outputs and hash so far
- *   save FILE | load FILE                         serialised state
- */
+ *   print NAME                                    bits of the outputs and hash of all outputs until now
+ *   save FILE | load FILE                         serialised state */
 #include <stdint.h>
 #include <stdarg.h>
 #include <stdio.h>

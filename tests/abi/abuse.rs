@@ -181,7 +181,7 @@ fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
 
 /// Tests which functions are allowed in which mode (`modes.c`). `names` are an output, a variable that depends directly
 /// on an input, this input, an Integer, an enumeration and a Boolean.
-fn functions_answer_as_the_table_has_it(model: &pack::Model, names: [&str; 6], sets: bool) {
+fn check_functions_in_every_mode(model: &pack::Model, names: [&str; 6], sets: bool) {
     let fmu = Unpacked::new(model, Fmi::V3);
     run(
         fmu.host("modes", &["tests/abi/modes.c"], &[])
@@ -212,13 +212,13 @@ fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
             false,
         ),
     ] {
-        functions_answer_as_the_table_has_it(pack::model(model).unwrap(), names, sets);
+        check_functions_in_every_mode(pack::model(model).unwrap(), names, sets);
     }
 }
 
 /// Makes random calls, or the calls of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in both versions of FMI.
 /// `host.c` lists the faults, for example floating-point exceptions in calls that succeed.
-fn no_calls_break<M: runtime::Model>(inputs: u32) {
+fn check_random_calls<M: runtime::Model>(inputs: u32) {
     let name = M::table().about.model;
     let fmu = Unpacked::new(pack::model(name).unwrap(), Fmi::V2);
     let sources =
@@ -252,23 +252,23 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
 
 #[test]
 fn no_calls_break_the_packed_binary_of_hubslosh() {
-    no_calls_break::<HubSlosh::HubSlosh>(3000);
+    check_random_calls::<HubSlosh::HubSlosh>(3000);
 }
 
 #[test]
 fn no_calls_break_the_packed_binary_of_spacecraft() {
-    no_calls_break::<Spacecraft::Model>(600);
+    check_random_calls::<Spacecraft::Model>(600);
 }
 
 #[test]
 fn no_calls_break_the_packed_binary_of_sloshtank() {
-    no_calls_break::<SloshTank::Model>(600);
+    check_random_calls::<SloshTank::Model>(600);
 }
 
 /// The host traps division by zero, invalid operations and overflow, as hosts do to find the first NaN. No slosh model,
 /// friction law or gyro may cause such an exception in either interface.
 #[cfg(target_os = "linux")]
-fn no_model_traps(fmi: Fmi, share: Share) {
+fn check_that_no_model_traps(fmi: Fmi, share: Share) {
     if under_valgrind() {
         return; // valgrind does not support such traps
     }
@@ -317,7 +317,7 @@ fn no_model_traps(fmi: Fmi, share: Share) {
 #[test]
 fn no_model_raises_a_floating_point_exception() {
     for fmi in VERSIONS {
-        no_model_traps(fmi, PART);
+        check_that_no_model_traps(fmi, PART);
     }
 }
 
@@ -363,7 +363,7 @@ fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> Strin
 /// traps and in both interfaces; also sets each Real to NaN and to infinity. Scenes limit the integrator's steps,
 /// because the test is about numbers and not about run time.
 #[cfg(target_os = "linux")]
-fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
+fn check_that_no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     if under_valgrind() {
         return; // valgrind does not support such traps
     }
@@ -578,7 +578,7 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
 #[test]
 fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
     for fmi in VERSIONS {
-        no_allowed_value_traps("HubSlosh", fmi, PART);
+        check_that_no_allowed_value_traps("HubSlosh", fmi, PART);
     }
 }
 
@@ -588,7 +588,7 @@ fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
 #[ignore = "half a minute: .ci/long-tests"]
 fn no_allowed_value_of_spacecraft_raises_a_floating_point_exception() {
     for fmi in VERSIONS {
-        no_allowed_value_traps("Spacecraft", fmi, PART);
+        check_that_no_allowed_value_traps("Spacecraft", fmi, PART);
     }
 }
 
@@ -596,7 +596,7 @@ fn no_allowed_value_of_spacecraft_raises_a_floating_point_exception() {
 #[test]
 fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     for fmi in VERSIONS {
-        no_allowed_value_traps("SloshTank", fmi, PART);
+        check_that_no_allowed_value_traps("SloshTank", fmi, PART);
     }
 }
 
@@ -609,11 +609,11 @@ fn abuse_tests_run_in_both_versions_of_fmi() {
     std::thread::scope(|scope| {
         for fmi in VERSIONS {
             for model in &pack::MODELS {
-                scope.spawn(move || no_allowed_value_traps(model.name, fmi, ALL));
+                scope.spawn(move || check_that_no_allowed_value_traps(model.name, fmi, ALL));
             }
             scope.spawn(move || {
                 a_whole_life(fmi, ALL);
-                no_model_traps(fmi, ALL);
+                check_that_no_model_traps(fmi, ALL);
             });
         }
     });
@@ -623,7 +623,7 @@ fn abuse_tests_run_in_both_versions_of_fmi() {
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
-fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() {
+fn handles_of_other_libraries_or_versions_and_freed_or_random_handles_are_errors() {
     if under_valgrind() {
         return; // valgrind would report the read of a freed instance's mark
     }
@@ -659,7 +659,7 @@ const STACK: [(&str, [u32; 2]); 3] =
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn the_stack_that_an_fmu_needs_is_no_more_than_the_book_says() {
+fn the_stack_that_an_fmu_needs_is_at_most_that_in_the_book() {
     if under_valgrind() {
         return; // valgrind uses another stack
     }
@@ -709,7 +709,7 @@ type Settings<'a> = &'a [(&'a str, &'a str)];
 /// Returns the bits of all Reals, ten times in 5 s of a motion, in a host with another floating-point environment. The
 /// motion is bit-identical in both versions of FMI, whether the FMU handles events or, in FMI 3.0, the host.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
-fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
+fn check_that_rounding_changes_only_last_digits(model: &str, settings: Settings) {
     if under_valgrind() {
         return; // valgrind always rounds to nearest and keeps subnormal numbers
     }
@@ -767,7 +767,7 @@ fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]
 fn a_hosts_rounding_mode_changes_only_last_digits_and_flushing_subnormal_numbers_changes_nothing() {
-    rounding_shows_in_the_last_digits_alone(
+    check_that_rounding_changes_only_last_digits(
         "HubSlosh",
         &[
             ("slosh.model", "4"),
@@ -779,7 +779,7 @@ fn a_hosts_rounding_mode_changes_only_last_digits_and_flushing_subnormal_numbers
             ("tau_cmd", "0.002"),
         ],
     );
-    rounding_shows_in_the_last_digits_alone(
+    check_that_rounding_changes_only_last_digits(
         "Spacecraft",
         &[
             ("tanks", "2"),

@@ -114,7 +114,7 @@ fn archive() -> zip::ZipArchive<File> {
 
 /// All files of HubSlosh.fmu are stored or deflated, the two zip methods that every importer can unpack.
 #[test]
-fn archive_begins_with_the_model_description_and_is_plain() {
+fn the_archive_begins_with_the_model_description_and_uses_only_stored_and_deflated_files() {
     let mut archive = archive();
     let mut names = BTreeSet::new();
     for n in 0..archive.len() {
@@ -646,7 +646,7 @@ fn inputs_that_are_nan_or_out_of_range_are_refused_by_the_call_that_sets_them() 
 /// HubSlosh refuses a communication step that is not positive or not finite, and a communication point that is not the
 /// present time. Its state does not change.
 #[test]
-fn steps_of_no_positive_length_are_refused_and_change_nothing() {
+fn steps_whose_length_is_not_positive_are_refused_and_change_nothing() {
     let fmu = open();
     let mut instance = stepping(&fmu, LIVELY);
     instance.do_step(0.0, 0.5).unwrap();
@@ -849,7 +849,7 @@ fn a_handle_of_a_saved_state_can_be_reused_and_a_null_handle_can_be_freed() {
 
 /// fmusim 0.0.39 passes the state itself. Refusing it would end its run with an error.
 #[test]
-fn a_saved_state_is_freed_by_itself_as_by_its_address() {
+fn a_saved_state_can_be_freed_by_its_handle_or_by_the_address_of_the_handle() {
     let fmu = open();
     let mut instance = stepping(&fmu, &[]);
     let saved = instance.get_state().unwrap();
@@ -860,7 +860,7 @@ fn a_saved_state_is_freed_by_itself_as_by_its_address() {
 }
 
 #[test]
-fn bytes_that_are_no_state_are_refused() {
+fn bytes_that_are_not_a_saved_state_are_refused() {
     let fmu = open();
     let mut instance = stepping(&fmu, LIVELY);
     drive(&mut instance, 0.0);

@@ -1,8 +1,8 @@
-/* FMI 2.0 and 3.0 as the C hosts of this folder see them: the same functions over either, chosen by -DFMI=2 or -DFMI=3.
- * The types behind are the official headers'.
+/* FMI 2.0 and FMI 3.0 for the C hosts of this folder: the same functions for both versions. -DFMI=2 or -DFMI=3 selects
+ * the version. The types are those of the official headers.
  *
- * Of FMI 3.0 Co-Simulation has the host handle events, if `events_by_host` says so before an instance is made: steps
- * return early and go on to where they were to end. Inputs move along a line by intermediate update there. */
+ * In Co-Simulation of FMI 3.0 the host handles events if `events_by_host` is set before an instance is made: a step
+ * returns early and is then continued to its end. Inputs change linearly by intermediate update. */
 #ifndef _GNU_SOURCE
 #error "_GNU_SOURCE must be defined before anything is included"
 #endif
@@ -24,26 +24,26 @@
 typedef void *Instance;
 typedef void *State;
 typedef unsigned int Reference;
-/* The numbers of both versions. */
+/* The status codes of both versions, which are equal. */
 typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 enum { MODEL_EXCHANGE, CO_SIMULATION, KINDS };
 
 /* GUID or instantiationToken. */
 static const char *identity;
 static void *library;
-/* What the FMU has said; of that, why a call did not succeed. */
+/* number of messages of the FMU, and number of those that explain why a call did not succeed */
 static unsigned long messages, reasons;
-/* Whether messages are shown. */
+/* true if messages are printed */
 static int shows_messages;
 
-/* Ends the process: the host met something that must not be. */
+/* Ends the process because of a fault of the FMU. */
 static void fail(const char *what)
 {
     fprintf(stderr, "error: %s\n", what);
     _exit(2);
 }
 
-/* From addresses of data to such of functions: POSIX has them alike. */
+/* Converts an address of data to an address of a function, which POSIX allows. */
 static inline void *find(const char *name)
 {
     void *function = dlsym(library, name);
@@ -87,7 +87,7 @@ static inline Instance instantiate(int kind)
     return CALL(fmi2Instantiate)("host", type, identity, "file:///nowhere", &callbacks, 0, 1);
 }
 
-/* Until steps or events follow. A tolerance or a stop time of 0 is none. */
+/* Initialises an instance until steps or events can follow. A tolerance or a stop time of 0 is not passed. */
 static inline Status initialise(Instance c, int kind, double tolerance, double stop)
 {
     Status status = (Status)CALL(fmi2SetupExperiment)(c, tolerance > 0, tolerance, 0, stop > 0, stop);
@@ -111,7 +111,7 @@ static inline Status read_others(Instance c, char type, const Reference *r, size
     return status;
 }
 
-/* Types as above, R is a real. */
+/* Sets a variable. The types are those of `read_others`, and R for a Real. */
 static inline Status set_value(Instance c, char type, Reference r, double value)
 {
     int integer = type == 'R' ? 0 : (int)value;
@@ -120,7 +120,7 @@ static inline Status set_value(Instance c, char type, Reference r, double value)
     return (Status)(type == 'B' ? CALL(fmi2SetBoolean)(c, &r, 1, &integer) : CALL(fmi2SetInteger)(c, &r, 1, &integer));
 }
 
-/* From now on, until the next step is done, an input moves with this slope. */
+/* Makes an input change with this slope from now on, until the next step is done. */
 static inline Status ramp(Instance c, Reference r, double at, double slope)
 {
     const int order = 1;
@@ -166,7 +166,7 @@ static inline Status completed_step(Instance c, int *event)
 
 #else
 
-/* What the host does within a step. */
+/* true if the host handles events within a step */
 static int events_by_host;
 static struct {
     Instance instance;
@@ -183,7 +183,7 @@ static void logger(fmi3InstanceEnvironment environment, fmi3Status status, fmi3S
     said((int)status, message);
 }
 
-/* Where the line is. The host's own sums are not trapped. */
+/* Returns the value on the line. The sums of the host itself are not trapped. */
 static double on_the_line(double t)
 {
     int traps = fegetexcept();
@@ -210,7 +210,7 @@ static void intermediate_update(fmi3InstanceEnvironment environment, fmi3Float64
     }
 }
 
-/* The inputs that an instance's host may move along lines. */
+/* the inputs that the host of an instance may change linearly within a step */
 static Reference movable[100];
 static size_t movable_count;
 
@@ -233,7 +233,7 @@ static inline Status update_discrete_states(Instance c, int *again)
     return status;
 }
 
-/* Through event mode to step mode. */
+/* Goes through event mode to step mode. */
 static inline Status to_step_mode(Instance c)
 {
     int again;
@@ -334,7 +334,7 @@ static inline Status output_derivative(Instance c, Reference r, double *slope)
     return (Status)CALL(fmi3GetOutputDerivatives)(c, &r, 1, &order, slope, 1);
 }
 
-/* Forwards and backwards: one number. */
+/* Asks for the directional and the adjoint derivative, which must be the same number. */
 static inline Status derivative(Instance c, Reference unknown, Reference known, double *answer)
 {
     const double one = 1;
@@ -380,7 +380,7 @@ THE_SAME(state_size, fmi2SerializedFMUstateSize, fmi3SerializedFMUStateSize, (In
 THE_SAME(serialise, fmi2SerializeFMUstate, fmi3SerializeFMUState, (Instance c, State s, void *b, size_t n), (c, s, b, n))
 THE_SAME(deserialise, fmi2DeSerializeFMUstate, fmi3DeserializeFMUState, (Instance c, const void *b, size_t n, State *s), (c, b, n, s))
 
-/* Through event mode, Model Exchange. */
+/* Goes through event mode to continuous-time mode (Model Exchange). */
 static inline Status to_continuous_time(Instance c)
 {
     int again;

@@ -1,7 +1,7 @@
-/* A C host that gives handles to functions that they do not belong to. Every such call is an error, and the instance
- * behind the handle keeps working. The handles are of another FMU's library, of a second copy of the same library, of a
- * freed instance and of a freed state, NULL, and numbers that cannot be addresses. Compiled for FMI 2.0 and for 3.0, whose
- * handles are tried with each other's functions, too.
+/* A C host that passes wrong handles to functions of an FMU. Every such call must return an error, and the instance
+ * behind the handle must keep working. The handles belong to the library of another FMU, to a second copy of the same
+ * library, to a freed instance or to a freed state; others are NULL, or numbers that cannot be addresses. The program is
+ * compiled for FMI 2.0 and for FMI 3.0; handles of one version are also passed to the functions of the other version.
  *
  *   handles LIBRARY IDENTITY OUTPUT OTHER_LIBRARY...
  *
@@ -9,12 +9,12 @@
 #define _GNU_SOURCE
 #include "fmi.h"
 
-/* In the order of fmi2Type's and FMI 3.0's arguments these take a handle alone; the names exist in both versions. */
+/* Functions whose only important argument is the handle. Their names exist in both versions of FMI. */
 static const char *const of_handle[] = {
     "EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "EnterContinuousTimeMode", "EnterEventMode",
 };
 
-/* Calls all functions that need nothing but a handle, of both versions, and frees the handle as an instance. */
+/* Calls all functions of both versions that need only a handle, and frees the handle as if it were an instance. */
 static void refuse(void *from, void *handle, int own, const char *what)
 {
     for (int version = 2; version <= 3; version++) {
@@ -66,7 +66,7 @@ int main(int argc, char **argv)
         refuse(other, c, 0, "an instance of another library");
         refuse(other, state, 0, "a state of another library");
     }
-    /* a state is not an instance, and an instance is not a state */
+    /* A state must not be accepted as an instance, and an instance not as a state. */
     refuse(library, state, 0, "a state");
     if (restore(c, c) != ERROR)
         fail("an instance was taken as a state");

@@ -1,21 +1,21 @@
-/* A C host that lives a whole life with the packed FMU's binary: both interfaces, saved states,
- * many instances at once, loading and unloading; compiled for FMI 2.0 or 3.0 (fmi.h). Ends with a sentence on the first
- * thing that is not as it should be; leaks nothing itself, so that valgrind's count is the FMU's.
+/* A C host that uses the packed FMU's binary in every way: both interfaces, saved states, many instances at the same
+ * time, loading and unloading. It is compiled for FMI 2.0 or FMI 3.0 (fmi.h). The program ends with a sentence about
+ * the first fault. It does not leak memory itself, so that valgrind counts only leaks of the FMU.
  *
  *   life LIBRARY GUID INSTANCES LOADS OMEGA OMEGA_DOT TAU_CMD SLOSH_MODEL INIT_OMEGA [INDICATOR]
  *
- * INDICATOR is the first event indicator, which are variables in FMI 3.0. */
+ * INDICATOR is the value reference of the first event indicator, because event indicators are variables in FMI 3.0. */
 #define _GNU_SOURCE
 #include "fmi.h"
 
-/* From the model description. */
+/* value references from the model description */
 static Reference omega, omega_dot, tau_cmd, slosh_model, init_omega, indicator;
 
 /* ---- Memory ---- */
 
 static unsigned long allocations;
 #ifdef COUNT_ALLOCATIONS
-/* The process's own allocator, which the FMU's library finds before that of the C library. */
+/* The allocator of the process. The FMU's library finds these functions before those of the C library. */
 void *__libc_malloc(size_t);
 void *__libc_calloc(size_t, size_t);
 void *__libc_realloc(void *, size_t);
@@ -41,7 +41,7 @@ static void load(const char *path) {
         fail(dlerror());
 }
 
-/* Whether the library is still among what the process has mapped. */
+/* Returns true if the process still maps the library. */
 static int is_mapped(const char *path) {
     FILE *maps = fopen("/proc/self/maps", "r");
     char line[4096];
@@ -60,7 +60,7 @@ static void unload(const char *path) {
         fail("the library is still there after it was unloaded");
 }
 
-/* Kilobytes that the process has in memory. */
+/* Returns the memory of the process in kilobytes. */
 static long memory(void) {
     FILE *file = fopen("/proc/self/statm", "r");
     long all = 0, resident = 0;
@@ -70,7 +70,7 @@ static long memory(void) {
     return resident * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
-/* Open descriptors. */
+/* Returns the number of open file descriptors. */
 static int descriptors(void) {
     int n = 0;
     for (int fd = 0; fd < 1024; fd++)
@@ -119,7 +119,7 @@ static void co_simulation(int model) {
     if (messages != 0)
         fail("an ordinary run says something");
     MUST(log_everything(c));
-    /* a state there and back, as handle and as bytes */
+    /* saves a state and restores it, as a handle and as bytes */
     State state = NULL, read = NULL;
     size_t size = 0;
     MUST(save(c, &state));
@@ -139,7 +139,7 @@ static void co_simulation(int model) {
     MUST(free_state(c, &read));
     free(bytes);
     MUST(derivative(c, omega_dot, tau_cmd, &answer));
-    /* what is refused, with a message; in FMI 3.0 the simulation is over then */
+    /* Wrong calls must be refused with a message. In FMI 3.0 they end the simulation. */
     if (do_step(c, 1.1, -1.0) != ERROR || get_reals(c, NULL, 1, NULL) != ERROR)
         fail("a call that makes no sense was accepted");
     MUST(get_reals(c, &omega, 1, &rate));
@@ -149,7 +149,7 @@ static void co_simulation(int model) {
     free_instance(c);
 }
 
-/* Event indicators, none of which is 0 after an event; as variables they are the same. */
+/* Reads the event indicators, none of which may be 0 after an event. Read as variables, they must have the same values. */
 static void indicators_after_an_event(Instance c, double *z) {
     MUST(get_indicators(c, z, INDICATORS));
     for (Reference i = 0; i < INDICATORS; i++) {
@@ -163,7 +163,7 @@ static void indicators_after_an_event(Instance c, double *z) {
 }
 
 static void model_exchange(int model) {
-    /* STATES and INDICATORS come from the compiler's command line. */
+    /* The compiler's command line defines STATES and INDICATORS. */
     Instance c = begin(MODEL_EXCHANGE, model);
     double x[STATES], rates[STATES], indicators[INDICATORS], before[INDICATORS];
     unsigned long at_first;
@@ -196,7 +196,7 @@ static void model_exchange(int model) {
     free_instance(c);
 }
 
-/* Instances at once, in turns, every one as if it were alone. */
+/* Steps many instances in turns. Each must have the results that it has by itself. */
 static void many(int count) {
     Instance *all = malloc((size_t)count * sizeof *all);
     double alone[5][3];
@@ -241,20 +241,20 @@ int main(int count, char **arguments) {
 #if FMI == 3
     if (early_returns == 0)
         fail("no step returned early");
-    /* from here on events stay within steps */
+    /* From here on the FMU handles events within its steps. */
     events_by_host = 0;
 #endif
     many(instances);
     unload(path);
 
-    /* The first loads fill caches of the dynamic linker's and malloc's. */
+    /* The first loads fill caches of the dynamic linker and of malloc. */
     long at_first = 0;
     int open_at_first = 0;
     for (int n = 0; n < loads; n++) {
         load(path);
         Instance c = begin(CO_SIMULATION, n % 5 + 1);
         step(c, 0.0, 0.03);
-        /* a panic hook or a thread's destructor left behind would point to code that is gone */
+        /* A panic hook or a thread's destructor that was left behind would point to code that is no longer loaded. */
         if (do_step(c, NAN, 1.0) != ERROR)
             fail("a call that makes no sense was accepted");
         free_instance(c);

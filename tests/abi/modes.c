@@ -1,13 +1,14 @@
-/* Each function of FMI 3.0 in each mode of an instance: allowed, or refused with fmi3Error and in words.
+/* Calls each function of FMI 3.0 in each mode of an instance. A call must be either allowed, or refused with
+ * fmi3Error and a message.
  *
  *   modes LIBRARY TOKEN OUTPUT DERIVED INPUT INTEGER ENUMERATION BOOLEAN SETS
  *
- * Value references: a continuous output that takes part in intermediate update; what follows the continuous input at once;
- * that input, which takes part too; parameters of the three types, or, if SETS is 0, a Boolean that can only be read.
- * INDICATORS and STATES come from the compiler's command line.
+ * The arguments are value references: a continuous output that takes part in intermediate update; a variable that
+ * depends directly on the continuous input; this input, which also takes part; parameters of the three types, or, if
+ * SETS is 0, a Boolean that can only be read. The compiler's command line defines INDICATORS and STATES.
  *
- * Modes, as letters: I Instantiated, K Configuration, M Initialization, V Event, C Continuous-Time, S Step, G Intermediate
- * Update for getting, P for setting, T Terminated. Each case has an instance of its own, which an error terminates. */
+ * Letters of the modes: I Instantiated, K Configuration, M Initialization, V Event, C Continuous-Time, S Step, G Intermediate
+ * Update for getting, P for setting, T Terminated. Each case uses a new instance, because an error terminates it. */
 #define _GNU_SOURCE
 #include "fmi.h"
 
@@ -26,7 +27,7 @@ static void keep(fmi3InstanceEnvironment environment, fmi3Status status, fmi3Str
 
 /* ---- What is called ---- */
 
-/* Another instance of this kind, a snapshot of it as it was made, and its bytes. */
+/* another instance of this kind, a snapshot of it directly after it was made, and the bytes of the snapshot */
 static Instance other;
 static State snapshot;
 static fmi3Byte bytes[1 << 20];
@@ -35,15 +36,16 @@ static size_t size;
 typedef Status Calls(Instance c);
 
 /* FUNCTION(name, modes in Model Exchange, modes in Co-Simulation, modes beyond the standard, expression)
- * The modes are those of FMI 3.0.2: 2.3 (states common to the interfaces), 3.2.1, 4.2.1; the event mode of Co-Simulation
- * is used. What goes beyond has its reason here:
- * - the standard says nothing of when dependencies may be asked for; 2.2.9 has them from the start;
+ *
+ * The modes are those of FMI 3.0.2: 2.3 (states common to the interfaces), 3.2.1, 4.2.1. Co-Simulation uses event mode.
+ * Reasons for modes beyond the standard:
+ * - the standard does not say when a host may ask for dependencies; 2.2.9 allows it from the start;
  * - fmusim 0.8 asks for the numbers of states and indicators in any mode;
- * - configuration mode may be entered and left, though there is nothing to configure, for hosts that always do;
- * - a host may reset and set its logging there too;
- * - a snapshot is no part of the instance, and may be given back at any time;
- * - orders of magnitude do not change, and can be asked for from the start;
- * - fmi3EvaluateDiscreteStates does nothing: it may be called in initialization mode as well. */
+ * - some hosts always enter and leave configuration mode, even if there is nothing to configure;
+ * - a host may also reset the instance and set its logging in configuration mode;
+ * - a snapshot is not part of the instance, and may be freed at any time;
+ * - nominal values do not change, and may be asked for from the start;
+ * - fmi3EvaluateDiscreteStates does nothing, and is also allowed in initialization mode. */
 #define FUNCTIONS \
     FUNCTION(fmi3SetDebugLogging, "IMVCT", "IMVST", "K", (c, 1, 0, NULL)) \
     FUNCTION(fmi3EnterInitializationMode, "I", "I", "", (c, 0, 0, 0, 0, 0)) \
@@ -116,7 +118,7 @@ typedef Status Calls(Instance c);
     FUNCTION(fmi3DoStep, "", "S", "", (c, 0, 0.01, 1, flags, flags + 1, flags + 2, any)) \
     FUNCTION(fmi3ActivateModelPartition, "", "", "", (c, integer, 0))
 
-/* Room for answers, and arguments. */
+/* arrays for results, and arguments */
 static union { double x; fmi3Int64 n; void *p; fmi3Byte b[64]; } room[8];
 static void *any = room;
 static double numbers[STATES + INDICATORS + 1];
@@ -128,10 +130,10 @@ static const double seed = 1;
 static const fmi3Int32 one[] = {1}, order = 1;
 static const fmi3Int64 item = 1;
 static State made, spare;
-/* What has a value: before initialization mode that is what has a start value. */
+/* A variable that can be read in this mode: before initialization mode only variables with start values can be read. */
 static const Reference *readable;
 
-/* As many as there are, or any number where it may not be asked for. */
+/* Asks for all dependencies, or for any number of them in a mode in which the call must be refused. */
 static size_t dependencies(Instance c)
 {
     size_t n = 0;
@@ -143,7 +145,7 @@ static size_t dependencies(Instance c)
     return n;
 }
 
-/* The present ones, where they can be had. */
+/* Returns the present states if they can be read. */
 static const double *states(Instance c)
 {
     CALL(fmi3GetContinuousStates)(c, numbers, STATES);
@@ -164,7 +166,7 @@ enum { ROWS = sizeof table / sizeof *table };
 
 /* ---- Modes ---- */
 
-/* What is called within a step, once, and what came of it. */
+/* The function that is called once within a step, and the result of this call. */
 static struct { Instance c; Calls *call; char mode; int called; Status status; char said[sizeof last_message]; } within;
 
 static void update(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi3Boolean set_requested,
@@ -198,7 +200,7 @@ static Status step(Instance c)
     return (Status)CALL(fmi3DoStep)(c, 0, 0.01, 1, &event, &end, &early, &last);
 }
 
-/* A new instance in a mode. */
+/* Returns a new instance in a mode. */
 static Instance in(int kind, char mode)
 {
     Instance c = make(kind);
@@ -234,7 +236,7 @@ static void check(int kind, char mode, int row)
     if (!sets_boolean)
         allowed &= table[row].call != call_fmi3SetBoolean && !(table[row].call == call_fmi3GetBoolean && mode == 'I');
     const char *belongs = table[row].allowed[!kind];
-    /* What goes beyond the standard does so in the interface that the function belongs to. */
+    /* Modes beyond the standard are allowed only in the interface to which the function belongs. */
     int lenient = strchr(table[row].beyond, mode) != NULL && (*table[row].allowed[kind] || !*belongs);
     Instance c = in(kind, mode == 'G' || mode == 'P' ? 'S' : mode);
     Status status, expected = allowed || lenient ? OK : ERROR;
@@ -264,7 +266,7 @@ static void check(int kind, char mode, int row)
         fprintf(stderr, "%s in mode %c: refused without its name: \"%s\"\n", name, mode, last_message);
         wrong = 1;
     }
-    /* After an error values can be read, and the instance be used again. */
+    /* After an error values can be read, and the instance can be reset. */
     if (status != OK && CALL(fmi3GetFloat64)(c, &output, 1, &x, 1) != fmi3OK) {
         fprintf(stderr, "%s in mode %c: after the error nothing can be read: %s\n", name, mode, last_message);
         wrong = 1;

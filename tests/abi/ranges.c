@@ -1,19 +1,19 @@
-/* A C host that traps floating-point exceptions and gives an FMU what its description allows: every
- * parameter and input at its smallest, its start and its largest value, one alone, and random pairs of any allowed values,
- * in both interfaces. Each run initialises, reads everything, steps and differentiates, in a process of its
- * own. A value that the FMU refuses is no fault; a trap is, and so is a number that is none. What no
- * description allows, NaN and infinity, has to be refused.
+/* A C host that traps floating-point exceptions and sets all values that the FMU's description allows: every parameter
+ * and input to its smallest, its start and its largest value, one at a time, and random pairs of any allowed values, in
+ * both interfaces. Each run initialises the FMU, reads all variables, makes steps and asks for derivatives, in a
+ * separate process. The FMU may refuse a value, but a trap is a fault, and so is NaN or infinity in a result. The FMU
+ * must refuse values that no description allows: NaN and infinity.
  *
  *   ranges LIBRARY GUID STATES INDICATORS FILE PAIRS SEED all|part
  *
  * FILE has a line for each scalar variable,
  *     v CAUSALITY TYPE REFERENCE MIN START MAX NAME    (CAUSALITY p, i or -; TYPE R, I, E or B)
- * and for what a scene, by its number from 0, sets before,
+ * and a line for each value that a scene, with its number from 0, sets first,
  *     s SCENE TYPE REFERENCE VALUE
  *
- * Part: an end of a range is set in one scene by each version of FMI (fmi.h), and by one of them at the least; which scene
- * changes from variable to variable. Starts, which are there already, are set once in every scene. Of what is no number one
- * version tries a NaN and the other an infinity for each Real. Model Exchange takes three steps instead of ten. */
+ * With `part`, each end of a range is set in only one scene, by at least one version of FMI (fmi.h); the scene changes
+ * from variable to variable. Start values are set once in every scene. One version sets each Real to NaN and the other
+ * to infinity. Model Exchange makes three steps instead of ten. */
 #define _GNU_SOURCE
 #include "fmi.h"
 #include <float.h>
@@ -36,7 +36,7 @@ struct setting {
     Reference reference;
     double value;
 };
-/* What is tried: a value, by its number or as such, of a variable. */
+/* One value to be set: a variable, and the number of one of its special values or a value. */
 struct trial {
     const struct variable *variable;
     double value;
@@ -52,7 +52,7 @@ static Reference known, unknown;
 static size_t states, indicators;
 
 enum { FINE = 0, FAILED = 2, REFUSED = 3, NOT_A_NUMBER = 4, SILENT = 5, ACCEPTED = 6, TRAP = 10 };
-/* Where in the run it is, for the report. */
+/* The present stage of a run, for the report. */
 static const char *const stages[] = {"set", "initialise", "read", "step", "differentiate", "integrate", "diverge"};
 static volatile int stage;
 
@@ -64,7 +64,7 @@ static void trapped(int signal, siginfo_t *info, void *context)
     _exit(TRAP + 3 * stage + kind);
 }
 
-/* The run ends here unless the call was accepted; a refusal needs a reason. */
+/* Ends the run unless the call was accepted. The FMU must log a reason for a refusal. */
 static void accepted(Status status)
 {
     if (status == OK)
@@ -98,7 +98,7 @@ static void stepping(Instance c, const struct trial *trials, int n)
     static const double steps[] = {1e-3, 0.02, 0.02};
     double t = 0;
     for (size_t k = 0; k < sizeof steps / sizeof *steps; k++) {
-        /* inputs run towards 0 */
+        /* the inputs change linearly towards 0 */
         for (int i = 0; k > 0 && i < n; i++)
             if (trials[i].variable->causality == 'i')
                 accepted(ramp(c, trials[i].variable->reference, t, -trials[i].value));
@@ -110,10 +110,10 @@ static void stepping(Instance c, const struct trial *trials, int n)
     }
 }
 
-/* Runs with what is allowed, of these refused; with what is forbidden; with faults. */
+/* numbers of runs with allowed values, of those that were refused, of runs with forbidden values, and of faults */
 static int runs, refused, others, ended;
 
-/* Whether the FMU has taken a call of a host that diverges; a refusal needs a reason. */
+/* Returns true if the FMU has accepted a call of a diverging host. The FMU must log a reason for a refusal. */
 static int taken(Status status)
 {
     if (status != OK && !reasons)
@@ -121,8 +121,8 @@ static int taken(Status status)
     return status == OK;
 }
 
-/* The host's integration diverges: states grow from any size on until the FMU refuses them. Nothing overflows before, and
- * what can be read is a number. */
+/* The integration of the host diverges: the states grow from any size until the FMU refuses them. Before that nothing
+ * may overflow, and every result must be a finite number. */
 static void diverge(Instance c, double *x)
 {
     static double rate[MOST], z[MOST], y[MOST];
@@ -147,8 +147,8 @@ static void diverge(Instance c, double *x)
     }
 }
 
-/* Explicit Euler steps, so short that they do not diverge for long; the host's own sums are not trapped. A state
- * that has grown beyond 1e9 has been made so by the host. */
+/* Makes explicit Euler steps, which are so short that they do not diverge for a while. The sums of the host itself are
+ * not trapped. A state above 1e9 is caused by the host. */
 static void exchange(Instance c)
 {
     static double x[MOST], rate[MOST], z[MOST];
@@ -211,7 +211,7 @@ static void allowed(int kind, int scene, const struct trial *trials, int n)
         stepping(c, trials, n);
     else
         exchange(c);
-    /* what has diverged may not be ended */
+    /* An instance whose integration diverged need not accept fmi2Terminate. */
     if (kind == MODEL_EXCHANGE && reasons)
         _exit(FINE);
     accepted(terminate(c));
@@ -219,8 +219,8 @@ static void allowed(int kind, int scene, const struct trial *trials, int n)
     _exit(FINE);
 }
 
-/* What is no number is refused: when it is set, or with all other parameters when initialization ends; so are
- * slopes, in FMI 3.0 as the end of the line within the step. */
+/* NaN and infinity must be refused when they are set, or when initialization ends, with all other parameters. The same
+ * holds for slopes, which in FMI 3.0 are given by the end of the line within the step. */
 static void forbidden(int kind, int scene, const struct trial *trials, int n)
 {
     Reference input = trials->variable->reference;
@@ -237,7 +237,7 @@ static void forbidden(int kind, int scene, const struct trial *trials, int n)
     _exit(ACCEPTED);
 }
 
-/* One run in a process of its own. */
+/* Makes one run in a separate process. */
 static void run(void (*what)(int, int, const struct trial *, int), int scene, const struct trial *trials, int n)
 {
     static const char *const traps[] = {"division by zero", "overflow", "invalid operation"};
@@ -272,7 +272,7 @@ static void run(void (*what)(int, int, const struct trial *, int), int scene, co
     }
 }
 
-/* xorshift64*: the same numbers everywhere */
+/* xorshift64*, which gives the same numbers on every platform */
 static uint64_t state;
 static int below(int n)
 {
@@ -282,8 +282,8 @@ static int below(int n)
     return (int)((state * 0x2545F4914F6CDD1DULL >> 33) % (uint64_t)n);
 }
 
-/* An allowed value of a variable: an end or the start of its range, what is nearest to 0, or any, of reals of any magnitude
- * from 1e-12 on. */
+/* Returns an allowed value of a variable: an end or the start value of its range, the value nearest to 0, or a random
+ * one; Reals have any magnitude from 1e-12 on. */
 static double any_value(const struct variable *v)
 {
     const double low = v->value[0], high = v->value[2];

@@ -1,9 +1,9 @@
-/* A C host with a floating-point environment of its own: another rounding mode, or subnormal numbers taken for 0.
- * It sets some variables, makes STEPS steps of 20 ms and prints the bits of all Reals after every tenth of them.
+/* A C host with another floating-point environment: another rounding mode, or subnormal numbers treated as 0. It sets
+ * some variables, makes STEPS steps of 20 ms, and prints the bits of all Reals after every tenth step.
  *
  *   rounding LIBRARY GUID MODE TYPE:REFERENCE=VALUE... -- REFERENCE...
  *
- * MODE is nearest, up, down, zero or flush; TYPE R, I, E or B; the references after -- are those of the Reals. */
+ * MODE is nearest, up, down, zero or flush; TYPE is R, I, E or B; the references after -- are those of the Reals. */
 #define _GNU_SOURCE
 #include "fmi.h"
 #include <inttypes.h>
@@ -36,7 +36,7 @@ int main(int argc, char **argv)
     identity = argv[2];
     if (!library)
         return 2;
-    /* the host's numbers are read before it changes how numbers are rounded */
+    /* The numbers of the command line are parsed before the rounding mode changes. */
     for (int i = arg; i < argc && i - arg < 100 && strcmp(argv[i], "--") != 0; i++)
         values[i - arg] = strtod(strchr(argv[i], '=') + 1, NULL);
     if (set_mode(argv[3]) != 0)

@@ -1,9 +1,10 @@
-/* A C host that measures the stack that an FMU needs: the whole life of an instance in a thread whose stack is filled
- * with a pattern; what has been overwritten was used. Prints bytes: to instantiate and initialise, and for steps alone.
+/* A C host that measures the stack that an FMU needs. An instance is made, stepped and freed in a thread whose stack
+ * is filled with a pattern; overwritten bytes were used. Prints two numbers of bytes: to instantiate and initialise,
+ * and for the steps.
  *
  *   stack LIBRARY IDENTITY co-simulation|model-exchange STATES [TYPE:REFERENCE=VALUE...] -- REFERENCE...
  *
- * The references after -- are all Reals, which are read. */
+ * The references after -- are those of all Reals, which are read. */
 #define _GNU_SOURCE
 #include "fmi.h"
 #include <pthread.h>
@@ -70,7 +71,7 @@ static void *go_on(void *nothing)
 
 static void *nothing(void *none) { return none; }
 
-/* Bytes of the stack that a function has used in a thread of its own. */
+/* Runs a function in a new thread, and returns the number of bytes of the stack that it has used. */
 static size_t used(void *(*function)(void *))
 {
     pthread_attr_t attributes;

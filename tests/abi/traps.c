@@ -1,19 +1,20 @@
-/* A C host that traps floating-point exceptions, as hosts do that look for the first NaN: division by
- * zero, invalid operations and overflow end the process. Every slosh model with every friction law,
- * with and without the gyro, in both interfaces, each in a process of its own; one line for each that
- * a trap has ended. A start that a model refuses is no fault.
+/* A C host that traps floating-point exceptions, as hosts do to find the first NaN: division by zero, invalid
+ * operations and overflow end the process. It runs every slosh model with every friction law, with and without the
+ * gyro, in both interfaces, each in a separate process, and prints a line for each run that a trap has ended. A model
+ * may refuse a start.
  *
  *   traps LIBRARY GUID STATES INDICATORS SLOSH_MODELS FRICTION_MODELS all|part NAME=REFERENCE... -- REFERENCE...
  *
- * SLOSH_MODELS and FRICTION_MODELS are how many items the two enumerations have. The names are those of `variables` below;
- * the references after -- are all Reals, which are read. Part: every second one in fewer steps, the others being the other
- * version's of FMI (fmi.h), which handles events itself where it can. */
+ * SLOSH_MODELS and FRICTION_MODELS are the numbers of items of the two enumerations. The names are those of
+ * `variables` below; the references after -- are those of all Reals, which are read. With `part`, only every second
+ * run is made, with fewer steps; the other runs are made with the other version of FMI (fmi.h), which handles events
+ * itself if it can. */
 #define _GNU_SOURCE
 #include "fmi.h"
 #include <signal.h>
 #include <sys/wait.h>
 
-/* What the host sets, by name; the value references come from the model description. */
+/* Variables that the host sets, by name. Their value references come from the model description. */
 enum {
     SLOSH, FRICTION, MODES, GYRO, WHEEL, LSB, OMEGA_0, ANGLE_0, RADIUS, COULOMB, STATIC,
     VISCOUS, STIFFNESS, TORQUE, GRAVITY, VARIABLES
@@ -30,8 +31,7 @@ static int part;
 static Reference reals[1000];
 static size_t count;
 
-/* What a run starts from and how it is driven, besides the models. The friction sticks up to
- * 1.7 coulomb. */
+/* Start and inputs of a run, in addition to the models. Friction sticks up to 1.7 times the Coulomb torque. */
 struct scene {
     const char *name;
     double omega, angle, radius, coulomb, viscous, gravity;
@@ -91,7 +91,7 @@ static void stepping(Instance c, const struct scene *scene)
 
 enum { MOST = 1000 };
 
-/* One step of the classical method: explicit Euler would feed the fast slosh modes. */
+/* Makes one step of the classical Runge-Kutta method. Explicit Euler would make the fast slosh modes grow. */
 static void runge_kutta(Instance c, double t, double h, double *x)
 {
     static double k[4][MOST], there[MOST];

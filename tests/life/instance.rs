@@ -536,7 +536,7 @@ fn a_state_can_be_saved_in_every_instance_state() {
 }
 
 #[test]
-fn bytes_that_are_no_state_are_refused() {
+fn bytes_that_are_not_a_saved_state_are_refused() {
     let mut instance = lively(4, 4);
     instance.do_step(0.0, 0.1).unwrap();
     let bytes = to_bytes(&instance);
@@ -1040,7 +1040,7 @@ fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
 /// OpenModelica's import, ecos and libcosim do not set enumerations; OMSimulator does not set enumerations with the
 /// name `model`.
 #[test]
-fn integer_twins_have_the_effect_of_the_enumerations() {
+fn integer_twins_have_the_same_effect_as_their_enumerations() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
         for n in items(model) {
             let motion = |name: &str| {

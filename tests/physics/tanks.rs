@@ -65,7 +65,7 @@ fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
 /// A box that rotates about its vertical axis takes liquid along (`tank.I_own`), which increases its inertia. For a
 /// square box of 0.1 m the effective inertia is 0.1565 of that of rigid liquid.
 #[test]
-fn a_box_drags_liquid_about_its_axis() {
+fn a_box_takes_liquid_along_about_its_vertical_axis() {
     let tank = Tank::parse("density = 1000\nbox = [0.1, 0.1]", std::path::Path::new("")).unwrap();
     let data = tank.solve(0.1, 1).unwrap();
     let own = data.i_eff_axis.unwrap();

@@ -248,7 +248,7 @@ fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {
 
 /// The two FMUs differ by the recoil, which falls as 1/M.
 #[test]
-fn a_lighter_craft_recoils_more_by_the_ratio_of_the_masses() {
+fn the_recoil_of_a_craft_is_inversely_proportional_to_its_mass() {
     let (tank, heavy) = (bench(1.227), 1e6);
     let period = TAU / linear_frequency(&tank);
     let released = Tank { p_0: [[0.02, 0.0, -1.0]; MODES], ..tank };

@@ -82,7 +82,7 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
 /// A mass of 1e11 kg and corresponding moments of inertia allow the craft to move only about one axis; the other
 /// motion falls as 1/M.
 #[test]
-fn spacecraft_held_to_one_axis_is_hubslosh() {
+fn spacecraft_on_one_axis_equals_hubslosh() {
     let fmu = load("HubSlosh");
     for (mass, allowed) in [(1e9, 1e-7), (1e11, 1e-9)] {
         let mut bench = bench(&fmu);
@@ -125,7 +125,7 @@ fn spacecraft_held_to_one_axis_is_hubslosh() {
 /// The host solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage of its integrator. The error of
 /// Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
 #[test]
-fn slosh_tank_on_a_hub_is_hubslosh() {
+fn slosh_tank_on_a_hub_equals_hubslosh() {
     const STEPS: usize = 40;
     let fmu = load("HubSlosh");
     let mut bench = bench(&fmu);

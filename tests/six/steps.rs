@@ -15,7 +15,7 @@ use super::records::{STEP, at_end, motion_at_end};
 /// Directly after a step the outputs are limits from the left: they include the torque of wheels that have accelerated
 /// and the rate of a host that has rotated.
 #[test]
-fn outputs_after_a_step_hold_at_its_end() {
+fn outputs_after_a_step_belong_to_its_end() {
     for seed in 0..10 {
         let mut random = Random::new(seed);
         let p = random.parameters();

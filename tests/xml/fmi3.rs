@@ -70,7 +70,7 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
 }
 
 #[test]
-fn every_variable_of_fmi_3_is_as_in_fmi_2() {
+fn every_variable_of_fmi_3_has_the_attributes_of_fmi_2() {
     every_variable_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
     every_variable_is_as_in_fmi_2::<Spacecraft::Model>();
     every_variable_is_as_in_fmi_2::<SloshTank::Model>();

@@ -184,7 +184,7 @@ fn enumerations_are_declared() {
 
 /// The items must have the numbers of the physics crate's enumerations, because they are set by these numbers.
 #[test]
-fn enumerations_name_the_physics_own_items_in_their_order() {
+fn enumerations_have_the_items_of_the_physics_crate_in_their_order() {
     fn compare<T: std::fmt::Debug>(variable: &str, all: &[T]) {
         let variable = TABLE.variables.iter().find(|v| v.name == variable).unwrap();
         let Kind::Enumeration(of) = variable.kind else { panic!("{} is none", variable.name) };
@@ -329,7 +329,7 @@ fn every_name_in_the_table_s_dependencies_is_a_variable() {
 }
 
 #[test]
-fn variable_names_that_others_use_exist() {
+fn variable_names_on_which_other_programs_rely_exist() {
     let names = "tau_cmd tau_ext g_axial theta omega omega_dot slosh_angle slosh_rate \
         slosh_angle_radial tau_friction tau_fluid F_tangential F_radial wave_height omega_imu \
         slosh_rate_radial energy momentum power_dissipated tau_actuator wheel_speed stuck regime \

@@ -1,4 +1,4 @@
-/* What an FMU shares with its host and must leave as it is. */
+/* State of the process that an FMU shares with its host and must not change. */
 #include <fenv.h>
 #include <locale.h>
 #include <signal.h>
@@ -8,8 +8,8 @@
 #include <xmmintrin.h>
 #endif
 
-/* Rounding mode, exception masks, flushing of small numbers; not the flags of what has happened,
- * which every computation sets. */
+/* Returns the rounding mode, the exception masks and the flushing of small numbers. The flags of past exceptions are
+ * excluded, because every computation sets them. */
 uint32_t hubslosh_float_control(void)
 {
 #if defined(__x86_64__) || defined(_M_X64)
@@ -25,7 +25,7 @@ const char *hubslosh_locale(void)
     return name ? name : "";
 }
 
-/* FNV-1a over the handlers of all signals. */
+/* Returns an FNV-1a hash of the handlers of all signals. */
 uint64_t hubslosh_signal_handlers(void)
 {
     uint64_t hash = 0;

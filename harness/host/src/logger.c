@@ -1,6 +1,5 @@
-/* FMI 2.0's logger callback is variadic (printf style), which stable Rust
- * cannot define. This shim formats the message and hands on a plain string.
- * The FMU may hand back any pointer as environment: nobody follows it. */
+/* FMI 2.0's logger callback is variadic (printf style), which stable Rust cannot define. This shim formats the message
+ * and passes on a plain string. The FMU may pass any pointer as environment; nobody dereferences it. */
 #include <stdarg.h>
 #include <stdio.h>
 

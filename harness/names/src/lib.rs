@@ -1,8 +1,7 @@
 //! Names of the variables of this project's FMUs, the items of their enumerations, and the sizes of their
 //! arrays.
-//!
-//! The harness does not link the models. Instead model-description writes one module per FMU from its
-//! variable table, so that a misspelt or renamed variable does not compile.
+//! The harness does not link the models. Instead model-description writes one module for each FMU from its variable
+//! table, so that a name that is misspelt, or no longer exists, does not compile.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Array<const D: usize>(&'static str);
@@ -23,9 +22,9 @@ impl<const D: usize> Array<D> {
     }
 }
 
-/// A parameter that determines how many elements of arrays are used; `most` is its largest value.
-/// `has_indicators` is true if each element has event indicators of its own. `arrays` lists the arrays that
-/// the parameter sizes, each with the position of this dimension among its indices.
+/// A parameter that determines the number of elements of arrays that are used. `most` is its largest value.
+/// `has_indicators` is true if each element has its own event indicators. `arrays` lists the arrays whose size it
+/// determines, each with the position of this dimension among the array's indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub parameter: &'static str,

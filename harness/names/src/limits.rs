@@ -1,5 +1,5 @@
-//! Reasons for which the tanks of a run were out of the range of their model, each with its share of the time and its
-//! first time.
+//! Describes for which reasons the tanks of a run were out of the range of their model, each with its share of the time
+//! and the time at which it first occurred.
 
 use formulas::limits::LimitedBy;
 
@@ -12,8 +12,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Finds those variables of an FMU that give the reason why a tank is out of the range of its
-    /// model. `has` returns true for the name of a variable of the FMU.
+    /// Finds the variables of an FMU that give the reason why a tank is out of the range of its model. `has` returns
+    /// true for names of variables of the FMU.
     pub fn find(has: impl Fn(&str) -> bool) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
             .map(|i| (spacecraft::tank::LIMITED_BY_KIND.element([i]), format!("tank {i}: ")));
@@ -26,9 +26,9 @@ impl Limits {
         self.tanks.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Returns a sentence for each tank that was out of range: the reasons with their shares of the time and
-    /// their first times, the longest first. `column` returns the column with this name of a run's table. A
-    /// row holds until the next one.
+    /// Returns a sentence for each tank that was out of range. It lists the reasons with their shares of the time, the
+    /// largest first, and the time at which each reason first occurred. `column` returns a column of a run's table by
+    /// name. A row counts until the next row.
     pub fn describe<'t>(&self, column: impl Fn(&str) -> Option<&'t [f64]>) -> Vec<String> {
         let of_tank = |(name, tank): &(String, String)| {
             let found = reasons(column("time")?, column(name)?);
@@ -52,7 +52,7 @@ fn reasons(time: &[f64], numbers: &[f64]) -> Vec<(LimitedBy, f64, f64)> {
     let end = time.len();
     let span = match (time.first(), time.last()) {
         (Some(first), Some(last)) if last > first => last - first,
-        // a single row
+        // a table with a single row
         _ => 0.0,
     };
     let lasts = |i: usize| match span > 0.0 {
@@ -87,8 +87,8 @@ fn percent(share: f64) -> String {
 mod tests {
     use super::*;
 
-    /// For each reason for which a tank was out of range, the share of the time and the first time are computed from
-    /// the history of the reason's number.
+    /// The share of the time and the time of the first occurrence of each reason are computed from the history
+    /// of the reason's number.
     #[test]
     fn each_reason_for_leaving_the_range_has_its_share_of_the_time_and_its_first_time() {
         let time = [0.0, 1.0, 3.0, 4.0, 10.0];
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(found, [(LimitedBy::ThirdOrder, 0.8, 1.0), (LimitedBy::Spin, 0.1, 3.0)]);
         assert_eq!(reasons(&time, &[1.0; 5]), []);
         assert_eq!(reasons(&[2.0], &[8.0]), [(LimitedBy::Contact, 1.0, 2.0)]);
-        // the last row, from which on nothing is known
+        // A reason in the last row has no share, because the table ends there.
         assert_eq!(
             reasons(&time, &[1.0, 1.0, 1.0, 1.0, 2.0]),
             [(LimitedBy::ThirdOrder, 0.0, 10.0)]

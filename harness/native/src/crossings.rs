@@ -1,10 +1,10 @@
 //! Finds the crossings of a loop gain L(jω): the frequencies at which |L| is 1 (gain crossings) or L is a negative real number
 //! (phase crossings), and the least distance of L from -1.
 //!
-//! The search uses that ln L is a sum over the poles and zeros of L. For any interval of frequencies this sum gives the value and
-//! the slope of ln L and a bound of its curvature. These show whether L can cross in the interval not at all, at most once or
-//! several times; in the last case the interval is halved. At the ends of the remaining intervals L itself is then evaluated from
-//! the state-space model, and the crossings are located there by root finding.
+//! The search uses the fact that ln L is a sum over the poles and zeros of L. For any interval of frequencies this sum
+//! gives the value and the slope of ln L and a bound of its curvature. From these follows if L can cross in the interval
+//! not at all, at most once, or several times; in the last case the interval is halved. At the ends of the remaining
+//! intervals L itself is evaluated from the state-space model, and the crossings between them are located by root finding.
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{Const, DMatrix, DefaultAllocator, DimDiff, DimSub, Dyn, OMatrix, Schur, U1};
@@ -17,14 +17,13 @@ use pyo3::types::PyBytes;
 use crate::numbers::numbers;
 use crate::schedule::bytes;
 
-/// Loop gain above which no phase crossing is searched, because such a gain occurs only next to a pole on the imaginary
-/// axis, for example an integrator at 0.
+/// Loop gain above which phase crossings are not searched, because such a gain occurs only close to a pole on the
+/// imaginary axis, for example an integrator at 0.
 const INTEGRATOR: f64 = 1e8;
 /// Loop gain below which no phase crossing is searched, because a value this small consists of
 /// rounding errors.
 const NOTHING: f64 = 1e-12;
-/// Allowance in ln L for the errors of the poles and zeros, which are computed eigenvalues with
-/// rounding errors of their own.
+/// Allowance in ln L for errors of the poles and zeros, which are eigenvalues computed with rounding errors.
 const SLACK: f64 = 1e-3;
 /// Number of frequencies, evenly spaced on a logarithmic scale, with which every search begins.
 const GRID: usize = 40;
@@ -100,7 +99,7 @@ impl Model {
     fn at(&self, w: f64) -> Vec<Complex> {
         let (n, m) = (self.states, self.inputs);
         let s = point(w, self.period);
-        // sI − A, then B: real and imaginary parts apart, which a processor computes several at once
+        // sI − A, then B: real and imaginary parts in separate arrays, of which a processor computes several elements at once
         let width = n + m;
         let mut rows = [vec![0.0; n * width], vec![0.0; n * width]];
         let [re, im] = &mut rows;
@@ -133,7 +132,7 @@ impl Model {
                 }
             }
         }
-        // column after column, from the last one on; the right-hand sides become the states
+        // Elimination column by column, from the last one on. The right-hand sides become the states.
         let [mut re, mut im] = rows;
         let mut states = vec![Complex::ZERO; m];
         let mut found: Vec<Complex> = self.d.iter().map(|d| Complex::new(*d, 0.0)).collect();
@@ -286,8 +285,8 @@ impl Root {
     }
 }
 
-/// A zero of the loop gain together with the nearest pole that has no partner yet. If the two are close, they nearly cancel in ln
-/// L, and the bound of the curvature is much smaller than the bound for two separate roots.
+/// A zero of the loop gain and its partner, the nearest pole without another partner. If the two are close, they nearly
+/// cancel in ln L, and the bound of the curvature is much smaller than the bound for two separate roots.
 struct Pair {
     /// Number of roots in the pair: 2 for a zero with its pole, 1 for a root without a partner.
     roots: usize,
@@ -316,7 +315,8 @@ struct Logarithm {
     curvature: [f64; 2],
 }
 
-/// A product of many complex numbers. Before the magnitude overflows or underflows, it is moved to the logarithm `scale`.
+/// A product of many complex numbers. Before its magnitude overflows or underflows, the magnitude is moved to the
+/// logarithm `scale`.
 struct Product {
     of: Complex,
     scale: f64,
@@ -387,7 +387,7 @@ impl Shape {
     /// within `half` of `w`.
     fn at(&self, w: f64, half: f64) -> Logarithm {
         let s = point(w, self.period);
-        // ds/dω, and how far s moves
+        // ds/dω, and the distance by which s can move
         let (along, reach) = match self.period {
             0.0 => (Complex::new(0.0, 1.0), half),
             period => (Complex::new(0.0, period) * s, half * period),
@@ -402,12 +402,12 @@ impl Shape {
                 let square = way.norm_sqr();
                 let share = 1.0 / square;
                 let inverse = Complex::new(way.re * share, -way.im * share);
-                // distance from the part of the axis within reach
+                // smallest distance from the part of the axis that s can reach
                 let least = (square.sqrt() - reach).max(root.axis);
                 let share = 1.0 / least;
                 let near = root.bends[0] * share * share;
                 bends[0] += near;
-                // the phase of a root on the axis turns steadily
+                // The phase of a root on the axis changes linearly.
                 bends[1] += near.min(root.bends[1] * share * share * share);
                 nearest = nearest.min(least);
                 if root.is_zero {
@@ -418,7 +418,7 @@ impl Shape {
                     sum -= inverse;
                 }
             }
-            // by the derivative along the way from one to the other
+            // bound by the derivative on the line between zero and pole
             let least = nearest - pair.half_gap;
             if least > 0.0 {
                 let both = pair.steep / (least * least * least);
@@ -532,7 +532,7 @@ impl Logarithm {
         }
         let (value, slope, bend) = match kind {
             Kind::Gain => (value[0], slope[0], curvature[0] * half),
-            // the phase of a negative or positive real number
+            // the phase of a negative or a positive real number
             Kind::Phase => {
                 let turns = value[1] / std::f64::consts::PI;
                 let value = (turns - turns.round()) * std::f64::consts::PI;
@@ -582,7 +582,7 @@ fn between(
         if f == 0.0 {
             return new;
         }
-        // a, b enclose the root, c is the one before
+        // a and b enclose the root; c is the previous point
         if (f > 0.0) == (f_a > 0.0) {
             (c, f_c) = (a, f_a);
         } else {
@@ -658,7 +658,7 @@ fn search(
         }
         before = Some((w, gain));
     }
-    // where the gain is real in any case
+    // points at which the gain is real in any case
     let ends = [
         0.0,
         if model.period == 0.0 { f64::INFINITY } else { std::f64::consts::PI / model.period },
@@ -712,7 +712,7 @@ impl Model {
 
     fn unit_magnitudes(&self, nodes: &[f64]) -> Vec<(f64, f64, f64)> {
         let height = |values: &[Complex], i: usize| values[i].norm().max(1e-300).ln();
-        // no eigenvalue is larger than the largest sum of the magnitudes in a row, which costs less
+        // No eigenvalue is larger than the largest sum of the magnitudes in a row, which is faster to compute.
         let all: Vec<_> = nodes.iter().map(|w| (*w, self.at(*w))).collect();
         let is_small = |response: &[Complex]| {
             let mut rows = response.chunks_exact(self.inputs);
@@ -853,7 +853,8 @@ pub fn exponential<'py>(
     size: usize,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let matrices = numbers(matrices)?;
-    // Columns are read and written as rows: the exponential of the transposed matrix is the transposed exponential.
+    // The array stores rows where the algorithm expects columns. The exponential of the transposed matrix is the
+    // transposed exponential.
     let power = |columns: &[f64]| {
         let matrix = DMatrix::from_column_slice(size, size, columns);
         let sum = matrix.abs().sum();

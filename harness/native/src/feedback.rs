@@ -12,7 +12,7 @@ use crate::numbers::{Failure, Numbers};
 /// A linear controller with the state x, which receives the error e = r − y of the measurements: u = C x + D
 /// e + f, then x = A x + B e. Matrices are stored row after row.
 ///
-/// Sums are taken from left to right without fused multiplication, so that Python computes the same bits.
+/// Sums are computed from left to right without fused multiplication, so that a computation in Python is bit-identical.
 struct Linear {
     x: Vec<f64>,
     a: Vec<f64>,
@@ -21,8 +21,9 @@ struct Linear {
     d: Vec<f64>,
     reference: Vec<f64>,
     feedforward: Vec<f64>,
-    /// Places of an attitude quaternion (scalar first) among the measurements y. For this quaternion the error is not r − y but
-    /// the vector part of q⁻¹ ⊗ r: half the small rotation about each body axis that remains, by the shorter way.
+    /// Positions of an attitude quaternion (scalar first) among the measurements y. For this quaternion the error is
+    /// not r − y but the vector part of q⁻¹ ⊗ r, which is half of the small rotation about each body axis that remains,
+    /// by the shorter way.
     quaternion: Option<[usize; 4]>,
     /// Working memory for the error e and the next state x, so that a cycle allocates nothing.
     error: Vec<f64>,
@@ -74,14 +75,16 @@ impl Linear {
 
 enum Controller {
     Linear(Box<Linear>),
-    /// A Python function of the number of the cycle, the time (s) and the measurements, which returns one number for each
+    /// A Python function. It receives the number of the cycle, the time (s) and the measurements, and returns one
+    /// number for each command.
     /// command.
     Function(Py<PyAny>),
 }
 
-/// A reaction wheel whose torque the controller commands: the column of its torque among the commands (`place`), its axis as a unit vector
-/// in body axes, its moment of inertia (kg·m²), the largest torque on the craft, to which a larger command is limited (N·m), the largest
-/// and the present speed relative to the body (rad/s), and the value references of `h_wheels`.
+/// A reaction wheel whose torque the controller commands. `place` is the column of its torque among the commands. The
+/// other fields are its axis as a unit vector in body axes, its moment of inertia (kg·m²), the largest torque on the
+/// craft (N·m), to which commands are limited, the largest and the present speed relative to the body (rad/s), and the
+/// value references of `h_wheels`.
 struct Wheel {
     place: usize,
     axis: [f64; 3],
@@ -92,9 +95,9 @@ struct Wheel {
 }
 
 impl Wheel {
-    /// Returns the torque on the craft if `asked` is commanded, and how long it can act, s.
+    /// Returns the torque on the craft for the commanded torque `asked`, and the time for which it can act, s.
     ///
-    /// The torque is limited to `max_torque`. At the largest speed a torque that would raise the speed has no effect.
+    /// The torque is limited to `max_torque`. At the largest speed a torque that would increase the speed has no effect.
     fn limited(&self, asked: f64) -> (f64, f64) {
         let torque = asked.clamp(-self.max_torque, self.max_torque);
         let rate = -torque / self.inertia;
@@ -106,11 +109,11 @@ impl Wheel {
     }
 }
 
-/// The wheels of a run, and the input of the FMU by which they turn the craft.
+/// The wheels of a run, and the input of the FMU through which they act on the craft.
 struct Wheels {
     each: Vec<Wheel>,
     references: [u32; 3],
-    /// Angular momentum of all wheels relative to the body, N·m·s, at the begin of the present step, and its derivative.
+    /// Angular momentum of all wheels relative to the body, N·m·s, at the beginning of the present step, and its derivative.
     momentum: [f64; 3],
     slope: [f64; 3],
     step: f64,
@@ -135,7 +138,8 @@ pub struct Feedback {
     /// of cycle k are at position k modulo `latency` + 1.
     on_the_way: Vec<f64>,
     now: Vec<f64>,
-    /// Commands that act from each row on, within the wheels' limits, one row of numbers per row of the run.
+    /// Commands that act from each row on, within the limits of the wheels. There is one row of commands for each
+    /// row of the run.
     commands: Numbers,
 }
 
@@ -227,7 +231,7 @@ impl Feedback {
         Ok(())
     }
 
-    /// Adds the present speeds of the wheels to the record; at the last row nothing else is recorded.
+    /// Adds the present speeds of the wheels to the record. At the last row nothing else is recorded.
     pub fn record_speeds(&mut self) {
         if let Some(wheels) = &mut self.wheels {
             let speeds: Vec<f64> = wheels.each.iter().map(|wheel| wheel.speed).collect();
@@ -272,7 +276,7 @@ impl Feedback {
         Some((&wheels.references, &wheels.momentum, &wheels.slope))
     }
 
-    /// Writes the rows of commands and speeds so far to Python's arrays.
+    /// Writes the rows of commands and speeds that have been recorded to Python's arrays.
     pub fn write(&mut self, py: Python) {
         self.commands.write(py);
         if let Some(wheels) = &mut self.wheels {
@@ -295,8 +299,8 @@ fn wheels(
     rows: usize,
     commands: usize,
 ) -> PyResult<Option<Wheels>> {
-    /// Wheel as Python gives it: column of its torque among the commands, axis in body axes, moment
-    /// of inertia, kg·m², largest torque, N·m, largest speed and present speed, rad/s.
+    /// A wheel as Python passes it: column of its torque among the commands, axis in body axes, moment of inertia,
+    /// kg·m², largest torque, N·m, largest speed and present speed, rad/s.
     type Given = (usize, [f64; 3], f64, f64, f64, f64);
     let given: Vec<Given> = feedback.getattr("wheels")?.extract()?;
     if given.is_empty() {
@@ -328,7 +332,7 @@ fn wheels(
     Ok(Some(Wheels { each, references, momentum, slope: [0.0; 3], step: 0.0, speeds }))
 }
 
-/// Reads a linear controller from the Python object `of`, which has the class `Linear`.
+/// Reads a linear controller from the Python object `of` of class `Linear`.
 fn linear(
     of: &Bound<PyAny>,
     (cycles, measured, commands): (usize, usize, usize),

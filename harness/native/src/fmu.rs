@@ -77,7 +77,8 @@ pub enum Given {
 }
 
 impl Given {
-    /// Returns the value in a form that the type of a variable accepts if any does; for example, 2.0 is 2 for an Integer.
+    /// Returns the value in the form that a variable of this type expects, if it can be converted; for example, 2.0
+    /// becomes 2 for an Integer.
     pub fn for_type(self, kind: Type) -> Value {
         match self {
             Given::Boolean(is) if kind == Type::Real => Value::Real(is.into()),

@@ -17,8 +17,8 @@ use crate::fmu::{Fmu, FmuError, FmuWarning, Given, error};
 use crate::run::{Run, Stop, Table};
 use crate::schedule::bytes;
 
-/// An FMI instance together with the loaded FMU that it uses. Rust drops the fields in this order, so that the instance is freed
-/// before its library is unloaded.
+/// An FMI instance together with the loaded FMU that it uses. The order of the fields is the order in which they are
+/// dropped: the instance is freed before its library is unloaded.
 pub struct Held {
     pub instance: fmu::Instance<'static>,
     /// Time derivatives of inputs for the next step: value references, and values per second.
@@ -26,20 +26,20 @@ pub struct Held {
     _fmu: Arc<fmu::Fmu>,
 }
 
-// SAFETY: a mutex protects it, so one thread at a time calls the instance, as FMI requires. The host sets its thread-local state
-// again in each call.
+// SAFETY: a mutex ensures that one thread at a time calls the instance, as FMI requires. The host sets its thread-local
+// state again in each call.
 unsafe impl Send for Held {}
 
 impl Held {
     fn new(fmu: Arc<fmu::Fmu>) -> Called<Held> {
-        // SAFETY: the FMU does not move within its Arc, and goes after the instance.
+        // SAFETY: the FMU does not move within its Arc, and it is dropped after the instance.
         let borrowed: &'static fmu::Fmu = unsafe { &*Arc::as_ptr(&fmu) };
         let instance = borrowed.instantiate("hubslosh")?;
         Ok(Held { instance, slopes: Default::default(), _fmu: fmu })
     }
 }
 
-/// An instance of an FMU. If several threads call it, a call waits until the call before has ended.
+/// An instance of an FMU. If several threads call it, a call waits until the previous call has ended.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Instance {
     pub fmu: Py<Fmu>,
@@ -278,7 +278,7 @@ fn jacobian(
     const BLOCK: usize = 8;
     let mut moves = |places: &[usize]| -> Called<bool> {
         let block: Vec<u32> = places.iter().map(|i| knowns[*i]).collect();
-        // Different shares, so that effects of opposite knowns do not cancel.
+        // The knowns have different weights, so that effects of opposite knowns do not cancel.
         let direction: Vec<f64> = (1..=block.len()).map(|n| (n as f64).sqrt()).collect();
         let all = instance.directional_derivative(unknowns, &block, &direction)?;
         Ok(all.iter().any(|x| *x != 0.0))

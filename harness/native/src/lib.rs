@@ -1,10 +1,10 @@
-//! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
-//! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the [`crossings`]
-//! of loop gains, computes the modal parameters of [`tanks`], says how runs left the [`limits`] of their model, reads
-//! recordings and parameters, places [`files`], and stores the runs of a [`study`].
+//! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and runs their instances by single calls
+//! ([`instance`]) or as whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the
+//! [`crossings`] of loop gains, computes the modal parameters of [`tanks`], describes how runs left the [`limits`] of
+//! their model, reads recordings and parameters, finds the destinations of [`files`], and stores the runs of a [`study`].
 //!
-//! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
-//! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
+//! The crate `host` makes all calls of FMUs, without Python's lock. Tables are numpy arrays, which are accessed through
+//! the buffer protocol. The library depends only on the stable ABI, so that one library serves every Python from 3.11 on.
 
 #![warn(missing_docs)]
 

@@ -34,8 +34,8 @@ pub fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
     PyBuffer::get(array)?.to_vec(array.py())
 }
 
-/// A numpy array with `rows` rows of `width` numbers, of which a block of rows at a time is copied here, so that Python's lock is
-/// needed only once per block.
+/// A numpy array with `rows` rows of `width` numbers. Blocks of rows are copied to this value, so that Python's lock is
+/// needed only once for each block.
 pub struct Numbers {
     array: PyBuffer<f64>,
     width: usize,
@@ -60,15 +60,15 @@ impl Numbers {
         Ok(Numbers { array, width, rows: Vec::new(), at: 0 })
     }
 
-    /// Adds a row to the block that waits to be written to the array.
+    /// Adds a row to the block of rows that has not been written to the array.
     pub fn push(&mut self, row: &[f64]) {
         self.rows.extend_from_slice(row);
     }
 
-    /// Writes the waiting rows to the numpy array.
+    /// Writes the block of rows to the numpy array.
     pub fn write(&mut self, _: Python) {
         if let Some(mut numbers) = self.array.as_slice_ptr() {
-            // SAFETY: of() has looked at its type and size, and nobody else runs Python meanwhile.
+            // SAFETY: `borrow` has checked type and size, and Python's lock is held.
             let numbers = unsafe { numbers.as_mut() };
             numbers[self.at..][..self.rows.len()].copy_from_slice(&self.rows);
         }
@@ -81,13 +81,14 @@ impl Numbers {
         self.at += self.rows.len();
         self.rows.clear();
         if let Some(numbers) = self.array.as_slice_ptr() {
-            // SAFETY: as above.
+            // SAFETY: the same as in `write`.
             let numbers = unsafe { &numbers.as_ref()[self.at..] };
             self.rows.extend(numbers.iter().take(rows * self.width));
         }
     }
 
-    /// Keeps only the first `rows` rows of the present block as read; the next [`Numbers::read`] begins with the row after them.
+    /// Marks only the first `rows` rows of the present block as read; the next [`Numbers::read`] begins with the
+    /// following row.
     pub fn keep(&mut self, rows: usize) {
         self.rows.truncate(rows * self.width);
     }

@@ -89,8 +89,8 @@ pub type Stop = (usize, usize, String);
 /// A table of the Python side: the names of its columns, and the numpy array.
 pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 
-/// The Reals that change along a line from a row to the next: value references, values at the row,
-/// and derivatives. It is working memory, so that a row allocates nothing.
+/// The Reals that change linearly from one row to the next: value references, values at the row, and derivatives. This
+/// is working memory, so that a row allocates nothing.
 #[derive(Default)]
 struct Lines {
     references: Vec<u32>,
@@ -100,9 +100,9 @@ struct Lines {
 
 pub struct Run<'fmu> {
     time: Vec<f64>,
-    /// For each row true if its outputs are read; `None` if all are. A row that is not read repeats
-    /// the outputs of the row before. Reading is left out where possible, because it can make the
-    /// FMU compute all its outputs.
+    /// For each row true if its outputs are read; `None` if the outputs of all rows are read. A row that is not read
+    /// repeats the outputs of the previous row. Rows are not read if possible, because reading can make the FMU
+    /// compute all its outputs.
     wanted: Option<Vec<bool>>,
     inputs: (Columns<'fmu>, Numbers),
     slopes: Option<Numbers>,
@@ -112,8 +112,8 @@ pub struct Run<'fmu> {
 }
 
 impl<'fmu> Run<'fmu> {
-    /// Prepares a run. `time` has the communication points, s, and 0 for each row whose outputs are not read, if there are such
-    /// rows; `slopes` has the same columns as `inputs`.
+    /// Prepares a run. `time` has the communication points, s; if some rows are not read, also a flag for each row,
+    /// which is 0 for those rows. `slopes` has the same columns as `inputs`.
     ///
     /// # Errors
     ///
@@ -191,7 +191,7 @@ impl<'fmu> Run<'fmu> {
         columns.set(instance, given.row(i))?;
         let Lines { references, values, slopes } = &mut self.lines;
         let mut begin = time;
-        // one step, or more if wheels reach their largest speeds before the next row
+        // one step, or several steps if wheels reach their largest speeds before the next row
         while begin < *next {
             let end = match &mut self.feedback {
                 Some(feedback) => feedback.turn(instance, begin, *next)?,

@@ -16,8 +16,8 @@ use signals::table;
 
 use crate::fmu::error;
 
-/// Version of the file format of a study. 1: without types and hashes (HubSlosh 0.5.0); 2: random numbers of NumPy's generator
-/// (0.6.1).
+/// Version of the file format of a study. Format 1 has no types and hashes (HubSlosh 0.5.0); format 2 has random
+/// numbers of NumPy's generator (0.6.1).
 const FORMAT: u32 = 3;
 
 /// Return `count` random numbers, uniform from 0 (included) to 1 (excluded), of stream number `run` for this seed. Run number
@@ -85,7 +85,7 @@ impl Store {
     ) -> PyResult<(Option<Bound<'py, PyBytes>>, Option<String>)> {
         let read = |store: &store::Store| match store.read(run) {
             Ok(bytes) => (bytes, None),
-            // the difference may tell what has happened to it
+            // The bytes may show what has happened to the file.
             Err(damage) => (input::bytes(&store.run(run)).ok(), Some(damage.to_string())),
         };
         let (bytes, damage) = self.with(py, read)?;

@@ -289,9 +289,9 @@ pub fn table<'py>(
     parameters_to_python(py, set.map_err(|why: Problems| tank.get().error(&why))?)
 }
 
-/// Returns the results of `of(0)` to `of(count - 1)`, computed in parallel by one thread per core.
+/// Returns the results of `of(0)` to `of(count - 1)`, computed in parallel by one thread for each core.
 ///
-/// On Ctrl-C the function returns at once, while the threads finish what they are computing.
+/// On Ctrl-C the function returns immediately, while the threads complete their computations.
 fn in_threads<T: Send + 'static>(
     py: Python,
     count: usize,

@@ -1,4 +1,4 @@
-//! Writes the `.fmu` as a zip archive (FMI 2.0, section 2.3). The same files always give the same bytes.
+//! Writes the `.fmu` as a zip archive (FMI 2.0, section 2.3). Equal files give byte-identical archives.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -12,14 +12,13 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::fmi::Fmi;
 
-/// Names in the archive and their contents, in the order of the archive. modelDescription.xml comes first,
-/// because some hosts expect that.
+/// Names in the archive and their contents, in the order of the archive. modelDescription.xml comes first, because some
+/// hosts expect it there.
 pub type Files = Vec<(String, Vec<u8>)>;
 
 const QUICK: i64 = 9;
-/// Compression level for distributed archives. Above 9 the crate `zip` uses Zopfli, with one
-/// iteration per level above that. Five iterations would make a binary smaller by 0.2 % and take a
-/// third longer.
+/// Compression level for distributed archives. At levels above 9 the crate `zip` uses Zopfli, with one iteration for
+/// each further level. Five iterations would make a binary smaller by 0.2 % and take a third longer.
 const SMALL: i64 = 10;
 
 pub struct Packed {
@@ -38,8 +37,8 @@ impl Packed {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }
 
-    /// Returns the paths of a binary in an FMU of the version `fmi`, each with its bytes. A folder
-    /// for one processor gets only that processor's part of a universal binary.
+    /// Returns the paths of a binary in an FMU of the version `fmi`, each with its bytes. The folder of one processor
+    /// gets only the part of a universal binary for this processor.
     pub fn files(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = (String, &[u8])> {
         fmi.folders(self.folder).iter().map(move |folder| {
             let bytes = match folder.strip_suffix("-darwin") {
@@ -52,8 +51,8 @@ impl Packed {
     }
 }
 
-/// Packs an FMU from its parts: description, binary for this platform, and every file below `extra` under its
-/// path relative to that folder (`resources/a.txt`, `sources/b.c`).
+/// Packs an FMU from its parts: description, binary for this platform, and every file below `extra`, under its path
+/// relative to this folder (`resources/a.txt`, `sources/b.c`).
 ///
 /// # Errors
 ///
@@ -87,7 +86,7 @@ pub fn write(files: &Files, out: &Path) -> Result<()> {
     write_at(files, out, QUICK)
 }
 
-/// Packs files for distribution: like [`write`], but by Zopfli, which makes binaries smaller by 3.6 % and
+/// Packs files for distribution. Like [`write`], but compresses with Zopfli, which makes binaries smaller by 3.6 % and
 /// takes 1.5 s of CPU time per megabyte.
 pub fn write_small(files: &Files, out: &Path) -> Result<()> {
     write_at(files, out, SMALL)
@@ -130,7 +129,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
 fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)], level: i64) -> Result<()> {
     let mut archive = ZipWriter::new(out);
     for (name, bytes) in files {
-        // An FMU's binaries and a wheel's command are executable.
+        // The binaries of an FMU and the command in a wheel are executable.
         let program = name.starts_with("binaries/") || name.contains(".data/scripts/");
         let mode = if program { 0o755 } else { 0o644 };
         let options = SimpleFileOptions::default()

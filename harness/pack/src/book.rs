@@ -17,13 +17,12 @@ pub fn address() -> String {
     format!("{REPOSITORY}/blob/v{VERSION}/book/index.md")
 }
 
-/// Builds the book and writes its files to `out`. At the first call Sphinx is installed into an environment
-/// of its own.
+/// Builds the book and writes its files to `out`. The first call installs Sphinx into a separate environment.
 ///
 /// # Errors
 ///
-/// If the source, Python or a package is missing, and at every warning of Sphinx: links and figures that do
-/// not exist, pages in no list, equations that are not LaTeX, docstrings that are not reStructuredText.
+/// If the source, Python or a package is missing, and at every warning of Sphinx: links and figures that do not exist,
+/// pages that no list contains, equations that are not LaTeX, docstrings that are not reStructuredText.
 pub fn write(out: &Path) -> Result<()> {
     needs_source("the book")?;
     let root = root();
@@ -31,7 +30,7 @@ pub fn write(out: &Path) -> Result<()> {
     let target = native.ancestors().nth(2).context("no target directory")?;
     let python = environment(target)?;
 
-    // Removed first, because it may have pages about names that the package no longer has.
+    // The folder is removed first, because it may contain pages about names that the package no longer has.
     match fs::remove_dir_all(root.join("book/api")) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error).context("book/api")?,
         _ => {}

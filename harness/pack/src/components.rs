@@ -1,5 +1,5 @@
-//! Third-party components of the FMU's binaries, found in the lock file and in the binaries: the note on
-//! licences and the SBOM (CycloneDX 1.6).
+//! Third-party components of the FMU's binaries, which are found in Cargo.lock and in the binaries themselves. Writes
+//! the note on licences and the SBOM (CycloneDX 1.6).
 //!
 //! Licence texts are committed in modelDescription/licenses; [`licence_note`] names their sources.
 
@@ -24,7 +24,7 @@ pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
     pub name: String,
-    /// Version of the component; `None` if it is the version of the tool that linked the component.
+    /// Version of the component. `None` if the component has the version of the tool that linked it.
     pub version: Option<String>,
     pub licence: String,
     pub texts: Vec<String>,
@@ -35,8 +35,8 @@ pub struct Component {
     pub platforms: BTreeSet<&'static str>,
 }
 
-/// Crates of Rust's standard library, each with its licence. A binary contains the paths of those
-/// crates whose code is linked and can panic, with their versions.
+/// Crates of Rust's standard library, each with its licence. A binary contains the paths, with versions, of those
+/// crates whose code is linked and can panic.
 const STANDARD: [(&str, &str); 10] = [
     ("addr2line", "Apache-2.0 OR MIT"),
     ("adler2", "0BSD OR MIT OR Apache-2.0"),
@@ -59,8 +59,8 @@ struct RunTime {
     origin: &'static str,
 }
 
-/// Reverses a text at compile time. This program is itself searched for texts that identify
-/// components of a wheel, and must therefore not contain them.
+/// Reverses a text at compile time. The texts identify components in a wheel, and this program, which is itself in the
+/// wheel, must not contain them.
 const fn backwards<const N: usize>(text: [u8; N]) -> [u8; N] {
     let (mut reversed, mut place) = ([0; N], 0);
     while place < N {
@@ -182,7 +182,7 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     while place < wanted.len() {
         let node = nodes.iter().find(|node| node.id == *wanted[place]);
         for dependency in node.into_iter().flat_map(|node| &node.deps) {
-            // Without dependencies of tests and build scripts.
+            // without dependencies of tests and build scripts
             let linked = dependency.dep_kinds.iter().any(|d| d.kind == DependencyKind::Normal);
             if linked && !wanted.contains(&&dependency.pkg) {
                 wanted.push(&dependency.pkg);
@@ -237,7 +237,7 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     let mut all = BTreeSet::new();
     let places = bytes.windows(BEFORE.len()).enumerate().filter(|(_, w)| *w == BEFORE);
     for (place, _) in places {
-        // One path separator, of this or of the target's system, on either side.
+        // a path separator of this system or of the target's system on either side
         let separator = |b: &u8| b"/\\".contains(b);
         let Some((first, rest)) = bytes[place + BEFORE.len()..].split_first() else { continue };
         let of_a_name = |b: &u8| b.is_ascii_alphanumeric() || b"-_.+".contains(b);
@@ -304,7 +304,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
         .exec()
         .context("`cargo metadata` failed; it is needed to list the crates of the program")?;
     let ours = project::root().join("modelDescription/licenses");
-    // Each text once, with the components under it.
+    // each licence text once, with the components to which it applies
     let mut texts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let mut list = String::new();
     for component in linked_in_wheel(binary)? {
@@ -407,8 +407,7 @@ struct Product<'a> {
 }
 
 impl Product<'_> {
-    /// Returns the SBOM. It contains neither a time nor a random number, so that the same binaries have the
-    /// same SBOM.
+    /// Returns the SBOM. It contains neither a time nor a random number, so that equal binaries have equal SBOMs.
     fn sbom(&self, components: &[Component]) -> String {
         let Product { kind, name, version, description, files } = self;
         let this = format!("{name}@{version}");
@@ -467,7 +466,7 @@ mod tests {
     use super::*;
     use crate::models::MODELS;
 
-    /// The SBOM lists the crates of the Rust standard library, which the compiler's paths in the binary name.
+    /// The SBOM lists those crates of the Rust standard library whose paths are in the binary.
     #[test]
     fn crates_of_std_are_found_by_name_and_version() {
         let found = standard_crates(
@@ -480,7 +479,7 @@ mod tests {
         assert!(error.contains("new-thing-1.0.0"), "{error}");
     }
 
-    /// The program that searches binaries for paths of crates contains such path prefixes itself.
+    /// The program that searches binaries for paths of crates itself contains beginnings of such paths.
     #[test]
     fn the_search_for_linked_crates_does_not_find_its_own_list_of_names() {
         for words in [
@@ -494,7 +493,7 @@ mod tests {
         }
     }
 
-    /// The program that searches binaries for marks of run-time libraries contains the marks only reversed.
+    /// The program that searches binaries for marks of run-time libraries contains these marks only reversed.
     #[test]
     fn this_program_is_not_mistaken_for_one_that_links_a_run_time_library() {
         let this = crate::archive::read(&std::env::current_exe().unwrap()).unwrap();
@@ -525,7 +524,7 @@ mod tests {
     }
 
     #[test]
-    fn an_fmu_links_libm_as_its_only_foreign_crate() {
+    fn libm_is_the_only_third_party_crate_in_an_fmu() {
         for model in &MODELS {
             let all = crates(model.package, &BTreeSet::from(["linux64"])).unwrap();
             assert_eq!(all[0].name, model.package);

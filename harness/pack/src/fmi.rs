@@ -2,20 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-/// A kind of FMU that is packed: the same binary with another description and other names in the archive.
+/// A kind of FMU: the binary is the same, but the description and the names in the archive differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fmi {
     V2,
     V3,
-    /// FMI 3.0 with array variables, some of which are sized by structural parameters.
+    /// FMI 3.0 with array variables. Structural parameters determine the sizes of some arrays.
     V3Arrays,
 }
 
 impl Fmi {
     pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
 
-    /// Returns the folders under `binaries/` for a platform that is given by its folder in FMI 2.0. For a
-    /// universal binary of macOS FMI 3.0 has two folders.
+    /// Returns the folders under `binaries/` for a platform that is given by its folder in FMI 2.0. For the universal
+    /// binary of macOS FMI 3.0 has two folders.
     pub fn folders(self, platform: &'static str) -> &'static [&'static str] {
         match (self, platform) {
             (Fmi::V3 | Fmi::V3Arrays, "linux64") => &["x86_64-linux"],
@@ -46,9 +46,8 @@ impl Fmi {
         }
     }
 
-    /// Returns the path of an FMU in a folder: `NAME.fmu`, for FMI 3.0 `NAME-fmi3.fmu` and
-    /// `NAME-fmi3-arrays.fmu`. Hosts take the name of the library from the description, not from the file
-    /// name.
+    /// Returns the path of an FMU in a folder: `NAME.fmu`, and for FMI 3.0 `NAME-fmi3.fmu` and `NAME-fmi3-arrays.fmu`.
+    /// The file name may differ from the library's, because hosts take the library's name from the description.
     pub fn path(self, folder: &Path, name: &str) -> PathBuf {
         folder.join(format!("{name}{}.fmu", self.suffix()))
     }

@@ -57,9 +57,8 @@ pub fn packed_for_tests() -> &'static Path {
     packed_model_for_tests(HUBSLOSH)
 }
 
-/// Returns a packed FMU for tests, which is built and packed once per process to `test-fmu/<name>.fmu` in the
-/// target directory. Several processes may do so at the same time, because each renames a complete file and
-/// all have the same bytes.
+/// Returns a packed FMU for tests. It is built and packed once in each process, to `test-fmu/<name>.fmu` in the target
+/// directory. Several processes may do this at the same time, because each renames a complete file, and all files are equal.
 ///
 /// # Panics
 ///
@@ -92,8 +91,7 @@ fn pack_for_tests(model: &Model, fmi: Fmi) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// Returns the list of related files in the FMU: the inputs of the example and its result (FMI-LS-REF,
-/// 1.0.0-beta.1).
+/// Returns the list of related files for the FMU: the inputs of the example and its result (FMI-LS-REF, 1.0.0-beta.1).
 fn references(model: &Model) -> String {
     let name = model.name;
     format!(
@@ -110,7 +108,7 @@ fn references(model: &Model) -> String {
 fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     let source = model.folder();
     let xml = model.description(fmi)?;
-    // The parts that are used here are the same in all versions.
+    // The parts of the description that are used here are equal in all versions.
     let first = model.description(Fmi::V2)?;
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&first))?;
     let icon = read(&root().join("modelDescription/icon/icon.png"))?;
@@ -138,8 +136,8 @@ fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
         files.push((format!("documentation/licenses/{text}"), read(&folder.join(text))?));
     }
 
-    // There is no terminalsAndIcons.xml: this plant has no terminals, and FMI Library logs a fatal error for
-    // an FMU 2.0 that contains the file.
+    // terminalsAndIcons.xml is not written, because this model has no terminals, and because FMI Library logs a fatal
+    // error for an FMU 2.0 that contains the file.
     let extra = source.join("extra");
     if extra.is_dir() {
         let extra = below(&extra)?.into_iter();

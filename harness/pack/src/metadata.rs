@@ -1,6 +1,5 @@
-//! The core metadata of the Python package, version 2.4 (packaging.python.org, "Core metadata
-//! specifications"). They are taken from `[project]` of pyproject.toml, Cargo.toml (version, authors,
-//! licence, repository) and README.md.
+//! The core metadata of the Python package, version 2.4 (packaging.python.org, "Core metadata specifications"). The data
+//! come from `[project]` in pyproject.toml, from Cargo.toml (version, authors, licence, repository) and from README.md.
 
 use std::ops::Range;
 
@@ -15,7 +14,7 @@ pub const PACKAGE: &str = "hubslosh";
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 pub const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
-/// File with the licences and notices of everything that is linked into a wheel's command.
+/// File with the licences and notices of all components that are linked into the command of a wheel.
 pub const NOTICES: &str = "THIRD-PARTY.txt";
 
 pub fn text() -> Result<String> {
@@ -70,8 +69,8 @@ fn compose(pyproject: &Table, readme: &str) -> Result<String> {
     Ok(format!("{}\n\n{}", lines.join("\n"), published(readme)))
 }
 
-/// Rewrites the links of a Markdown page so that they work outside the project: links to the project's files
-/// lead to the repository at this version.
+/// Rewrites the links of a Markdown page so that they work outside the project: links to files of the project lead to
+/// the repository at this version.
 fn published(page: &str) -> String {
     let mut changes: Vec<(Range<usize>, String)> = Vec::new();
     for (event, range) in Parser::new_ext(page, Options::ENABLE_TABLES).into_offset_iter() {
@@ -90,7 +89,7 @@ fn published(page: &str) -> String {
             }
             _ => continue,
         };
-        // The last "](…" in the range belongs to this link, because those inside it end earlier.
+        // The last "](…" in the range belongs to this link, because links inside it end earlier.
         let written = format!("]({to}");
         if !to.contains("://")
             && !to.starts_with('#')
@@ -101,7 +100,7 @@ fn published(page: &str) -> String {
             changes.push((start..start + to.len(), address));
         }
     }
-    // An image within a link is reported after the link, but comes before the link's end.
+    // The parser reports an image inside a link after the link, but the image comes before the end of the link.
     changes.sort_by_key(|(range, _)| range.start);
     let mut published = page.to_string();
     for (range, address) in changes.into_iter().rev() {

@@ -13,8 +13,8 @@ pub const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Model {
-    /// The `modelIdentifier`. The folder `modelDescription/<name>` has everything that is packed with the
-    /// binary: `modelDescription.xml`, `documentation/` and, if it exists, `extra/`.
+    /// The `modelIdentifier`. The folder `modelDescription/<name>` contains everything that is packed with the binary:
+    /// `modelDescription.xml`, `documentation/` and, if it exists, `extra/`.
     pub name: &'static str,
     pub package: &'static str,
 }
@@ -31,7 +31,7 @@ pub const HUBSLOSH: &Model = &MODELS[0];
 ///
 /// # Errors
 ///
-/// If there is none; the text lists the existing names.
+/// If there is no FMU with this name; the message lists the names.
 pub fn model(name: &str) -> Result<&'static Model> {
     MODELS.iter().find(|model| model.name == name).with_context(|| {
         let names = MODELS.iter().map(|model| model.name);
@@ -62,9 +62,9 @@ impl Model {
         root().join("modelDescription").join(self.name)
     }
 
-    /// Returns the folder with the example and its reference result, both in the FMU and in the model's folder. The layered
-    /// standard FMI-LS-REF keeps such files there. (Folders in `extra` are named after reversed domain names, and the
-    /// project has no domain.)
+    /// Returns the folder with the example and its reference result, in the FMU as well as in the model's folder. The
+    /// layered standard FMI-LS-REF requires this folder. (Other folders in `extra` would need reversed domain names,
+    /// and the project has no domain.)
     pub fn example(&self) -> PathBuf {
         self.folder().join(REFERENCES)
     }

@@ -1,4 +1,4 @@
-//! Packs FMUs that have only part of the variables, for the same binary; see [`host::part`].
+//! Packs FMUs that have only part of the variables and the same binary; see [`host::part`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +9,8 @@ use host::part::{Limit, START_VALUES, describe};
 
 use crate::archive::{self, Files};
 
-/// Packs to `out` the variables of `fmu` that are within the limits. `starts` are other start values by name.
+/// Packs an FMU with those variables of `fmu` that are within the limits, and writes it to `out`. `starts` has start
+/// values by name that replace those of the description.
 ///
 /// # Errors
 ///

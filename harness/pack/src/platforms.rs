@@ -1,7 +1,7 @@
 //! The platforms for which FMUs and the command are built, and the tools that each build needs.
 //!
-//! Rust's compiler generates code for all of them. Each target also needs Rust's standard library and a
-//! linker. `harness/platforms/setup` installs both on a Debian machine, into `target/tools`.
+//! Rust's compiler generates code for all platforms. Each target also needs Rust's standard library and a linker, which
+//! `harness/platforms/setup` installs into `target/tools` on a Debian machine.
 
 use std::collections::BTreeMap;
 use std::env;
@@ -64,7 +64,7 @@ const MINGW: Tool = Tool {
 
 pub const PLATFORMS: [Platform; 4] = [
     Platform {
-        // The names of FMI 2.0 itself are for x86; for other processors it uses the tuples of FMI 3.0.
+        // FMI 2.0 itself has names only for x86; for other processors it uses the platform tuples of FMI 3.0.
         folder: "aarch64-linux",
         ending: ".so",
         targets: &[Target {
@@ -85,8 +85,7 @@ pub const PLATFORMS: [Platform; 4] = [
         ],
         tools: &[CARGO_ZIGBUILD, ZIG],
         cargo: Cargo::Zig,
-        // Without debug information (-S) the identifier that zig writes does not depend on folders of this
-        // machine.
+        // Without debug information (-S) the identifier that zig writes does not depend on folders of this machine.
         link: &["-Wl,-S"],
     },
     Platform {
@@ -107,7 +106,7 @@ pub const PLATFORMS: [Platform; 4] = [
         targets: &[Target { triple: "x86_64-pc-windows-gnu", suffix: "", architecture: "x86_64" }],
         tools: &[MINGW],
         cargo: Cargo::Plain,
-        // Without the time of the build the same source gives the same bytes.
+        // The time of the build is not written, so that equal sources give equal bytes.
         link: &["-Wl,--no-insert-timestamp"],
     },
 ];
@@ -116,7 +115,7 @@ pub const PLATFORMS: [Platform; 4] = [
 ///
 /// # Errors
 ///
-/// If there is none; the text lists the existing folders.
+/// If there is no such folder; the message lists the folders.
 pub fn platform(folder: &str) -> Result<&'static Platform> {
     PLATFORMS.iter().find(|platform| platform.folder == folder).with_context(|| {
         let all = PLATFORMS.each_ref().map(|platform| platform.folder);
@@ -135,7 +134,7 @@ pub struct Built {
 ///
 /// # Errors
 ///
-/// Before building, everything that is missing; after building, every fault of every binary.
+/// Before building, everything that is missing; after building, all faults of all binaries.
 pub fn build(model: &Model) -> Result<Vec<Built>> {
     let toolchain = Toolchain::find()?;
     toolchain.check(&PLATFORMS.each_ref())?;
@@ -198,7 +197,7 @@ impl Toolchain {
             Ok(String::from_utf8_lossy(&said.stdout).trim().into())
         };
         let sysroot = PathBuf::from(rustc(&["--print", "sysroot"])?);
-        // "rustc 1.95.0 (…)": only the standard library of the same version compiles.
+        // "rustc 1.95.0 (…)": only the standard library of this version compiles with it.
         let version = rustc(&["--version"])?;
         let version = version.split_whitespace().nth(1).unwrap_or_default();
         let source = [
@@ -231,7 +230,7 @@ impl Toolchain {
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     }
 
-    /// Lists the faults of a binary: those in `found`, and paths of this machine that it contains.
+    /// Lists the faults of a binary: those in `found`, and paths of this machine that the binary contains.
     pub fn faults(&self, platform: &Platform, bytes: &[u8], found: Vec<String>) -> Vec<String> {
         let private = self.private().into_iter();
         let named = private
@@ -301,8 +300,7 @@ impl Toolchain {
         command.env("PATH", &self.path);
         command.args(["rustc", "--locked", "--target"]);
         command.arg(format!("{}{}", target.triple, target.suffix));
-        // Paths of this machine are replaced, so that the same source gives the same bytes wherever it is
-        // built.
+        // Paths of this machine are replaced, so that equal sources give equal bytes on every machine.
         let registry = Path::new(&self.home).join("registry").join("src");
         let mut flags = vec![
             format!("--remap-path-prefix={}=.", self.root.display()),
@@ -311,7 +309,7 @@ impl Toolchain {
         if !self.has_standard_library(target.triple)
             && let Some(source) = &self.source
         {
-            // Building std is an unstable feature of Cargo, which these two variables enable.
+            // Building the standard library is an unstable feature of Cargo, which these two variables enable.
             command.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", source);
             command.arg("-Zbuild-std=std,panic_unwind");
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
@@ -342,11 +340,11 @@ impl Toolchain {
         };
         let mut link: Vec<_> = platform.link.iter().map(|&argument| argument.to_string()).collect();
         if let (Some(name), "darwin64") = (&name, platform.folder) {
-            // Hosts load the library by its path; its install name must not be a folder of this machine.
+            // Hosts load the library by its path. Its install name must not contain a folder of this machine.
             link.push(format!("-Wl,-install_name,@rpath/{name}{}", platform.ending));
         }
         if let (Product::Native | Product::Command, "darwin64") = (product, platform.folder) {
-            // Zig includes only the C library of macOS; the names of the other libraries are here.
+            // Zig includes only the C library of macOS; this folder has the names of the other libraries.
             link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
         }
         command.args(link.iter().map(|argument| format!("-Clink-arg={argument}")));
@@ -359,8 +357,8 @@ mod tests {
     use super::*;
     use crate::fmi::Fmi;
 
-    /// Every platform that is built has a folder in the FMU. Without one its binary would be left
-    /// out of the archive without a message.
+    /// Every platform that is built has a folder in the FMU. Without a folder its binary would silently be
+    /// missing in the archive.
     #[test]
     fn every_platform_has_its_folder_in_an_fmu() {
         for platform in &PLATFORMS {

@@ -1,4 +1,4 @@
-//! The project as Cargo builds it: the location of its source, and the builds of its binaries.
+//! The project's source and the builds of its binaries by Cargo.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Message, TargetKind};
 
-/// Returns the project's root: the current folder, because this program was built elsewhere.
+/// Returns the project's root: the current folder, because this program was built on another machine.
 #[cfg(feature = "shipped")]
 pub fn root() -> PathBuf {
     std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))
@@ -54,21 +54,20 @@ pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Adds the arguments of `cargo rustc` for the FMU's binary; arguments that follow go to the compiler. `cargo
-/// build` would also build the rlib in the same call and then silently omit the link-time optimisation, which
-/// would give 70 % more code.
+/// Adds the arguments of `cargo rustc` for the FMU's binary; arguments that follow go to the compiler. `cargo build` would
+/// also build the rlib in the same call and then silently omit the link-time optimisation, which would give 70 % more code.
 ///
-/// The compiler may process two numbers at once (SLP vectorisation) only where this saves much, as for
-/// vectors. Where it saves little, it costs time, because a pair is loaded just after its halves were stored
-/// separately, and the processor waits: the linear model's step would take a fifth longer.
+/// The compiler may process two numbers at once (SLP vectorisation) only where this saves much, as for vectors.
+/// Otherwise it costs time, because the processor waits when a pair is loaded directly after its halves were stored
+/// separately: a step of the linear model would take a fifth longer.
 pub(crate) fn arguments(command: &mut Command, package: &str) {
     command.args(["--profile", PROFILE, "--package", package, "--lib", "--crate-type", "cdylib"]);
     command.args(["--message-format", "json-render-diagnostics"]);
     command.args(["--", "-Cllvm-args=-slp-threshold=10"]);
 }
 
-/// Adds to a build of a binary that is distributed that packages which the profile `release` does not optimise, because
-/// `cargo run` then compiles them faster, are optimised for size.
+/// Makes a distributed build optimise for size those packages that the profile `release` does not optimise. (It does
+/// not optimise them, so that `cargo run` compiles them faster.)
 fn optimise_for_size(command: &mut Command) -> Result<()> {
     let manifest = std::fs::read_to_string(root().join("Cargo.toml")).context("Cargo.toml")?;
     let manifest: toml::Table = manifest.parse().context("Cargo.toml cannot be understood")?;
@@ -103,10 +102,10 @@ pub(crate) fn native_arguments(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Builds the compiled half of the Python package for the platform on which this program runs and returns its
-/// path, at which the package finds it in the source tree.
+/// Builds the compiled half of the Python package for the platform on which this program runs, and returns its path, at
+/// which the package finds it in the source tree.
 ///
-/// It is built with the program's features: with the features of only one package Cargo would
+/// It is built with the features of the whole program, because with the features of only one package Cargo would
 /// compile `host`, `signals`, `parquet` and 16 other crates a second time.
 ///
 /// # Errors

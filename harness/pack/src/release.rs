@@ -12,17 +12,17 @@ use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
 
-/// Name of the list of the files in the folder, all of one version, with their SHA-256 in the format of `sha256sum
-/// --check`.
+/// Name of the list of the files in the folder, which all have one version, with their SHA-256 in the format of
+/// `sha256sum --check`.
 pub const PRESENT: &str = "SHA256SUMS";
 
-/// Name of the list of all files of all releases with their SHA-256: those in [`PRESENT`], files of older
-/// versions, and wheels that are not kept in the folder.
+/// Name of the list of all files of all releases with their SHA-256: the files in [`PRESENT`], files of older versions,
+/// and wheels that the folder does not keep.
 pub const MANIFEST: &str = "SHA256SUMS.all";
 
-/// Largest wheel for Linux that is kept in the release, bytes. It is limited because the wheel stays in the
-/// project's history forever. Of its 17.0 MB the command has 6.6, the nine FMUs 7.7 and the package's compiled
-/// half 2.3. The two FMUs 3.0 of a model repeat the binary of its FMU 2.0, because a zip archive cannot share it.
+/// Largest wheel for Linux that is kept in the release, bytes. It is limited because the wheel stays in the project's
+/// history forever. Of 17.0 MB the command has 6.6, the nine FMUs 7.7, and the compiled half of the package 2.3. The
+/// two FMUs 3.0 of a model repeat the binary of its FMU 2.0, because a zip archive cannot share it.
 pub const LARGEST_WHEEL: u64 = 20_000_000;
 
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
@@ -75,10 +75,9 @@ fn belongs_to(file: &str, name: &str, version: &str) -> bool {
         .is_some_and(|rest| rest.starts_with(['-', '.']))
 }
 
-/// Writes files of the present version of `name` to `folder` and updates this version's entries in
-/// [`MANIFEST`] with these files and with `elsewhere`, the names and SHA-256 of files that are not kept in
-/// the folder. Removes listed files of `name` that are no longer kept. Returns the paths of the written
-/// files.
+/// Writes files of the present version of `name` to `folder`, and updates the entries of this version in [`MANIFEST`]
+/// with these files and with `elsewhere`, the names and SHA-256 of files that the folder does not keep. Removes listed
+/// files of `name` that are no longer kept. Returns the paths of the written files.
 ///
 /// # Errors
 ///
@@ -180,8 +179,8 @@ pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
 mod tests {
     use super::*;
 
-    /// Packing version n removes the files of version n − 1 from the folder; SHA256SUMS keeps the hashes of files that are
-    /// published elsewhere.
+    /// Packing version n removes the files of version n − 1 from the folder. SHA256SUMS.all keeps the hashes of files
+    /// that are published elsewhere.
     #[test]
     fn a_release_replaces_the_files_of_the_last_one_and_keeps_their_hashes() {
         let folder = tempfile::tempdir().unwrap();
@@ -195,7 +194,7 @@ mod tests {
         let fmu = |ending: &str, text: &str| (format!("A-{VERSION}{ending}"), text.into());
         let elsewhere = [(format!("A-{VERSION}-b.whl"), "5".to_string())];
         record(folder.path(), "A", &[fmu(".fmu", "1"), fmu("-fmi3.fmu", "1")], &elsewhere).unwrap();
-        // the same version once more, without one of the files
+        // the same version again, without one of the files
         record(folder.path(), "A", &[fmu(".fmu", "2")], &elsewhere).unwrap();
         assert!(!there("A-0.0.1.fmu") && !there("A-0.0.1.check.txt"));
         assert!(there("AB-0.0.1.fmu") && there("A-notes.txt"));

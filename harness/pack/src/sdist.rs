@@ -1,5 +1,5 @@
-//! Packs the project's source as a Python sdist (packaging.python.org, "Source distribution format"), from
-//! which pip builds the wheel if Rust and a C compiler are installed. The same files give the same bytes.
+//! Packs the project's source as a Python sdist (packaging.python.org, "Source distribution format"). If Rust and a C
+//! compiler are installed, pip builds the wheel from it. Equal files give byte-identical archives.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,8 +14,8 @@ use crate::archive::{Files, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::root;
 
-/// Text in pyproject.toml that gives the path of the build backend: relative to the folder of this
-/// file in the project, and relative to the root of the sdist.
+/// Line of pyproject.toml with the path of the build backend: relative to the folder of this file in the project, and
+/// relative to the root of the sdist.
 const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
 
 /// Writes the sdist to `folder` and returns its path.

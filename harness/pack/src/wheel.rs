@@ -1,9 +1,8 @@
-//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of all versions
-//! of FMI and the command `hubslosh` (packaging.python.org, "Binary distribution format"). The same files
-//! give the same bytes.
+//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of all versions of FMI and
+//! the command `hubslosh` (packaging.python.org, "Binary distribution format"). Equal files give byte-identical wheels.
 //!
-//! The Python code runs anywhere, but the binaries do not: the tag states which Linux, Windows or macOS they
-//! need, and is derived from the binaries. The compiled half uses only the stable ABI of Python, so that one
+//! The Python code runs on every platform, but the binaries do not: the tag of a wheel states which Linux, Windows or
+//! macOS they need, and is derived from the binaries. The compiled half uses only the stable ABI of Python, so that one
 //! wheel serves every CPython from the version in [`ABI`] on.
 
 use std::path::{Path, PathBuf};
@@ -32,12 +31,12 @@ struct Binaries {
     read: Vec<Binary>,
 }
 
-/// Builds and packs every FMU of this project and the wheel that contains them, for this machine's platform.
-/// Returns the path of the wheel in `folder`.
+/// Builds every FMU of this project, and the wheel that contains them, for the platform of this machine. Returns the
+/// path of the wheel in `folder`.
 ///
 /// # Errors
 ///
-/// If something cannot be built, read or written.
+/// If a file cannot be built, read or written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     check_folder(folder)?;
     write_one(folder, native()?, archive::write)
@@ -47,8 +46,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 ///
 /// # Errors
 ///
-/// If something cannot be built, read or written, or a binary would not run on every machine of its platform.
-/// Then no wheel is written.
+/// If a file cannot be built, read or written, or a binary would not run on every machine of its platform. In this case
+/// no wheel is written.
 pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
     check_folder(folder)?;
     let write = |binaries| write_one(folder, binaries, archive::write_small);
@@ -138,7 +137,7 @@ fn cross_one(
         let bytes = toolchain.build(product, platform, target)?;
         let mut binary = Binary::read(&bytes).context(target.triple)?;
         if matches!(product, Product::Native) {
-            // Python itself loads this library.
+            // python3.dll need not be part of every system, because Python itself has loaded it.
             binary.libraries.retain(|library| library != "python3.dll");
         }
         let found = binary.loading_faults_for(&[target.architecture]);
@@ -183,8 +182,8 @@ fn write_one(
     Ok(out)
 }
 
-/// Returns the tags of a platform on which all these binaries run ("Platform compatibility tags"). For glibc
-/// 2.17 the older name is added.
+/// Returns the tags of the platforms on which all these binaries run ("Platform compatibility tags"). For glibc 2.17
+/// the older name of the tag is added.
 fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     let Some(Binary { kind, architectures, .. }) = binaries.first() else {
         bail!("a wheel without binaries has no platform")
@@ -205,7 +204,7 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
             [format!("manylinux_{major}_{minor}_{machine}")].into_iter().chain(older).collect()
         }
         Kind::Windows => vec!["win_amd64".into()],
-        // From version 11 on the second number is not a release of its own.
+        // From macOS 11 on the second number of a version does not denote a release.
         Kind::MacOs => vec![format!("macosx_{}_0_{architecture}", needed(MACOS).0)],
     })
 }
@@ -256,8 +255,7 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     Ok(files)
 }
 
-/// Reads the Python scripts and pages of the examples, without tests. Pictures are left out, because the
-/// scripts draw them.
+/// Reads the Python scripts and pages of the examples, without tests, and without pictures, which the scripts draw.
 ///
 /// # Errors
 ///
@@ -292,7 +290,7 @@ mod tests {
 
     #[test]
     fn a_line_of_the_wheel_s_record_has_the_hash_in_url_safe_base64() {
-        // the empty text's SHA-256; base64 has both `-` and `_` where plain base64 has `+` and `/`
+        // SHA-256 of the empty text. In base64 it has `-` and `_` where plain base64 has `+` and `/`.
         assert_eq!(
             record_line("a/b.py", b""),
             "a/b.py,sha256=47DEQpj8HBSa-_TImW-5JCeuQeRkm5NMpJWZG3hSuFU,0\n"

@@ -1,5 +1,5 @@
-//! JavaScript that several of the project's pages hold, as text to be put between `<script>` and `</script>`; data for it
-//! goes through [`json_in_script`].
+//! JavaScript that several pages of the project contain, as text to be put between `<script>` and `</script>`. Data for
+//! it must be escaped by [`json_in_script`].
 
 /// The part of three.js that [`SCENE`] uses, as the global `THREE` (MIT: [`THREE_LICENSE`] goes with it).
 pub static THREE: &str = include_str!("../three/three.min.js");
@@ -10,10 +10,9 @@ pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 /// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
 pub static SCENE: &str = include_str!("../scene/scene.js");
 
-/// Escapes JSON so that it can stand in a script element of any page or in a script: no text in it ends the
-/// element (`</script`), prevents the end from being seen (`<!--<script`: HTML, 13.2.5.20), becomes an
-/// entity, or ends a line of JavaScript. JSON has these characters only in strings, so its value stays the
-/// same.
+/// Escapes JSON so that it can be put into a script element of any page, or into a script. After that no text in it
+/// ends the element (`</script`), hides its end (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of
+/// JavaScript. The value stays the same, because JSON has these characters only in strings.
 pub fn json_in_script(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for c in json.chars() {
@@ -53,8 +52,7 @@ mod tests {
         );
     }
 
-    /// esbuild includes only the names in `used.js`, so that a name that is missing there fails in the
-    /// browser.
+    /// esbuild includes only the names in `used.js`. A name that is missing there causes an error only in the browser.
     #[test]
     fn the_bundle_has_every_name_that_the_scene_uses() {
         let exported = include_str!("../three/used.js");

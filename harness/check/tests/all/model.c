@@ -37,7 +37,7 @@ enum { X, DER_X, K, U, OWN };
 
 #define MAGIC 0x6d6f64656c2e6331
 
-/* What fmi2GetFMUstate saves. */
+/* The part of the model that fmi2GetFMUstate saves. */
 struct state {
     unsigned long long magic;
     enum mode mode;
@@ -109,7 +109,7 @@ static double value(const struct state *s, unsigned reference)
     }
 }
 
-/* The place of a value that a host sets; NULL where it may not. */
+/* Returns the address of a value that a host may set now, or NULL if it may not. */
 static double *place(struct state *s, unsigned reference)
 {
     int early = s->mode == INSTANTIATED || s->mode == INITIALIZATION;
@@ -133,7 +133,7 @@ static void begin(struct state *s)
 }
 
 #ifdef RESOURCES
-/* Reads rate.txt from the folder of a URI; 0 if it is not there. */
+/* Reads rate.txt from the folder of a URI. Returns 0 if there is no such file. */
 static double rate_at(const char *uri)
 {
     char path[4096];
@@ -316,7 +316,7 @@ Status fmi2SetReal(Component m, const unsigned *r, size_t n, const double *x)
     return OK;
 }
 
-/* It has no variables of the other types. */
+/* The model has no variables of the other types. */
 #define NOTHING(name, type)                                                     \
     Status name(Component m, const unsigned *r, size_t n, type *x)              \
     {                                                                           \
@@ -546,7 +546,7 @@ Status fmi2GetNominalsOfContinuousStates(Component m, double *x, size_t n)
 #endif
 
 #ifdef UNDEFINED
-/* nobody defines it, and 1,000 functions of C++ are exported besides */
+/* Nobody defines this function. The library also exports 1,000 functions of C++. */
 extern void UNDEFINED(void);
 void (*const undefined)(void) = UNDEFINED;
 #define ONE(n) void _ZN9pythonfmu4m##n##Ev(void) {}

@@ -1,6 +1,7 @@
-/* A small FMU 3.0 without a fault, for the tests of `hubslosh check` and of the host: x' = -k (x - u), solved exactly
- * for inputs that go in straight lines, counted every PERIOD s. With event mode the count changes in event mode alone;
- * with early return a step ends there. The digits in `fault` make it wrong in one of the ways that the test lists. */
+/* A small FMU 3.0 without a fault, for the tests of `hubslosh check` and of the host: x' = -k (x - u), solved
+ * exactly for inputs that change linearly, and a counter that counts every PERIOD s. With event mode the counter
+ * changes only in event mode; with early return a step ends at this time. The digits in `fault` select one of the
+ * faults that the test lists. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -61,7 +62,7 @@ static void begin(struct state *s)
 
 static double rate(const struct state *s) { return -s->k * (s->x - s->u); }
 
-/* the exact solution over h with u from u0 by slope */
+/* the exact solution over a step h, for an input that starts at u0 with this slope */
 static void advance(struct state *s, double h, double slope)
 {
     double e = exp(-s->k * h), u1 = s->u + slope * h;
@@ -320,7 +321,7 @@ Status fmi3GetVariableDependencies(Instance m, uint32_t vr, size_t own[], uint32
 Status fmi3EnterConfigurationMode(Instance m) { return refuse(m, "there are no structural parameters"); }
 Status fmi3ExitConfigurationMode(Instance m) { return refuse(m, "there are no structural parameters"); }
 
-/* whether time has come to the next count, to rounding */
+/* Returns true if the time of the next count has come, to rounding. */
 static bool is_due(const struct state *s) { return s->t >= s->next - 1e-9; }
 
 static void count(struct state *s)
@@ -441,7 +442,7 @@ Status fmi3DoStep(Instance m, double t, double h, bool forget, bool *event, bool
     return OK;
 }
 
-/* the other functions that an FMU exports */
+/* the other functions that an FMU must export */
 #define STUB(name) \
     Status name(Instance m) { return refuse(m, #name " is not supported"); }
 STUB(fmi3GetFloat32) STUB(fmi3GetInt8) STUB(fmi3GetUInt8) STUB(fmi3GetInt16) STUB(fmi3GetUInt16) STUB(fmi3GetUInt32)

@@ -1,5 +1,5 @@
-/* An FMU around our FMU that misbehaves in one way, for the tests of `hubslosh check`: every call
- * goes on to real.so beside this library, but for what the word in misbehaviour.txt asks for. */
+/* A library around our FMU that misbehaves in one way, for the tests of `hubslosh check`. Every call is passed on to
+ * real.so in the same folder, except for the misbehaviour that the word in misbehaviour.txt selects. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>

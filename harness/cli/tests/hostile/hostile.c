@@ -1,5 +1,5 @@
-/* The FMU of model.c with a fault that harms its host, when it is loaded (-DAT_LOAD) or in its first
- * step (-DAT_STEP) or when a value is read (-DAT_GET; with NONE it is NaN then). -DHARM=… says which. */
+/* The FMU of model.c with a fault that harms its host: when it is loaded (-DAT_LOAD), in its first step (-DAT_STEP), or
+ * when a value is read (-DAT_GET; with NONE the value is then NaN). -DHARM=… selects the fault. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <signal.h>
@@ -26,7 +26,7 @@ static int deeper(int n)
     return n < 0 ? 0 : deeper(n + 1) + page[0];
 }
 
-/* Answers of a run that is done and of a rule that finds nothing, as a process with another connection would write them. */
+/* Writes the messages of a run that is done and of a rule without findings, as a process with the right connection would. */
 static void forge(int file)
 {
     static const char text[] = "{\"Done\":{\"severity\":\"Error\",\"list\":[],\"more\":0,\"skipped\":null,\"told_by\":null}}\n";
@@ -35,7 +35,7 @@ static void forge(int file)
     write(file, run, sizeof run - 1);
 }
 
-/* Writes answers to each path on the command line, except for the FMU, and to each open file. */
+/* Writes these messages to each path on the command line, except for the FMU, and to each open file. */
 static void forge_all(void)
 {
     static char line[1 << 16];

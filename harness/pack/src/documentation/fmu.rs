@@ -1,5 +1,5 @@
-//! Renders `documentation/index.html` of an FMU: its introduction, and the pages that the introduction lists,
-//! as one file. Only the figures are separate files in the same folder.
+//! Renders `documentation/index.html` of an FMU: its introduction, and the pages that the introduction lists, as one
+//! file. Only the figures are separate files, in the same folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -49,14 +49,12 @@ impl Gathered {
 }
 
 impl Page {
-    /// Returns the `id` of a heading in the file that has all pages, or the `id` of the page itself
-    /// if `slug` is empty.
+    /// Returns the `id` of a heading of this page in the file with all pages; if `slug` is empty, the `id` of the page itself.
     pub fn id(&self, slug: &str) -> String {
         if slug.is_empty() { self.name.clone() } else { format!("{}--{slug}", self.name) }
     }
 
-    /// Returns the address of a heading of the page, as in a link, or of the page itself if `slug`
-    /// is empty.
+    /// Returns the address of a heading of this page, as in a link; if `slug` is empty, the address of the page itself.
     pub fn address(&self, slug: &str) -> String {
         format!("#{}", self.id(slug))
     }
@@ -75,7 +73,7 @@ impl Page {
         Ok(page)
     }
 
-    /// Returns the paths of the pages that this page lists, from the project's root, in their order.
+    /// Returns the paths of the pages that this page lists, relative to the project's root, in their order.
     pub fn listed(&self) -> Vec<String> {
         let (mut items, mut paths) = (0, Vec::new());
         for event in events(&self.text) {
@@ -97,7 +95,7 @@ impl Page {
         self.headings.iter().filter(|heading| heading.level == 2)
     }
 
-    /// Renders the page as HTML. A link to one of `pages` leads to that page; of a link to another file of
+    /// Renders the page as HTML. A link to one of `pages` leads to this page in the file. Of a link to another file of
     /// the project only the text is kept.
     pub fn html(&self, root: &Path, pages: &[Page], all: &mut Gathered) -> Markup {
         let mut headings = self.headings.iter();
@@ -138,7 +136,7 @@ impl Page {
             Event::End(TagEnd::Table) => Some(Event::Html("</tbody></table></div>\n".into())),
             Event::InlineMath(latex) => Some(Event::InlineHtml(self.equation(&latex, false, all))),
             Event::DisplayMath(latex) => Some(Event::InlineHtml(self.equation(&latex, true, all))),
-            // Comments for people who edit the page.
+            // Comments are meant for people who edit the page.
             Event::Html(text) if text.trim_start().starts_with("<!--") => None,
             other => Some(other),
         });
@@ -147,8 +145,8 @@ impl Page {
         PreEscaped(page)
     }
 
-    /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error is a
-    /// broken link.
+    /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error means that the
+    /// target does not exist.
     fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>> {
         if link.contains("://") {
             return Ok(None);
@@ -181,7 +179,7 @@ impl Page {
         let events = events.into_iter().map(Ok::<_, Infallible>);
         // Writing to a String cannot fail.
         let _ = pulldown_latex::push_mathml(&mut mathml, events, config);
-        // Corrects a fault of pulldown-latex 0.8.0: a space counts as the base of a script.
+        // works around a fault of pulldown-latex 0.8.0, which treats a space as the base of a superscript
         if ["<msup><mspace", "<msub><mspace", "&amp;nbsp;"]
             .iter()
             .any(|wrong| mathml.contains(wrong))

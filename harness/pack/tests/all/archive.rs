@@ -72,7 +72,7 @@ fn the_sbom_of_an_fmu_lists_the_linked_crates_and_has_no_dangling_reference() {
     for name in [HUBSLOSH.package, "plant", "libm", "std", "gimli"] {
         assert!(names.contains(name), "{name} is not in {names:?}");
     }
-    // the harness's own crates are not in the FMU
+    // Crates that only the harness uses are not in the FMU.
     assert!(!names.contains("zip") && !names.contains("clap"));
     let references: BTreeSet<&str> = parts.iter().map(|p| p["bom-ref"].as_str().unwrap()).collect();
     assert_eq!(references.len(), parts.len(), "references are unique");
@@ -107,6 +107,6 @@ fn an_fmu_packed_from_a_binary_a_description_and_a_folder_contains_only_these_fi
 fn an_fmu_2_has_its_icon_and_no_terminals_of_fmi_3() {
     let files = files();
     assert_eq!(files["model.png"][..8], *b"\x89PNG\r\n\x1a\n");
-    // FMI Library 3.0.4 and newer log terminalsAndIcons.xml in an FMU 2.0 as fatal
+    // FMI Library 3.0.4 and newer log a fatal error if an FMU 2.0 contains terminalsAndIcons.xml.
     assert!(!files.keys().any(|name| name.starts_with("terminalsAndIcons")));
 }

@@ -1,4 +1,4 @@
-//! The packed FMU, the documentation and the release as files.
+//! Tests of the packed FMU, the documentation and the release as files.
 
 mod archive;
 mod documentation;

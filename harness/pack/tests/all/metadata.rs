@@ -1,4 +1,4 @@
-//! Statements about the project outside of Cargo.toml agree with Cargo.toml.
+//! Statements about the project in other files agree with Cargo.toml.
 
 use pack::metadata::{self, REPOSITORY, VERSION};
 use pack::root;
@@ -46,7 +46,7 @@ fn the_package_index_shows_readme_with_absolute_links() {
     let (head, body) = text.split_once("\n\n").unwrap();
     assert!(head.contains(&format!("\nProject-URL: Source, {REPOSITORY}\n")), "{head}");
     assert!(body.starts_with("# HubSlosh\n"), "{body}");
-    // every link and picture is absolute, or leads to a heading of the page
+    // Every link and picture is absolute, or leads to a heading of the page.
     for target in body.match_indices("](").map(|(place, _)| &body[place + 2..]) {
         let to = target.split([')', ' ']).next().unwrap_or_default();
         assert!(to.starts_with("https://") || to.starts_with('#'), "{to}");

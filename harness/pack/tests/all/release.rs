@@ -1,5 +1,4 @@
-//! The FMUs released in dist/release are whole, and of this source as long as they bear this
-//! version.
+//! The released FMUs in dist/release are complete. As long as they have the version in Cargo.toml, they belong to this source.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -10,8 +9,8 @@ use host::binary::Binary;
 use pack::platforms::{PLATFORMS, Platform};
 use pack::{Fmi, MODELS, Model, release};
 
-/// Returns the committed FMUs of this version. Between a new version's number and its release there are none;
-/// the files of an older version must then exist.
+/// Returns the committed FMUs of this version. After the version in Cargo.toml has changed and before the release is
+/// made, there are none; then the files of an older version must exist.
 fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
     let of = |model| Fmi::ALL.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
@@ -200,7 +199,7 @@ fn release_is_small_and_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in released() {
         let mut processors = 0;
         for Platform { folder, ending, .. } in &PLATFORMS {
-            // FMI 2.0 has one folder for both processors of macOS
+            // FMI 2.0 has one folder for both processors of macOS.
             for folder in fmi.folders(folder) {
                 let binary = format!("binaries/{folder}/{name}{ending}");
                 let binary = Binary::read(&release::read(&fmu, &binary).unwrap()).unwrap();
@@ -208,8 +207,8 @@ fn release_is_small_and_for_all_platforms() {
             }
         }
         let size = fmu.metadata().unwrap().len();
-        // Code for one processor takes 530 to 750 kB since 0.4.0, whose libraries have the functions of both versions of FMI, and
-        // Spacecraft's the modes of tanks without axial symmetry; before it were 410 to 520 kB.
+        // Code for one processor has 530 to 750 kB since 0.4.0, whose libraries contain the functions of both versions
+        // of FMI, and Spacecraft's also the modes of tanks without axial symmetry. Before 0.4.0 it had 410 to 520 kB.
         let limit = 800_000 * processors;
         assert!(size < limit, "{}: {size} bytes of {limit}", fmu.display());
     }
