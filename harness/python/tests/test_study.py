@@ -310,7 +310,9 @@ def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_
                 msvcrt.locking(lock.fileno(), msvcrt.LK_NBLCK, 1)
             else:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            says(False, rf"is in use by another {kind}: process \d+, .*, for \d+ s; wait for its end")
+            says(
+                False, rf"is in use by another {kind}: process \d+, .*, for \d+ s; wait for its end"
+            )
         says(True)
         changed = "re-running .*: the SHA-256 of the file differs from the one in manifest.sha256"
         for data in (whole[: len(whole) // 2], b"", whole + b" "):

@@ -1,12 +1,12 @@
 // Draws a bench or a spacecraft with its tanks, the liquid in them, pendulums, forces and torques.
 //
-// HubSloshScene.create(element, geometry, options) makes a picture that fills `element`; `show(state)` draws an instant.
-// README.md beside this file says what both hold. SI units; z points up along the bearing's axis or the thrust.
-// Needs the bundle of three.js (../three) as the global THREE.
+// `HubSloshScene.create(element, geometry, options)` makes a picture that fills `element`, and `show(state)` draws one
+// instant. README.md in this folder describes the keys of `geometry` and `state`. All values are in SI units, and z
+// points up along the bearing's axis or the thrust. The file needs the bundle of three.js (../three) as the global THREE.
 globalThis.HubSloshScene = (() => {
   "use strict";
 
-  // Zeros of J1', and J1 by its power series, which has every digit of a picture up to the tenth zero at 31.
+  // The zeros of J1' and a function for J1. Its power series is exact enough for a picture up to the tenth zero, at 31.
   const XI = [1.8411837813, 5.3314427735, 8.5363163664, 11.7060049026, 14.8635886339, 18.0155278627, 21.1643698592, 24.3113268572, 27.4570505711, 30.601922973];
   function j1(x) {
     let term = x / 2, sum = term;
@@ -22,19 +22,20 @@ globalThis.HubSloshScene = (() => {
     light: { paper: "#ffffff", ink: "#1b1f24", soft: "#59636e", line: "#c3cad1", glass: "#59636e", liquid: "#2a86d1", surface: "#3f9be6", bob: "#c2410c", body: "#7d8894", hub: "#aeb7c0", metal: "#8d98a3" },
     dark: { paper: "#14181d", ink: "#e6eaee", soft: "#9aa5b1", line: "#3a444f", glass: "#b8c2cc", liquid: "#2f8fe0", surface: "#58adf2", bob: "#ff9d5c", body: "#93a0ad", hub: "#5b6772", metal: "#75828e" },
   };
-  // For arrows without a colour of their own and for a page's curves: Okabe and Ito's, each at 3:1 on its background.
+  // Colours for arrows that have none of their own and for the curves of a page. They follow Okabe and Ito, and each
+  // has a contrast of 3:1 with its background.
   const ARROWS = { light: ["#b84a00", "#0072b2", "#00805d", "#a8527f", "#6d4fb3", "#8a6a00"], dark: ["#ff8a4c", "#56b4e9", "#2fd0a3", "#e79ac4", "#b79cf0", "#f0c24b"] };
-  const AROUND = 64, RINGS = 16, WALL = 40; // at least so many rings; eight for every mode
+  const AROUND = 64, RINGS = 16, WALL = 40; // RINGS is the least number of rings; a tank has at least eight for every mode
 
-  // An upright cylinder's contour from the axis along the bottom and up the wall, (r, z), m.
+  // Returns the contour of an upright cylinder as points (r, z), m, from the axis along the bottom and up the wall.
   const cylinder = (radius, bottom, top) => [[0, bottom], [radius, bottom], [radius, top]];
-  // A sphere's.
+  // Returns the contour of a sphere in the same form.
   const sphere = (radius, z) => Array.from({ length: 49 }, (_, i) => {
     const a = -Math.PI / 2 + (Math.PI * i) / 48;
     return [Math.max(0, radius * Math.cos(a)), z + radius * Math.sin(a)];
   });
 
-  // More points on a contour's straight lines, so that a liquid's edge has where to end.
+  // Adds points on the straight lines of a contour, so that the edge of the liquid can end close to any height.
   function refine(contour) {
     const length = contour.slice(1).reduce((sum, p, i) => sum + Math.hypot(p[0] - contour[i][0], p[1] - contour[i][1]), 0);
     const fine = [contour[0]];
@@ -45,7 +46,8 @@ globalThis.HubSloshScene = (() => {
     return fine;
   }
 
-  // A contour's radius at the height z, going up from its lowest point: along the outer wall or, if there is one, the inner.
+  // Returns functions that give a contour's radius at a height z: of the outer wall and, if there is one, of the inner
+  // wall. Both are searched upwards from the contour's lowest point.
   function wall(contour) {
     const low = contour.reduce((best, p, i) => (p[1] <= contour[best][1] ? i : best), 0);
     const outer = contour.slice(low), inner = contour.slice(0, low + 1).reverse();
@@ -64,7 +66,8 @@ globalThis.HubSloshScene = (() => {
     };
   }
 
-  // The nth mode's surface along the radius, from the axis or the inner wall at s = s0 to the outer wall at s = 1, 1 there.
+  // Returns the shape of the nth mode's surface along the radius. The coordinate s goes from s0 (the axis or the inner
+  // wall) to 1 at the outer wall, where the shape is 1.
   function alongRadius(mode, shape, n, s0) {
     if (shape) {
       const last = shape.length - 1;
@@ -79,7 +82,7 @@ globalThis.HubSloshScene = (() => {
 
   const angle = (component) => Math.asin(Math.max(-1, Math.min(1, component)));
 
-  // A tank: glass, liquid, pendulums. `draw(state, exaggeration)` moves them.
+  // A tank with its glass, its liquid and its pendulums. `draw(state, exaggeration)` moves the liquid and the pendulums.
   class Tank {
     constructor(data, size) {
       this.data = data;
@@ -113,9 +116,9 @@ globalThis.HubSloshScene = (() => {
       this.low = wall(this.contour).low;
       this.extent = Math.max(...contour.map((p) => p[0]));
       const lathe = new THREE.Mesh(new THREE.LatheGeometry(contour.map((p) => new THREE.Vector2(p[0], p[1])), AROUND), this.glass);
-      lathe.rotation.x = Math.PI / 2; // from around y to around z
+      lathe.rotation.x = Math.PI / 2; // the lathe turns around y, the tank around z
       this.group.add(lathe);
-      // circles where the contour has a corner or ends
+      // Circles show where the contour has a corner or ends.
       const corners = contour.filter((p, i) => p[0] > 0 && (i === 0 || i === contour.length - 1 || turn(contour[i - 1], p, contour[i + 1]) > 0.35));
       const widest = contour.reduce((a, b) => (b[0] > a[0] ? b : a));
       for (const [r, z] of [...corners, widest]) this.group.add(circle(r, z, this.edge));
@@ -159,7 +162,7 @@ globalThis.HubSloshScene = (() => {
       const surface = this.surface.geometry.attributes.position, body = this.body.geometry.attributes.position;
       const rim = this.rim.geometry.attributes.position, rings = this.rings;
       const hollow = this.wall.inner(level) > 0, s0 = hollow ? this.wall.inner(level) / this.wall.outer(level) : 0;
-      // every mode's elevation per angle on each ring, m/rad
+      // The elevation of every mode per slosh angle on each ring, m/rad.
       const eta = this.data.modes.map((mode, n) => {
         const along = alongRadius(mode, modes?.[n].shape ?? mode.shape, n, s0);
         return Array.from({ length: rings + 1 }, (_, k) => mode.wave * along(s0 + ((1 - s0) * k) / rings));
@@ -186,7 +189,8 @@ globalThis.HubSloshScene = (() => {
 
     drawBox() {
       const [a, b] = this.data.shape.box, surface = this.surface.geometry.attributes.position, body = this.body.geometry.attributes.position, rings = this.rings;
-      // the modes of a box along each side, each side with a count of its own: sin((2n - 1) pi x/a), 1 at the wall
+      // The modes of a box along each side are sin((2n - 1) pi x/a), with sign so that they are 1 at the wall. Each
+      // side counts its own modes.
       const eta = (x, y) => this.angles.reduce((sum, [ax, ay], n) => {
         const order = this.data.modes[n].order ?? n, odd = 2 * order + 1, sign = order % 2 ? -1 : 1;
         return sum + sign * this.data.modes[n].wave * (ax * Math.sin((odd * Math.PI * x) / a) + ay * Math.sin((odd * Math.PI * y) / b));
@@ -210,7 +214,7 @@ globalThis.HubSloshScene = (() => {
       this.wet.color.set(colors.liquid);
       this.top.color.set(colors.surface);
       this.metal.color.set(colors.bob);
-      this.metal.emissive.set(colors.bob).multiplyScalar(0.45); // seen through the liquid
+      this.metal.emissive.set(colors.bob).multiplyScalar(0.45); // so that the bobs are visible through the liquid
       this.rod.color.set(colors.ink);
     }
   }
@@ -229,7 +233,7 @@ globalThis.HubSloshScene = (() => {
     return new THREE.LineLoop(new THREE.BufferGeometry().setFromPoints(points), material);
   }
 
-  // A mesh of `columns` by `rows` vertices, to be moved.
+  // Makes a mesh of `columns` by `rows` vertices whose positions are set later.
   function grid(columns, rows, material) {
     const geometry = new THREE.BufferGeometry(), index = [];
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * columns * rows), 3));
@@ -243,7 +247,7 @@ globalThis.HubSloshScene = (() => {
     return mesh;
   }
 
-  // A straight arrow along a vector; a torque has two heads, along its axis by the right-hand rule.
+  // A straight arrow along a vector. A torque's arrow lies along its axis by the right-hand rule and has two heads.
   class Arrow {
     constructor(data, size) {
       this.group = new THREE.Group();
@@ -273,7 +277,7 @@ globalThis.HubSloshScene = (() => {
     }
   }
 
-  // A torque about z as an arc around the axis, from the direction `from` (rad) on.
+  // An arc around the z axis that shows a torque about it. It begins at the direction `from`, rad.
   class Arc {
     constructor(data, size) {
       this.data = data;
@@ -286,7 +290,7 @@ globalThis.HubSloshScene = (() => {
       this.group.add(this.tube, this.head);
     }
 
-    // `turn`: the angle that it covers, rad, with its sign
+    // `turn` is the angle that the arc covers, rad, with its sign.
     draw(turn) {
       const { radius, from } = this.data.arc, thick = this.thick;
       this.group.visible = Math.abs(turn) > 0.01;
@@ -308,13 +312,14 @@ globalThis.HubSloshScene = (() => {
     }
   }
 
-  // The bench: a fixed base with marks every 30 degrees; the platform that turns with the tank; the wheel on the axis.
+  // Draws the bench: a fixed base with marks every 30 degrees, the platform that turns with the tank, and the
+  // wheel on the axis.
   function bench({ reach, wheel, arm, below }, root, fixed, paint) {
     const hub = paint(new THREE.MeshLambertMaterial(), "hub"), metal = paint(new THREE.MeshLambertMaterial(), "metal");
     const line = paint(new THREE.LineBasicMaterial(), "soft");
     const upright = (mesh, z) => { mesh.rotation.x = Math.PI / 2; mesh.position.z = z; return mesh; };
     const thick = 0.05 * reach, plate = 0.42 * reach;
-    // an arm from the axis to the tank and a round plate under both
+    // The platform is an arm from the axis to the tank with a round plate under both ends.
     root.add(upright(new THREE.Mesh(new THREE.CylinderGeometry(plate, plate, thick, 64), hub), -thick / 2 - 1e-3 * reach));
     const beam = new THREE.Mesh(new THREE.BoxGeometry(arm.length, arm.width, thick), hub);
     beam.position.set(arm.length / 2, 0, -thick / 2 - 1e-3 * reach);
@@ -332,13 +337,13 @@ globalThis.HubSloshScene = (() => {
       for (const r of [inner * reach, 0.8 * reach]) marks.push(new THREE.Vector3(r * Math.cos(a), r * Math.sin(a), z));
     }
     fixed.add(circle(0.8 * reach, z, line), circle(0.3 * reach, z, line), new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(marks), line));
-    // where the tank points to on the ground
+    // A line on the base shows the direction in which the tank points.
     const pointer = new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(0.3 * reach, 0, z), new THREE.Vector3(0.78 * reach, 0, z)]), paint(new THREE.LineBasicMaterial(), "bob"));
     root.add(pointer);
     return rotor;
   }
 
-  // A craft: a box and its axes, in front of the directions that do not turn.
+  // Draws a craft: a box and its axes, in front of a graticule of directions that do not turn.
   function craft({ size, center }, root, fixed, paint, reach) {
     const line = paint(new THREE.LineBasicMaterial(), "body");
     if (size) {
@@ -410,7 +415,7 @@ globalThis.HubSloshScene = (() => {
     const tanks = geometry.tanks.map((data) => new Tank(data, reach));
     tanks.forEach((tank) => root.add(tank.group));
 
-    // axes of the body, with letters
+    // The axes of the body have letters.
     const letters = [];
     if (geometry.axes) {
       const length = geometry.axes.length, at = new THREE.Vector3().fromArray(geometry.axes.at || [0, 0, 0]);
@@ -466,12 +471,13 @@ globalThis.HubSloshScene = (() => {
     let width = 0, height = 0, asked = false, state = null, exaggeration = options.exaggeration ?? 1, frame = options.frame || "inertial";
     const dark = matchMedia("(prefers-color-scheme: dark)");
 
-    // What is left of the height below the legend, where the picture is too narrow to have it at its side.
+    // Height in pixels that the legend leaves for the picture. In a narrow element the picture is below the legend
+    // instead of beside it.
     const NARROW = 600;
     let below = 0;
     const part = () => Math.min(width, below) / Math.max(height, 1);
 
-    // All of it in the picture, whatever its shape.
+    // Moves the camera so that the whole scene is in the picture, whatever the picture's proportions.
     function home() {
       const half = (camera.fov * Math.PI) / 360;
       const distance = (geometry.radius || reach) / Math.sin(Math.atan(Math.tan(half) * Math.min(1, part())));
@@ -485,12 +491,12 @@ globalThis.HubSloshScene = (() => {
       if (!w || !h || (w === width && h === height)) return;
       const first = !width, before = Math.min(1, part());
       [width, height] = [w, h];
-      // no less than half: a legend of many lines is not all there is to see
+      // The picture keeps at least half of the height even if the legend has many lines.
       below = w < NARROW ? Math.max(h - legend.offsetTop - legend.offsetHeight, h / 2) : h;
       renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
       renderer.setSize(w, h, false);
       camera.aspect = w / h;
-      // updates the projection
+      // This also updates the camera's projection.
       camera.setViewOffset(w, h, 0, (below - h) / 2, w, h);
       if (first) home();
       else camera.position.sub(controls.target).multiplyScalar(before / Math.min(1, part())).add(controls.target);
@@ -584,19 +590,19 @@ globalThis.HubSloshScene = (() => {
 
     return {
       canvas,
-      // Draws an instant, at once.
+      // Draws one instant immediately.
       show(next) { state = next; apply(); draw(); },
       set exaggeration(value) { exaggeration = value; if (state) { apply(); request(); } },
       get exaggeration() { return exaggeration; },
-      // "inertial": the craft turns before what stands still; "body": the other way round.
+      // With "inertial" the craft turns and the directions stand still, with "body" it is the other way round.
       set frame(value) { frame = value; if (state) { apply(); request(); } },
       get frame() { return frame; },
       home() { home(); request(); },
-      // Colours of the arrows by name, so that a curve of the same quantity can have the same colour.
+      // The colours of the arrows by name, with which a page can draw the curve of the same quantity in the same colour.
       colors: shownColors,
-      // What is drawn, read back from its meshes: of each tank and mode hinge and bob in the body's frame, m; the surface above the
-      // tank's x axis and y axis from the axis or inner wall outwards, (r, elevation), m, exaggerated as it is drawn, and its ends
-      // at the wall.
+      // Returns what is drawn, read from the meshes. For each tank and mode these are hinge and bob in the body's
+      // frame, m. The surface above the tank's x axis and y axis is given as points (r, elevation), m, from the axis or
+      // the inner wall outwards. Its elevation is exaggerated as in the picture, and its ends are those at the wall.
       read() {
         scene.updateMatrixWorld(true);
         const inBody = (mesh) => root.worldToLocal(mesh.getWorldPosition(new THREE.Vector3())).toArray();

@@ -1,4 +1,4 @@
-// What scene.js uses of three.js; the bundle holds this and what it needs.
+// The names of three.js that scene.js uses. The bundle contains them and whatever they need.
 export {
   AmbientLight,
   BoxGeometry,

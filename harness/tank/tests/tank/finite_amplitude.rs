@@ -279,7 +279,7 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
 #[test]
 fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
     let at = |fill: f64| found("shape = { sphere = { radius = 1.0 } }", fill);
-    let beside = [1.07, 1.3].map(|fill| at(fill).pendulum_limit.unwrap().to_degrees());
+    let neighbours = [1.07, 1.3].map(|fill| at(fill).pendulum_limit.unwrap().to_degrees());
     let mut refused = 0;
     for i in 0..=16 {
         let fill = 1.1 + 0.01 * f64::from(i);
@@ -287,7 +287,7 @@ fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
         let limit = found.pendulum_limit.unwrap().to_degrees();
         println!("{fill:.2}: {limit:.2} {}", found.mode.is_none());
         refused += usize::from(found.mode.is_none());
-        assert!(limit > 0.0 && limit < beside[0].max(beside[1]), "{fill} {limit} {beside:?}");
+        assert!(limit > 0.0 && limit < neighbours[0].max(neighbours[1]), "{fill} {limit} {neighbours:?}");
     }
     assert!(refused > 8, "{refused}");
 }
@@ -671,7 +671,7 @@ fn compare_placed_tables(tanks: &[(&str, f64, f64)]) {
         let stated: f64 =
             note.split(" within ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         println!("{shape}: {worst:.1e}, stated {stated:.1e}");
-        // The largest error may lie beside the middle of an interval, where the table measures it.
+        // The table measures the error in the middle of an interval, but the largest error may be elsewhere in it.
         assert!(worst < 3.0 * stated + 1e-6 && stated < 0.01, "{shape}: {worst:e} {stated:e}");
     }
 }

@@ -175,7 +175,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
         found = std::array::from_fn(|k| found[k].max(off[k].abs()));
     }
     for (found, stated) in found.into_iter().zip(placed.between.error) {
-        // The stated error was measured at the middles of the intervals, and the true largest error may lie beside a middle.
+        // The stated error was measured in the middles of the intervals, but the largest error may be elsewhere in them.
         assert!((0.95..1.1).contains(&(found / stated)), "{found:e} {stated:e}");
         assert!(stated < 5e-3);
     }
