@@ -287,7 +287,10 @@ fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
         let limit = found.pendulum_limit.unwrap().to_degrees();
         println!("{fill:.2}: {limit:.2} {}", found.mode.is_none());
         refused += usize::from(found.mode.is_none());
-        assert!(limit > 0.0 && limit < neighbours[0].max(neighbours[1]), "{fill} {limit} {neighbours:?}");
+        assert!(
+            limit > 0.0 && limit < neighbours[0].max(neighbours[1]),
+            "{fill} {limit} {neighbours:?}"
+        );
     }
     assert!(refused > 8, "{refused}");
 }
