@@ -145,7 +145,7 @@ impl Run<'_> {
         }
     }
 
-    fn everything(&mut self) -> BTreeMap<Key, u64> {
+    fn all_values(&mut self) -> BTreeMap<Key, u64> {
         let mut all = BTreeMap::new();
         for v in self.opened.variables.iter().filter(|v| v.kind != "UInt64") {
             let keys = v.keys(&self.sizes);
@@ -284,7 +284,7 @@ fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
             let all = two.each_mut().map(|run| {
                 run.set(|key| input(case.model, &names, key, time));
                 run.instance.do_step(time, h).unwrap();
-                run.everything()
+                run.all_values()
             });
             assert_same(&all[0], &all[1], &format!("of {} at {time} s", case.model.name));
         }
@@ -331,7 +331,7 @@ fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicator
                 run.instance.event_indicators(&mut z).unwrap();
                 run.instance.nominals(&mut x).unwrap();
                 let z: Vec<u64> = z.iter().map(|z| z.to_bits()).collect();
-                (run.everything(), z, x.len())
+                (run.all_values(), z, x.len())
             });
             assert_same(&all[0].0, &all[1].0, &format!("of {} at {time} s", case.model.name));
             assert_eq!(all[0].1, all[1].1);
@@ -448,7 +448,7 @@ fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     three.resize("tank.modes", 3);
     three.initialise();
     three.instance.do_step(0.0, 0.1).unwrap();
-    let there = three.everything();
+    let there = three.all_values();
     let state = three.instance.get_state().unwrap();
     let bytes = three.instance.serialize(&state).unwrap();
     // restored in an instance of another size, which then gets the size of the state
@@ -456,11 +456,11 @@ fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let state = one.instance.deserialize(&bytes).unwrap();
     one.instance.set_state(&state).unwrap();
     one.sizes = three.sizes.clone();
-    assert_eq!(one.everything(), there);
+    assert_eq!(one.all_values(), there);
     for run in [&mut one, &mut three] {
         run.instance.do_step(0.1, 0.1).unwrap();
     }
-    assert_eq!(one.everything(), three.everything());
+    assert_eq!(one.all_values(), three.all_values());
     let mut other = opened[1].instance(Interface::CoSimulation);
     let (status, text) = refusal(other.instance.deserialize(&bytes));
     assert_eq!(status, Status::Error);
@@ -740,7 +740,7 @@ fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
                     let mut z = vec![0.0; run.instance.number_of_indicators().unwrap()];
                     run.instance.event_indicators(&mut z).unwrap();
                 }
-                run.everything()
+                run.all_values()
             });
             assert_same(&all[0], &all[1], &format!("at {time} s"));
         }

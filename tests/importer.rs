@@ -32,7 +32,7 @@ fn start(instance: &mut impl Common, fmu: &Fmu) {
     Common::exit_initialization_mode(instance).unwrap();
 }
 
-fn started<'fmu>(fmu: &'fmu Fmu, kind: i32) -> Instance<'fmu> {
+fn start_instance<'fmu>(fmu: &'fmu Fmu, kind: i32) -> Instance<'fmu> {
     let mut with = fmu.instantiation("ours");
     with.kind = kind;
     let mut instance = fmu.instantiate_with(&with).unwrap();
@@ -58,7 +58,7 @@ fn the_importer_crate_fmi_gets_bit_identical_outputs_in_co_simulation() {
     let mut theirs = import.instantiate_cs("theirs", false, true).unwrap();
     assert_eq!(theirs.get_types_platform(), "default");
     start(&mut theirs, &fmu);
-    let mut ours = started(&fmu, host::fmi2::CO_SIMULATION);
+    let mut ours = start_instance(&fmu, host::fmi2::CO_SIMULATION);
     let outputs = TABLE.scalars.iter().filter(|s| s.variable.causality == Causality::Output);
     let names: Vec<String> = outputs.map(|s| s.name()).collect();
     let outputs = references(&fmu, &names.iter().map(String::as_str).collect::<Vec<_>>());
@@ -106,7 +106,7 @@ fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let mut theirs = import.instantiate_me("theirs", false, true).unwrap();
     start(&mut theirs, &fmu);
-    let mut ours = started(&fmu, MODEL_EXCHANGE);
+    let mut ours = start_instance(&fmu, MODEL_EXCHANGE);
     let mut flags = EventFlags::default();
     theirs.new_discrete_states(&mut flags).unwrap();
     ours.new_discrete_states().unwrap();
@@ -173,7 +173,7 @@ mod fmi3 {
     use pack::{Fmi, HUBSLOSH, MODELS, Model, packed_model_for_tests, packed_version_for_tests};
     use plant::{INDICATORS, STATES};
 
-    use super::{SPHERICAL, bits, started};
+    use super::{SPHERICAL, bits, start_instance};
 
     /// Imports the FMU with the crate fmi. It gets a copy of the description without units and nominal values of variables,
     /// because version 0.8 of the crate's schema does not know these attributes, which the standard defines (2.4.7.5).
@@ -213,7 +213,7 @@ mod fmi3 {
     }
 
     /// Enters and leaves event mode, in which nothing may happen.
-    fn handle(instance: &mut impl Common) {
+    fn pass_event_mode(instance: &mut impl Common) {
         let mut flags = EventFlags::default();
         instance.update_discrete_states(&mut flags).unwrap();
         assert!(!flags.discrete_states_need_update && !flags.terminate_simulation);
@@ -263,7 +263,7 @@ mod fmi3 {
                 Common::enter_initialization_mode(&mut theirs, None, 0.0, None).unwrap();
                 Common::exit_initialization_mode(&mut theirs).unwrap();
                 if event_mode {
-                    handle(&mut theirs);
+                    pass_event_mode(&mut theirs);
                     theirs.enter_step_mode().unwrap();
                 }
                 let mut returns = 0;
@@ -286,7 +286,7 @@ mod fmi3 {
                         assert!(!over && (event_mode || !event) && (early_return || !early));
                         if event {
                             theirs.enter_event_mode().unwrap();
-                            handle(&mut theirs);
+                            pass_event_mode(&mut theirs);
                             theirs.enter_step_mode().unwrap();
                         }
                         if !early {
@@ -316,7 +316,7 @@ mod fmi3 {
     fn the_importer_crate_fmi_gets_bit_identical_derivatives_from_fmi_3_and_fmi_2() {
         let (import, description) = import(HUBSLOSH);
         let two = host::fmi2::Fmu::open(packed_model_for_tests(HUBSLOSH)).unwrap();
-        let mut ours = started(&two, MODEL_EXCHANGE);
+        let mut ours = start_instance(&two, MODEL_EXCHANGE);
         let mut theirs = import.instantiate_me("theirs", false, true).unwrap();
         let names = super::START.map(|(name, _)| name);
         let values = super::START.map(|(_, value)| value);
@@ -325,7 +325,7 @@ mod fmi3 {
         theirs.set_int64(&model, &[SPHERICAL.into()]).unwrap();
         Common::enter_initialization_mode(&mut theirs, Some(1e-9), 0.0, Some(100.0)).unwrap();
         Common::exit_initialization_mode(&mut theirs).unwrap();
-        handle(&mut theirs);
+        pass_event_mode(&mut theirs);
         ours.new_discrete_states().unwrap();
         ModelExchange::enter_continuous_time_mode(&mut theirs).unwrap();
         ours.enter_continuous_time_mode().unwrap();
@@ -365,7 +365,7 @@ mod fmi3 {
             assert!(!end);
             if event {
                 Common::enter_event_mode(&mut theirs).unwrap();
-                handle(&mut theirs);
+                pass_event_mode(&mut theirs);
                 ModelExchange::enter_continuous_time_mode(&mut theirs).unwrap();
                 ours.enter_event_mode().unwrap();
                 ours.new_discrete_states().unwrap();

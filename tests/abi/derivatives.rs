@@ -75,7 +75,7 @@ impl Point<'_, '_> {
     }
 
     /// Returns the unknowns at the point whose knowns are moved by `s` in a direction.
-    fn at(&mut self, s: f64, direction: &[f64]) -> Vec<f64> {
+    fn unknowns_at(&mut self, s: f64, direction: &[f64]) -> Vec<f64> {
         let there: Vec<f64> = self.x.iter().zip(direction).map(|(x, d)| x + s * d).collect();
         self.go(&there, direction);
         let values = self.values();
@@ -170,7 +170,8 @@ impl Point<'_, '_> {
         let directions: Vec<Vec<f64>> = directions.chain([along]).collect();
         for (j, direction) in directions.iter().enumerate() {
             let forward = self.forward(direction);
-            let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|k| self.at(k * H, direction));
+            let [p2, p1, m1, m2] =
+                [2.0, 1.0, -1.0, -2.0].map(|k| self.unknowns_at(k * H, direction));
             let (mut by_differences, mut size) = (0.0, 0.0);
             let mut by_forward = 0.0;
             for i in 0..forward.len() {
@@ -220,7 +221,7 @@ fn exchange<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> (Instance<'f
     (instance, states)
 }
 
-fn stepped<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Instance<'fmu> {
+fn instance_after_step<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Instance<'fmu> {
     let mut instance = fmu.instantiate("one").unwrap();
     set(&mut instance, settings);
     instance.enter_initialization_mode(None, START, None).unwrap();
@@ -238,7 +239,7 @@ fn set(instance: &mut Instance, settings: &[(String, String)]) {
     }
 }
 
-fn between(rng: &mut Rng, low: f64, high: f64) -> f64 {
+fn uniform(rng: &mut Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.f64()
 }
 
@@ -268,7 +269,7 @@ fn check(
     let (mut instance, mut states) = exchange(fmu, settings);
     for (name, state) in names[sides.inputs..].iter().zip(&mut states) {
         let [low, high] = scatter(name);
-        *state += between(rng, low, high);
+        *state += uniform(rng, low, high);
     }
     instance.set_continuous_states(&states).unwrap();
     let what = format!("Model Exchange, {settings:?}");
@@ -279,7 +280,7 @@ fn check(
     let all: Vec<usize> = (0..x.len()).collect();
     Point { sides: &sides, instance, x, sizes: sizes.clone(), what }.check(rng, &all);
 
-    let mut instance = stepped(fmu, settings);
+    let mut instance = instance_after_step(fmu, settings);
     let mut x = vec![0.0; sides.knowns.len()];
     instance.get_numbers(&sides.knowns, &mut x).unwrap();
     let what = format!("Co-Simulation, {settings:?}");
@@ -318,13 +319,13 @@ fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_sti
                 setting("friction.model", friction),
                 // With the default of 1e-5 the friction curve bends within a range that differences cannot resolve.
                 setting("friction.eps", 0.05),
-                setting("friction.forward_cos1", between(&mut rng, -0.2, 0.2)),
-                setting("friction.asymmetry", between(&mut rng, -0.2, 0.2)),
+                setting("friction.forward_cos1", uniform(&mut rng, -0.2, 0.2)),
+                setting("friction.asymmetry", uniform(&mut rng, -0.2, 0.2)),
                 setting("init.omega", if is_stuck { 0.0 } else { 0.2 }),
                 setting("init.slosh_angle", if is_stuck { 1e-3 } else { 0.1 }),
-                setting("tau_cmd", between(&mut rng, -torque, torque)),
-                setting("tau_ext", between(&mut rng, -torque, torque)),
-                setting("g_axial", between(&mut rng, 5.0, 20.0)),
+                setting("tau_cmd", uniform(&mut rng, -torque, torque)),
+                setting("tau_ext", uniform(&mut rng, -torque, torque)),
+                setting("g_axial", uniform(&mut rng, 5.0, 20.0)),
                 setting("wheel.enabled", wheel != "none"),
             ];
             // The torque of the wheel on the hub must stay below the limit of the friction.
@@ -386,20 +387,20 @@ fn adjoint_and_directional_derivatives_of_spacecraft_equal_differences() {
         for i in 1..=3 {
             settings.push(setting(format!("gravity[{i}]"), [0.3, -0.2, -9.8][i - 1]));
             settings.push(setting(format!("force[{i}]"), [100.0, -50.0, 2400.0][i - 1]));
-            settings.push(setting(format!("torque[{i}]"), between(&mut rng, -20.0, 20.0)));
-            settings.push(setting(format!("h_wheels[{i}]"), between(&mut rng, -5.0, 5.0)));
-            settings.push(setting(format!("init.omega[{i}]"), between(&mut rng, -0.2, 0.2)));
+            settings.push(setting(format!("torque[{i}]"), uniform(&mut rng, -20.0, 20.0)));
+            settings.push(setting(format!("h_wheels[{i}]"), uniform(&mut rng, -5.0, 5.0)));
+            settings.push(setting(format!("init.omega[{i}]"), uniform(&mut rng, -0.2, 0.2)));
         }
         for tank in 1..=tanks {
             settings.push(setting(format!("tank[{tank}].modes"), modes));
             settings.push(setting(format!("tank[{tank}].damping_law"), "constant"));
             for i in 1..=3 {
                 let name = format!("tank[{tank}].position[{i}]");
-                settings.push(setting(name, between(&mut rng, -0.6, 0.6)));
+                settings.push(setting(name, uniform(&mut rng, -0.6, 0.6)));
                 for mode in 1..=modes {
-                    let p = if i == 3 { -1.0 } else { between(&mut rng, -0.3, 0.3) };
+                    let p = if i == 3 { -1.0 } else { uniform(&mut rng, -0.3, 0.3) };
                     settings.push(setting(format!("tank[{tank}].p_0[{mode},{i}]"), p));
-                    let rate = between(&mut rng, -0.5, 0.5);
+                    let rate = uniform(&mut rng, -0.5, 0.5);
                     settings.push(setting(format!("tank[{tank}].p_dot_0[{mode},{i}]"), rate));
                 }
             }
@@ -429,13 +430,13 @@ fn adjoint_and_directional_derivatives_of_sloshtank_equal_differences() {
         settings.push(setting("tank.damping_law", "constant"));
         for i in 1..=3 {
             settings.push(setting(format!("a[{i}]"), [0.3, -0.2, 1.5][i - 1]));
-            settings.push(setting(format!("omega[{i}]"), between(&mut rng, -0.3, 0.3)));
-            settings.push(setting(format!("omega_dot[{i}]"), between(&mut rng, -0.1, 0.1)));
-            settings.push(setting(format!("tank.position[{i}]"), between(&mut rng, -0.6, 0.6)));
+            settings.push(setting(format!("omega[{i}]"), uniform(&mut rng, -0.3, 0.3)));
+            settings.push(setting(format!("omega_dot[{i}]"), uniform(&mut rng, -0.1, 0.1)));
+            settings.push(setting(format!("tank.position[{i}]"), uniform(&mut rng, -0.6, 0.6)));
             for mode in 1..=modes {
-                let p = if i == 3 { -1.0 } else { between(&mut rng, -0.3, 0.3) };
+                let p = if i == 3 { -1.0 } else { uniform(&mut rng, -0.3, 0.3) };
                 settings.push(setting(format!("tank.p_0[{mode},{i}]"), p));
-                let rate = between(&mut rng, -0.5, 0.5);
+                let rate = uniform(&mut rng, -0.5, 0.5);
                 settings.push(setting(format!("tank.p_dot_0[{mode},{i}]"), rate));
             }
         }

@@ -56,7 +56,7 @@ fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Ve
 }
 
 /// Lists other values for a parameter. The test uses the first one that the FMU accepts.
-fn others<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
+fn other_values<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
     match (value, scalar.variable.kind) {
         (Value::Boolean(b), _) => vec![Value::Boolean(!b)],
         (Value::Integer(n), Kind::Enumeration(of)) => {
@@ -90,7 +90,7 @@ fn check<M: Model>(base: Values) {
         }
         let set = base.iter().find(|(s, _)| s.index == scalar.index).map(|(_, value)| *value);
         let Some(value) = set.or_else(|| scalar.start()) else { continue };
-        for other in others(scalar, value) {
+        for other in other_values(scalar, value) {
             let mut values = base.clone();
             values.retain(|(s, _)| s.index != scalar.index);
             values.push((scalar, other));

@@ -12,7 +12,7 @@ use runtime::snapshot::{size, to_bytes};
 use runtime::v2::{GET_BOOLEAN, GET_INTEGER, GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
 use runtime::variable::{Access, Causality, Kind, Value};
 
-fn fresh() -> Instance {
+fn new_instance() -> Instance {
     HubSlosh::instance(Interface::CoSimulation)
 }
 
@@ -68,7 +68,7 @@ fn all(instance: &mut Instance) -> Vec<u64> {
 }
 
 fn stepping_from(start: f64, stop: Option<f64>, values: &[(&str, Value)]) -> Instance {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(&mut instance, values);
     instance.setup_experiment(None, start, stop).unwrap();
     instance.enter_initialization_mode().unwrap();
@@ -84,7 +84,7 @@ const fn number(n: i32) -> Value {
     Value::Integer(n)
 }
 
-fn lively(slosh_model: i32, friction_model: i32) -> Instance {
+fn moving_instance(slosh_model: i32, friction_model: i32) -> Instance {
     stepping(&[
         ("slosh.model", number(slosh_model)),
         ("friction.model", number(friction_model)),
@@ -100,7 +100,7 @@ fn lively(slosh_model: i32, friction_model: i32) -> Instance {
 
 #[test]
 fn calls_are_refused_in_the_wrong_state_and_change_nothing() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     let before = to_bytes(&instance);
     assert!(instance.exit_initialization_mode().is_err());
     assert!(instance.do_step(0.0, 0.1).is_err());
@@ -126,7 +126,7 @@ fn calls_are_refused_in_the_wrong_state_and_change_nothing() {
 
 #[test]
 fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization_mode() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(&mut instance, &[("tank.h", Value::Real(0.06)), ("tau_cmd", Value::Real(0.01))]);
     instance.setup_experiment(None, 0.0, None).unwrap();
     set(&mut instance, &[("tank.h", Value::Real(0.07)), ("tau_cmd", Value::Real(0.02))]);
@@ -141,7 +141,7 @@ fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization
 /// The natural frequency is computed with the specific force at the end of the initialization.
 #[test]
 fn inputs_set_in_initialization_mode_count_from_the_start() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     instance.enter_initialization_mode().unwrap();
     let on_earth = real(&mut instance, "slosh.frequency[1]");
     set(&mut instance, &[("g_axial", Value::Real(9.81 / 4.0))]);
@@ -153,7 +153,7 @@ fn inputs_set_in_initialization_mode_count_from_the_start() {
 
 #[test]
 fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(
         &mut instance,
         &[
@@ -195,7 +195,7 @@ fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
 
 #[test]
 fn parameters_that_contradict_each_other_are_reported() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(&mut instance, &[("wheel.speed_min", Value::Real(1e4))]);
     instance.enter_initialization_mode().unwrap();
     let fault = instance.exit_initialization_mode().unwrap_err();
@@ -235,7 +235,7 @@ fn unknown_and_mistyped_references_are_refused_with_name_and_type() {
 
 #[test]
 fn an_experiment_with_wrong_times_is_refused() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     let before = to_bytes(&instance);
     assert!(instance.setup_experiment(None, f64::NAN, None).is_err());
     assert!(instance.setup_experiment(None, 1.0, Some(0.0)).is_err());
@@ -331,8 +331,8 @@ fn the_axial_specific_force_may_fall_to_zero_but_not_below() {
 
 #[test]
 fn a_reset_instance_equals_a_new_one() {
-    let expected = to_bytes(&fresh());
-    let mut instance = lively(4, 4);
+    let expected = to_bytes(&new_instance());
+    let mut instance = moving_instance(4, 4);
     instance.do_step(0.0, 0.5).unwrap();
     instance.reset().unwrap();
     assert_eq!(to_bytes(&instance), expected);
@@ -366,14 +366,14 @@ fn after_a_panic_every_call_is_fatal() {
     assert_eq!(instance.do_step(0.0, 1.0).unwrap_err().severity, Severity::Fatal);
     assert_eq!(instance.reset().unwrap_err().severity, Severity::Fatal);
     assert_eq!(instance.get(&GET_REAL, 0).unwrap_err().severity, Severity::Fatal);
-    assert_eq!(instance.restore(&fresh()).unwrap_err().severity, Severity::Fatal);
+    assert_eq!(instance.restore(&new_instance()).unwrap_err().severity, Severity::Fatal);
 }
 
 #[test]
 fn a_restored_state_continues_bit_identically() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
-            let mut original = lively(slosh_model, friction_model);
+            let mut original = moving_instance(slosh_model, friction_model);
             original.do_step(0.0, 0.777).unwrap();
             original.set_input_derivatives(&[reference("tau_cmd")], &[1], &[-0.3]).unwrap();
             let saved = original.clone();
@@ -385,7 +385,7 @@ fn a_restored_state_continues_bit_identically() {
             assert_ne!(here, there);
 
             original.restore(&saved).unwrap();
-            let mut other = fresh();
+            let mut other = new_instance();
             other.restore(&from_bytes(&bytes).unwrap()).unwrap();
             for instance in [&mut original, &mut other] {
                 assert_eq!(all(instance), here, "slosh {slosh_model}, friction {friction_model}");
@@ -454,7 +454,7 @@ fn rollback_is_exact_in_a_thousand_random_sequences() {
         instance.restore(&read).unwrap();
         assert!(to_bytes(&instance) == saved, "slosh model {slosh}, law {law}");
         assert!(run(&mut instance) == first, "slosh model {slosh}, law {law}");
-        let mut other = fresh();
+        let mut other = new_instance();
         other.restore(&read).unwrap();
         assert!(run(&mut other) == first, "slosh model {slosh}, law {law}, another instance");
     }
@@ -520,13 +520,13 @@ fn random_calls_never_panic() {
 /// Their instance state and their bytes are then equal.
 #[test]
 fn a_state_can_be_saved_in_every_instance_state() {
-    let mut initializing = fresh();
+    let mut initializing = new_instance();
     set(&mut initializing, &[("tank.h", Value::Real(-1.0))]);
     initializing.enter_initialization_mode().unwrap();
-    let mut terminated = lively(2, 4);
+    let mut terminated = moving_instance(2, 4);
     terminated.do_step(0.0, 0.1).unwrap();
     terminated.terminate().unwrap();
-    for saved in [fresh(), initializing, terminated, diverged(), lively(2, 4)] {
+    for saved in [new_instance(), initializing, terminated, diverged(), moving_instance(2, 4)] {
         let bytes = to_bytes(&saved);
         assert_eq!(bytes.len(), size::<HubSlosh::HubSlosh>());
         let read = from_bytes(&bytes).unwrap();
@@ -537,7 +537,7 @@ fn a_state_can_be_saved_in_every_instance_state() {
 
 #[test]
 fn bytes_that_are_not_a_saved_state_are_refused() {
-    let mut instance = lively(4, 4);
+    let mut instance = moving_instance(4, 4);
     instance.do_step(0.0, 0.1).unwrap();
     let bytes = to_bytes(&instance);
     for length in 0..bytes.len() {
@@ -595,7 +595,7 @@ fn with_number(mut bytes: Vec<u8>, old: f64, new: f64) -> Vec<u8> {
 
 #[test]
 fn an_input_out_of_range_in_saved_bytes_is_refused() {
-    let mut instance = lively(4, 4);
+    let mut instance = moving_instance(4, 4);
     let g: f64 = 9.123456;
     set(&mut instance, &[("g_axial", Value::Real(g))]);
     let why = from_bytes(&with_number(to_bytes(&instance), g, -g)).unwrap_err();
@@ -606,7 +606,7 @@ fn an_input_out_of_range_in_saved_bytes_is_refused() {
 #[test]
 fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     let width = 0.0123456;
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(&mut instance, &[("baffle.width", Value::Real(width))]);
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();
@@ -620,7 +620,7 @@ fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
 #[test]
 fn output_derivatives_equal_differences_of_the_outputs() {
     for slosh_model in items("slosh.model") {
-        let mut instance = lively(slosh_model, 4);
+        let mut instance = moving_instance(slosh_model, 4);
         instance.do_step(0.0, 0.3).unwrap();
         set(&mut instance, &[("tau_cmd", Value::Real(0.02))]);
         let slope = 0.3;
@@ -770,7 +770,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
 /// liquid if nothing else moves.
 #[test]
 fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and_parameters() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(
         &mut instance,
         &[
@@ -805,7 +805,7 @@ fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and
 
 #[test]
 fn directional_derivatives_of_variables_without_any_are_refused() {
-    let mut instance = lively(4, 4);
+    let mut instance = moving_instance(4, 4);
     let mut answer = [0.0];
     let [omega, stuck, height, mass] =
         ["omega", "stuck", "tank.h", "slosh.mass[1]"].map(|name| [reference(name)]);
@@ -856,7 +856,7 @@ fn only_friction_parameters_can_be_changed_between_steps() {
 #[test]
 fn a_state_of_the_other_interface_is_refused() {
     let mut exchange = HubSlosh::instance(Interface::ModelExchange);
-    let mut instance = fresh();
+    let mut instance = new_instance();
     assert!(instance.restore(&exchange).unwrap_err().text.contains("Model Exchange"));
     assert!(exchange.restore(&instance).is_err());
     assert!(exchange.setup_experiment(None, 0.0, None).is_ok());
@@ -870,7 +870,7 @@ fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
             // a moving hub, and a hub that is stuck at the start
-            let mut moving = lively(slosh_model, friction_model);
+            let mut moving = moving_instance(slosh_model, friction_model);
             moving.do_step(0.0, 0.5).unwrap();
             let stuck = stepping(&[
                 ("slosh.model", number(slosh_model)),
@@ -924,7 +924,7 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
     let models = items("slosh.model").map(|model| (model, 1));
     let of_table = SloshModel::ALL.into_iter().map(|model| (model as i32, 2));
     for (slosh_model, source) in models.chain(of_table) {
-        let mut instance = fresh();
+        let mut instance = new_instance();
         set(&mut instance, base);
         set(&mut instance, &[("slosh.model", number(slosh_model))]);
         set(&mut instance, &[("slosh.source", number(source))]);
@@ -1052,7 +1052,7 @@ fn integer_twins_have_the_same_effect_as_their_enumerations() {
             assert_eq!(motion(kind), motion(model), "{kind} = {n}");
         }
         let too_many = items(model).count() as i32 + 1;
-        let mut instance = fresh();
+        let mut instance = new_instance();
         set(&mut instance, &[(kind, number(too_many))]);
         instance.enter_initialization_mode().unwrap();
         let fault = instance.exit_initialization_mode().unwrap_err();
@@ -1092,7 +1092,7 @@ fn integer_twins_override_the_booleans() {
 /// enumerations. Two different values are refused at the end of initialisation.
 #[test]
 fn kinds_that_contradict_the_enumerations_are_all_reported() {
-    let mut instance = fresh();
+    let mut instance = new_instance();
     set(&mut instance, &[("slosh.model", number(3)), ("slosh.kind", number(4))]);
     set(&mut instance, &[("friction.model", number(1)), ("friction.kind", number(2))]);
     instance.enter_initialization_mode().unwrap();

@@ -130,7 +130,7 @@ impl Pair {
             at_rest: Matrix6::zeros(),
         };
         pair.at_rest = symmetric(&pair.tank.outputs(&TankInputs::default()).added_mass);
-        let given = pair.look(&pair.input([x, x], 1.0));
+        let given = pair.equation_terms(&pair.input([x, x], 1.0));
         pair.given = [given, given];
         pair
     }
@@ -145,7 +145,7 @@ impl Pair {
 
     /// Returns the matrix and the right-hand side of the tank in the equation that the body solves: (M_body + matrix) x
     /// = rest + right-hand side.
-    fn look(&mut self, u: &TankInputs) -> Given {
+    fn equation_terms(&mut self, u: &TankInputs) -> Given {
         let SloshTankOutputs { tank, bias, added_mass, .. } = self.tank.outputs(u);
         let wrench = Vector6::from_column_slice(&[tank.force, tank.torque].concat());
         match self.exchange {
@@ -204,7 +204,7 @@ impl Pair {
     /// Makes the tank's step with the rates of the body at both ends, and returns the tank's terms at the end.
     fn move_tank(&mut self, ends: [Vector6<f64>; 2], h: f64) -> Given {
         self.tank.step(&self.input(ends, h), h).unwrap();
-        self.look(&self.input([ends[1], ends[1]], h))
+        self.equation_terms(&self.input([ends[1], ends[1]], h))
     }
 
     fn step(&mut self, h: f64) {

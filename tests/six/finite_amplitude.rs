@@ -24,7 +24,7 @@ struct Carried {
 }
 
 impl Carried {
-    fn by(heavy: f64, tank: &Tank) -> Carried {
+    fn with_mass(heavy: f64, tank: &Tank) -> Carried {
         let j = Inertia { xx: heavy, yy: heavy, zz: heavy, xy: 0.0, xz: 0.0, yz: 0.0 };
         let craft = Craft { mass: heavy, r: [0.0; 3], j };
         let mut p = Parameters { craft, tanks: 1, ..Parameters::default() };
@@ -48,7 +48,7 @@ fn bob(x: &[f64]) -> [f64; 6] {
 
 impl Moved for Carried {
     fn start(tank: &Tank) -> Self {
-        Carried::by(HEAVY, tank)
+        Carried::with_mass(HEAVY, tank)
     }
 
     fn step(&mut self, a: [f64; 2], h: f64) {
@@ -64,7 +64,7 @@ impl Moved for Carried {
     }
 }
 
-fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
+fn state_distance(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
 }
 
@@ -99,7 +99,7 @@ fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
         let mut moved = T::start(tank);
         let start = moved.bob();
         (0..16).for_each(|_| moved.step([0.0; 2], TAU / w / 16.0));
-        apart(start, moved.bob(), w) / a
+        state_distance(start, moved.bob(), w) / a
     }
     let (mut tank, a) = (bench(1.227), f64::to_radians(8.0));
     let w = linear_frequency(&tank) * circular::<SloshTank>(tank, a);
@@ -119,14 +119,14 @@ fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     let pieces = 100;
     let h = TAU / w / f64::from(pieces);
     let a = |k: i32| stroke * w * w * (f64::from(k) * h * w).cos();
-    let (mut alone, mut carried) = (SloshTank::start(&tank), Carried::by(heavy, &tank));
+    let (mut alone, mut carried) = (SloshTank::start(&tank), Carried::with_mass(heavy, &tank));
     let (mut largest, mut off) = ([0.0_f64; 3], 0.0_f64);
     for k in 0..150 * pieces {
         let a = [a(k), (a(k + 1) - a(k)) / h];
         Moved::step(&mut alone, a, h);
         carried.step(a, h);
         let x = alone.bob();
-        off = off.max(apart(x, carried.bob(), w));
+        off = off.max(state_distance(x, carried.bob(), w));
         if k > 135 * pieces {
             let force = alone.outputs_after_step().tank.force[0];
             let now = [x[0].to_degrees(), x[1].to_degrees(), force];
@@ -253,7 +253,8 @@ fn the_recoil_of_a_craft_is_inversely_proportional_to_its_mass() {
     let period = TAU / linear_frequency(&tank);
     let released = Tank { p_0: [[0.02, 0.0, -1.0]; MODES], ..tank };
     // After a quarter of a period the slosh mass is ahead in phase by pi/2 times the gain in frequency.
-    let (mut alone, mut carried) = (SloshTank::start(&released), Carried::by(heavy, &released));
+    let (mut alone, mut carried) =
+        (SloshTank::start(&released), Carried::with_mass(heavy, &released));
     Moved::step(&mut alone, [0.0; 2], period / 4.0);
     carried.step([0.0; 2], period / 4.0);
     let gain = (alone.bob()[0] - carried.bob()[0]) / (0.02 * TAU / 4.0);

@@ -14,16 +14,16 @@ fn parse(text: &str) -> Element {
     Element::parse(text.as_bytes()).unwrap()
 }
 
-fn two<M: Model>() -> Element {
+fn description_2<M: Model>() -> Element {
     parse(&model_description::xml::<M>().unwrap())
 }
 
-fn three<M: Model>() -> Element {
+fn description_3<M: Model>() -> Element {
     parse(&model_description::fmi3::xml::<M>(Layout::Scalars).unwrap())
 }
 
 fn every_variable_is_as_in_fmi_2<M: Model>() {
-    let (two, three) = (two::<M>(), three::<M>());
+    let (two, three) = (description_2::<M>(), description_3::<M>());
     let (old, new): (Vec<_>, Vec<_>) =
         (two.list("ModelVariables").collect(), three.list("ModelVariables").collect());
     let indicators = M::table().about.event_indicators;
@@ -103,7 +103,7 @@ fn only_inputs_whose_slopes_the_model_sets_lack_intermediate_update() {
 }
 
 fn the_structure_is_as_in_fmi_2<M: Model>() {
-    let (two, three) = (two::<M>(), three::<M>());
+    let (two, three) = (description_2::<M>(), description_3::<M>());
     let old = two.child("ModelStructure").unwrap();
     let new = three.child("ModelStructure").unwrap();
     for (list, element) in [
@@ -161,7 +161,7 @@ fn the_structure_of_fmi_3_equals_that_of_fmi_2_with_event_indicators() {
 }
 
 fn units_are_defined<M: Model>() {
-    let three = three::<M>();
+    let three = description_3::<M>();
     let mut defined: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for unit in three.list("UnitDefinitions") {
         let shown = unit.children.iter().filter(|child| child.name == "DisplayUnit");
@@ -190,7 +190,8 @@ fn the_root_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
     assert!(text.starts_with(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"3.0\""
     ));
-    let (two, three) = (two::<HubSlosh::HubSlosh>(), three::<HubSlosh::HubSlosh>());
+    let (two, three) =
+        (description_2::<HubSlosh::HubSlosh>(), description_3::<HubSlosh::HubSlosh>());
     assert_eq!(
         three.get("instantiationToken"),
         Some(Fmi3::token::<HubSlosh::HubSlosh>(Layout::Scalars))
@@ -222,7 +223,7 @@ fn the_root_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
 }
 
 fn capabilities_are_shown<M: Model>() {
-    let (two, three) = (two::<M>(), three::<M>());
+    let (two, three) = (description_2::<M>(), description_3::<M>());
     let flags = |interface: &str| -> BTreeMap<String, String> {
         let element = three.child(interface).unwrap();
         let others = element.attributes.iter().filter(|(name, _)| name != "modelIdentifier");

@@ -22,7 +22,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         integers: references(fmu, &[Type::Integer, Type::Enumeration]),
         booleans: references(fmu, &[Type::Boolean]),
         strings: references(fmu, &[Type::String]),
-        serializes: fmu.can(interface, "canSerializeFMUstate"),
+        serializes: fmu.has_capability(interface, "canSerializeFMUstate"),
         ..Lists::default()
     };
     for v in &fmu.inputs {
@@ -30,7 +30,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
             lists.inputs.push((v.reference, x));
         }
     }
-    if fmu.can(interface, "providesDirectionalDerivative") {
+    if fmu.has_capability(interface, "providesDirectionalDerivative") {
         let unknowns = d.unknowns(d.words.outputs).filter_map(|u| d.variable_of(u));
         let unknowns = unknowns.filter(|v| v.is_continuous()).map(|v| v.reference);
         lists.unknowns = unknowns.collect();

@@ -168,7 +168,7 @@ impl Binaries {
         all
     }
 
-    pub fn own(&self) -> Option<&str> {
+    pub fn own_binary(&self) -> Option<&str> {
         self.placed.iter().find(|p| p.folder == self.own_folder).map(|p| p.name.as_str())
     }
 
@@ -235,7 +235,7 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
             "the name of the binary is not known, because modelDescription.xml cannot be read",
         );
     }
-    if binaries.own().is_none() {
+    if binaries.own_binary().is_none() {
         findings.at(format!("binaries/{}", binaries.own_folder)).add("the FMU has no binary for this platform, so that the rules that call the FMU are not checked (required: a binary for this platform, or a check on one of the FMU's platforms)");
     }
 }
@@ -280,7 +280,7 @@ pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
         // Functions that both interfaces need are named only once.
         let mut seen = std::collections::BTreeSet::new();
         wanted.retain(|symbol| seen.insert(*symbol));
-        if let Some(fault) = binary.lacking(&wanted) {
+        if let Some(fault) = binary.missing_exports(&wanted) {
             findings.at(name).add(fault);
         }
     });

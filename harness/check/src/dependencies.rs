@@ -110,7 +110,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn nothing() -> Seen {
+    fn empty() -> Seen {
         Seen { pairs: BTreeSet::new(), traces: BTreeSet::new(), moved: BTreeSet::new(), starts: 0 }
     }
 
@@ -214,7 +214,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input).collect();
     let states = fmu.states();
-    let mut seen = Seen::nothing();
+    let mut seen = Seen::empty();
     for attempt in 0..TRIES {
         let mut session = random_session(fmu, interface, attempt)?;
         fmu.announce(format!("initialising with other parameters, try {attempt}"));
@@ -234,7 +234,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
         let before = read(&mut session, &unknowns)?;
         for v in &inputs {
             let start = session.get(v)?;
-            let Some(other) = displaced(fmu, v, &start, share) else { continue };
+            let Some(other) = displaced_value(fmu, v, &start, share) else { continue };
             if session.set(v, &other).is_ok() {
                 let after = read(&mut session, &unknowns)?;
                 seen.compare(&unknowns, v, &before, &after);
@@ -266,7 +266,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
 
 /// Returns another value that `v` may have, which differs from `now` by about `share` of its
 /// magnitude; `None` if the bounds of `v` leave no room.
-pub fn displaced(fmu: &FmuUnderTest, v: &Variable, now: &Value, share: f64) -> Option<Value> {
+pub fn displaced_value(fmu: &FmuUnderTest, v: &Variable, now: &Value, share: f64) -> Option<Value> {
     let Value::Real(x) = now else { return super::values::other_value(fmu, v, now) };
     let (min, max) = v.bounds();
     let step = share * x.abs().max(0.1 * v.nominal().min(max.abs()));
@@ -283,7 +283,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     let knowns: Vec<_> = fmu.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
     let interface = fmu.first_interface()?;
-    let mut seen = Seen::nothing();
+    let mut seen = Seen::empty();
     for attempt in 0..AT_LEAST {
         let mut session = random_session(fmu, interface, attempt)?;
         let begun = session.instance.setup_experiment(None, session.time, None);
@@ -296,7 +296,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
         for v in &knowns {
             let start = session.get(v)?;
-            let Some(other) = displaced(fmu, v, &start, share) else { continue };
+            let Some(other) = displaced_value(fmu, v, &start, share) else { continue };
             if session.set(v, &other).is_ok() {
                 if let Ok(after) = read(&mut session, &unknowns) {
                     seen.compare(&unknowns, v, &before, &after);
@@ -316,7 +316,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const AGREE: f64 = 1e-3;
     let d = fmu.description;
     if !fmu.has(Interface::ModelExchange)
-        || !fmu.can(Interface::ModelExchange, "providesDirectionalDerivative")
+        || !fmu.has_capability(Interface::ModelExchange, "providesDirectionalDerivative")
     {
         return skip(
             "providesDirectionalDerivative is not declared for Model Exchange, which alone gives access to the states",

@@ -164,15 +164,15 @@ pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         running.retain(|pair| pair.kind != "discrete");
     }
     if !running.is_empty() && fmu.has(interface) {
-        look(fmu, findings, &running, interface, false)?;
+        check_pairs(fmu, findings, &running, interface, false)?;
     }
     if !initial.is_empty() {
-        look(fmu, findings, &initial, fmu.first_interface()?, true)?;
+        check_pairs(fmu, findings, &initial, fmu.first_interface()?, true)?;
     }
     Ok(())
 }
 
-fn look(
+fn check_pairs(
     fmu: &FmuUnderTest,
     findings: &mut Findings,
     pairs: &[Pair],

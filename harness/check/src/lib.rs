@@ -139,7 +139,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         Ok(d) if d.has_clocks() && !exchanges => {
             Err("the FMU has clocks, and the check does not call Co-Simulation of FMUs with clocks".into())
         }
-        _ if binaries.own().is_none() => {
+        _ if binaries.own_binary().is_none() => {
             Err(format!("the FMU has no binary for this platform, {}", binaries.own_folder()))
         }
         Ok(description) => Ok(write_description(&description.root)?),

@@ -14,7 +14,7 @@ use host::fmi2::{CallError, Callbacks, Instance, Instantiation, Status, file_uri
 /// `load.opens`: if no binary could be loaded, the check has already ended. If the two interfaces have different
 /// binaries, one of them may still be broken, which is reported here.
 pub fn opens<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
-    for why in fmu.broken() {
+    for why in fmu.callability_faults() {
         findings.at("the binary of one interface").add(why);
     }
     Ok(())
@@ -193,7 +193,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// is reported by `values.unknown`.
 fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
     let mut session = fmu.running(interface)?;
-    Ok(session.refused().is_some_and(|error| !error.messages.is_empty()))
+    Ok(session.provoke_refusal().is_some_and(|error| !error.messages.is_empty()))
 }
 
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -377,7 +377,7 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         ] {
             let mut session = fmu.session_in(interface, stage)?;
             if stage == Stage::Initialised {
-                session.refused();
+                session.provoke_refusal();
             }
             let place = format!("fmi2Reset, {from} ({interface})");
             fmu.announce(&place);

@@ -61,12 +61,12 @@ pub fn memory(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return skip("the operating system does not report how much memory a process uses");
     }
     for interface in fmu.interfaces() {
-        look(fmu, interface, findings)?;
+        measure_leaks(fmu, interface, findings)?;
     }
     Ok(())
 }
 
-fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Result<()> {
+fn measure_leaks(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Result<()> {
     let name = interface;
     let mut session = fmu.running(interface)?;
     let step = || -> Result<()> {
@@ -81,7 +81,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
             "the memory of the process grows by {bytes} bytes in each step (allowed: {PER_STEP} bytes, for a history)"
         ));
     }
-    if fmu.can(interface, "canGetAndSetFMUstate") {
+    if fmu.has_capability(interface, "canGetAndSetFMUstate") {
         let state = || -> Result<()> {
             let state = session.instance.get_state()?;
             Ok(session.instance.free_state(state)?)
@@ -94,7 +94,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         }
     }
     drop(session);
-    if fmu.can(interface, "canBeInstantiatedOnlyOncePerProcess") {
+    if fmu.has_capability(interface, "canBeInstantiatedOnlyOncePerProcess") {
         return Ok(());
     }
     // The instance is terminated as the standard prescribes, because some FMUs free part of their memory in

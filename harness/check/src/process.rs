@@ -196,7 +196,7 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     let description: &'static Description = Box::leak(Box::new(Description::new(root)));
     let rules = if description.is_fmi3() { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
-    trace::doing(LOADING, Crash::Error);
+    trace::announce_call(LOADING, Crash::Error);
     // A rule that is slow, but not stuck, reports its findings before the time limit.
     let deadline = Instant::now() + limit.mul_f64(0.75);
     trace::done(match rule.check {
@@ -250,7 +250,7 @@ mod tests {
         if std::env::args().any(|argument| argument == CHILD) {
             files::bug::keep_panics();
             guard::enter().unwrap();
-            trace::doing(LOADING, Crash::Error);
+            trace::announce_call(LOADING, Crash::Error);
             panic!("row 7 is odd");
         }
         let folder = tempfile::tempdir().unwrap();

@@ -42,7 +42,7 @@ impl Doctype {
     }
 
     /// Describes, as the end of a sentence, what an XML parser does because of this DOCTYPE.
-    pub fn danger(&self) -> &'static str {
+    pub fn parser_reaction(&self) -> &'static str {
         if self.text.contains("SYSTEM") || self.text.contains("PUBLIC") {
             "it makes a parser open another file or address"
         } else if self.text.contains("<!ENTITY") {
@@ -84,7 +84,7 @@ pub fn doctype(archive: &Archive, findings: &mut Findings) {
     };
     if let Some(doctype) = Doctype::find(bytes) {
         let start: String = doctype.text.chars().take(80).collect();
-        let danger = doctype.danger();
+        let danger = doctype.parser_reaction();
         findings.at(format!("{NAME}, line {}", doctype.line)).add(format!(
             "{:?}: {danger} (allowed: no document type declaration and no entities but &lt; \
                  &gt; &amp; &quot; &apos; and character references)",
@@ -122,13 +122,13 @@ mod tests {
         let found = |text: &str| Doctype::find(text.as_bytes());
         let simple = found("<?xml version=\"1.0\"?>\n<!-- a -->\n<!DOCTYPE a><a/>").unwrap();
         assert_eq!(
-            (simple.line, simple.text.as_str(), simple.danger()),
+            (simple.line, simple.text.as_str(), simple.parser_reaction()),
             (3, "<!DOCTYPE a>", "many parsers refuse it")
         );
         let bomb = found("<!DOCTYPE a [<!ENTITY b \"c>d\"> ]><a/>").unwrap();
-        assert!(bomb.text.ends_with("]>") && bomb.danger().contains("entities"));
+        assert!(bomb.text.ends_with("]>") && bomb.parser_reaction().contains("entities"));
         let outside = found("<!doctype a SYSTEM \"file:///etc/passwd\"><a/>").unwrap();
-        assert!(outside.danger().contains("another file"));
+        assert!(outside.parser_reaction().contains("another file"));
         for none in ["<a><!-- <!DOCTYPE a> --></a>", "<!-- <!DOCTYPE a> --><a/>", "", "<a/>"] {
             assert!(found(none).is_none(), "{none}");
         }

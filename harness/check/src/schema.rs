@@ -173,7 +173,7 @@ pub const DOUBLES: Written = List(&Double);
 pub const BOOLEANS: Written = List(&Boolean);
 
 impl Written {
-    fn fits(self, value: &str) -> bool {
+    fn accepts(self, value: &str) -> bool {
         let value = value.trim();
         match self {
             Text => true,
@@ -183,7 +183,7 @@ impl Written {
             Long => value.parse::<i64>().is_ok() || value.parse::<u64>().is_ok(),
             Double => double(value).is_some(),
             Time => is_time(value),
-            List(one) => value.split_whitespace().all(|word| one.fits(word)),
+            List(one) => value.split_whitespace().all(|word| one.accepts(word)),
             OneOf(words) => words.contains(&value),
             Words(words) => value.split_whitespace().all(|word| words.contains(&word)),
         }
@@ -395,7 +395,7 @@ pub fn values(d: &Description, findings: &mut Findings) {
 fn value(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {
     let Some(kind) = find(kinds, parent, &element.name) else { return };
     for (name, written) in kind.attributes() {
-        if let Some(value) = element.get(name).filter(|value| !written.fits(value)) {
+        if let Some(value) = element.get(name).filter(|value| !written.accepts(value)) {
             let allowed = written.allowed();
             findings.at(place(element)).add(format!("{name}=\"{value}\" (allowed: {allowed})"));
         }

@@ -12,7 +12,7 @@ use super::under_test::{
 pub fn uses_with<V: Tested>(fmu: &UnderTest<V>, can: &str, findings: &mut Findings) -> Vec<Use> {
     let flag = format!("{can}{}", V::STATE);
     let mut all = fmu.uses();
-    all.retain(|using| fmu.can(using.interface, &flag));
+    all.retain(|using| fmu.has_capability(using.interface, &flag));
     if all.is_empty() {
         findings.skip(format!("{flag} is not declared"));
     }

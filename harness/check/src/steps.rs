@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow};
 
-use super::dependencies::displaced;
+use super::dependencies::displaced_value;
 use super::description::Variable;
 use super::findings::Findings;
 use super::life::expect_refusal;
@@ -325,7 +325,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             findings.at(place).add("fmi2OK (allowed: fmi2Error and a message)");
         }
     }
-    let can = fmu.can(Interface::CoSimulation, "canInterpolateInputs");
+    let can = fmu.has_capability(Interface::CoSimulation, "canInterpolateInputs");
     for v in inputs.iter().filter(|v| can && v.is_continuous()) {
         let place = format!("fmi2SetRealInputDerivatives of {}", v.name);
         fmu.announce(&place);
@@ -361,7 +361,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         };
         let (_, now) = running()?;
         let (Value::Real(here), Some(Value::Real(there))) =
-            (&now, displaced(fmu, input, &now, SHARE))
+            (&now, displaced_value(fmu, input, &now, SHARE))
         else {
             continue;
         };
@@ -432,7 +432,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
         &vec![1; outputs.len()],
         &mut declared,
     )?;
-    if !fmu.can(Interface::CoSimulation, STEP_SIZES) {
+    if !fmu.has_capability(Interface::CoSimulation, STEP_SIZES) {
         return Ok(());
     }
     // Differences over two short steps with held inputs. If the two disagree, the output is not smooth.

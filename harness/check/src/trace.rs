@@ -23,7 +23,7 @@ pub(super) enum Answer {
 }
 
 /// Tells the parent process the next call and the meaning of a crash in this call.
-pub fn doing(what: &str, crash: Crash) {
+pub fn announce_call(what: &str, crash: Crash) {
     // If sending fails, the report of a crash does not name the call.
     let _ = send(&Answer::Doing(what.into(), crash));
 }

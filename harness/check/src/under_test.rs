@@ -221,7 +221,7 @@ impl<V: Tested> UnderTest<V> {
             fmu.interfaces.push((interface, at));
         }
         let why = || {
-            let mut all: Vec<&str> = fmu.broken().collect();
+            let mut all: Vec<&str> = fmu.callability_faults().collect();
             all.dedup();
             if all.is_empty() { "the FMU declares no interface".into() } else { all.join("; ") }
         };
@@ -276,7 +276,7 @@ impl<V: Tested> UnderTest<V> {
     /// Announces the next call, so that a crash or a hang in it is reported with this text.
     pub fn announce(&self, what: impl Into<String>) {
         let what = what.into();
-        trace::doing(&what, self.crash.borrow().clone());
+        trace::announce_call(&what, self.crash.borrow().clone());
         *self.doing.borrow_mut() = what;
     }
 
@@ -348,7 +348,7 @@ impl<V: Tested> UnderTest<V> {
     }
 
     /// Lists the reasons why interfaces cannot be called although they have a binary.
-    pub fn broken(&self) -> impl Iterator<Item = &str> {
+    pub fn callability_faults(&self) -> impl Iterator<Item = &str> {
         self.broken.iter().map(|(_, why)| &why[..])
     }
 
@@ -368,7 +368,9 @@ impl<V: Tested> UnderTest<V> {
         make: impl FnOnce() -> Result<T, E>,
     ) -> Result<Result<T, E>> {
         let made = self.made.get();
-        let why = if made > 0 && self.can(interface, "canBeInstantiatedOnlyOncePerProcess") {
+        let why = if made > 0
+            && self.has_capability(interface, "canBeInstantiatedOnlyOncePerProcess")
+        {
             "the FMU can be instantiated only once per process".into()
         } else if Instant::now() > self.deadline {
             format!(
@@ -449,13 +451,13 @@ impl<V: Tested> UnderTest<V> {
         }
     }
 
-    pub fn can(&self, interface: Interface, flag: &str) -> bool {
+    pub fn has_capability(&self, interface: Interface, flag: &str) -> bool {
         self.description.interface(element(interface)).is_some_and(|element| element.flag(flag))
     }
 
     /// Skips the rule unless the element of `interface` declares the capability `flag`.
     pub fn require(&self, interface: Interface, flag: &str) -> Result<()> {
-        match self.can(interface, flag) {
+        match self.has_capability(interface, flag) {
             true => Ok(()),
             false => skip(format!("{flag} is not declared")),
         }
@@ -597,7 +599,7 @@ impl<V: Tested> Session<'_, V> {
 
     /// Reads the value of a value reference that no variable has, and returns the FMU's refusal
     /// with its messages. If this call crashes, `values.unknown` reports it.
-    pub fn refused(&mut self) -> Option<CallError> {
+    pub fn provoke_refusal(&mut self) -> Option<CallError> {
         self.fmu.with_crash_reported_by("values.unknown", || {
             self.fmu.announce(V::UNKNOWN_READ);
             V::reals(&mut self.instance, &[u32::MAX], &mut [0.0]).err()

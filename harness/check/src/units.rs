@@ -218,7 +218,7 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
 }
 
-fn declared(unit: &Element) -> Option<Unit> {
+fn unit_from_element(unit: &Element) -> Option<Unit> {
     let BaseUnit { exponents, factor, offset } = BaseUnit::from_element(unit)?;
     Some(Unit { exponents, factor, offset })
 }
@@ -254,7 +254,9 @@ pub fn numbers(d: &Description, findings: &mut Findings) {
 
 pub fn base_units(d: &Description, findings: &mut Findings) {
     for unit in d.root.list("UnitDefinitions") {
-        let (Some(name), Some(written)) = (unit.get("name"), declared(unit)) else { continue };
+        let (Some(name), Some(written)) = (unit.get("name"), unit_from_element(unit)) else {
+            continue;
+        };
         let meant = read(name);
         let fits = |m: &&Unit| {
             written.measures_like(m)
@@ -280,7 +282,7 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
     for unit in d.root.list("UnitDefinitions") {
         let Some(name) = unit.get("name") else { continue };
         // Without BaseUnit the name determines the unit that is converted.
-        let from = match declared(unit) {
+        let from = match unit_from_element(unit) {
             Some(written) => vec![written],
             None => read(name),
         };
@@ -330,7 +332,7 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
     let units: BTreeMap<&str, &Element> =
         d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
     let known = |name: &str| -> Vec<Unit> {
-        match units.get(name).and_then(|unit| declared(unit)) {
+        match units.get(name).and_then(|unit| unit_from_element(unit)) {
             Some(unit) => vec![unit],
             None => read(name),
         }

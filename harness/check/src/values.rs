@@ -216,7 +216,7 @@ pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for reference in free.into_iter().filter(|r| !taken.contains(r)) {
         for call in calls {
             let what = format!("the unknown value reference {reference}");
-            refused(fmu, findings, call, reference, &what)?;
+            check_refusal(fmu, findings, call, reference, &what)?;
         }
     }
     Ok(())
@@ -226,7 +226,7 @@ type Call = (&'static str, fn(&mut Instance, u32) -> Called);
 
 /// Adds a finding unless the FMU refuses the call `what`. Each such call is made with a new instance, because after an
 /// error some FMUs refuse every call.
-fn refused(
+fn check_refusal(
     fmu: &FmuUnderTest,
     findings: &mut Findings,
     (name, call): Call,
@@ -259,14 +259,14 @@ pub fn wrong_type(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for (call, others) in of_real {
         if let Some(reference) = reals.difference(others).next() {
             looked = true;
-            refused(fmu, findings, call, *reference, "a Real")?;
+            check_refusal(fmu, findings, call, *reference, "a Real")?;
         }
     }
     let get_real: Call = ("fmi2GetReal", |i, r| i.get_real(&[r], &mut [0.0]));
     for (others, what) in [(&integers, "an Integer"), (&booleans, "a Boolean")] {
         if let Some(reference) = others.difference(&reals).next() {
             looked = true;
-            refused(fmu, findings, get_real, *reference, what)?;
+            check_refusal(fmu, findings, get_real, *reference, what)?;
         }
     }
     if !looked {

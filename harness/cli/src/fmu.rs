@@ -35,7 +35,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     if packed.is_file() {
         return Ok(packed);
     }
-    if let Some(installed) = installed(&file) {
+    if let Some(installed) = find_installed(&file) {
         return Ok(installed);
     }
     if !pack::has_source() {
@@ -73,7 +73,7 @@ pub fn all() -> Vec<PathBuf> {
     found
 }
 
-pub fn installed(file: &str) -> Option<PathBuf> {
+pub fn find_installed(file: &str) -> Option<PathBuf> {
     folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
 }
 

@@ -190,7 +190,7 @@ fn main() -> ExitCode {
             (false, false) => Ok(carry_out(cli)),
         }
     };
-    let code = match bug::caught(work) {
+    let code = match bug::catch_panic(work) {
         Ok(code) => code,
         Err(panic) => {
             let report = bug::report(&panic.0);
@@ -217,7 +217,7 @@ fn guarded(cli: &Cli) -> Result<u8> {
     // The FMU is built before the guard starts, because the guard's limits are not meant for a compiler.
     match cli.fmu() {
         Some(name) => drop(fmu::find(name)?),
-        None if fmu::installed("HubSlosh.fmu").is_none() && ::pack::has_source() => {
+        None if fmu::find_installed("HubSlosh.fmu").is_none() && ::pack::has_source() => {
             pack::native(::pack::HUBSLOSH, ::pack::Fmi::V2, Path::new("dist/HubSlosh.fmu"))?;
         }
         None => drop(fmu::find(Path::new(DEFAULT_FMU))?),

@@ -76,20 +76,20 @@ pub fn color_of_arguments() -> ColorChoice {
 
 pub fn error(text: impl std::fmt::Display) {
     let text = input::without_error_numbers(&text.to_string());
-    complain(format!("{} {text}\n", with_style("error:", *Styles::styled().get_error())));
+    print_to_stderr(format!("{} {text}\n", with_style("error:", *Styles::styled().get_error())));
 }
 
 /// Prints a warning. With `--strict` a warning makes the exit code 1.
 pub fn warn(text: impl std::fmt::Display) {
     WARNINGS.fetch_add(1, Ordering::Relaxed);
     let style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
-    complain(format!("{} {text}\n", with_style("warning:", style)));
+    print_to_stderr(format!("{} {text}\n", with_style("warning:", style)));
 }
 
 /// Prints a line about progress to stderr; `--quiet` suppresses it.
 pub fn note(text: impl std::fmt::Display) {
     if !is_quiet() {
-        complain(format!("{text}\n"));
+        print_to_stderr(format!("{text}\n"));
     }
 }
 
@@ -98,12 +98,12 @@ pub fn code() -> u8 {
     match WARNINGS.load(Ordering::Relaxed) {
         0 => 0,
         _ if !terminal().strict => 0,
-        1 => fails("there was a warning, which --strict makes an error"),
-        n => fails(&format!("there were {n} warnings, which --strict makes an error")),
+        1 => report_failure("there was a warning, which --strict makes an error"),
+        n => report_failure(&format!("there were {n} warnings, which --strict makes an error")),
     }
 }
 
-fn fails(why: &str) -> u8 {
+fn report_failure(why: &str) -> u8 {
     error(why);
     1
 }
@@ -167,7 +167,7 @@ pub fn stdout() -> Box<dyn Write> {
 
 /// Prints a text to stderr. In a guarded process it is printed to the original stderr, which the
 /// FMU cannot reach.
-fn complain(text: String) {
+fn print_to_stderr(text: String) {
     // A closed stderr means that nobody wants to read the messages.
     let _ = match guard::streams() {
         Some((_, mut stderr)) => stderr.write_all(text.as_bytes()),

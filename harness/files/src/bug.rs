@@ -47,7 +47,7 @@ pub struct Panicked(pub String);
 
 /// Runs `work`, and returns the message of its panic if it panics. If there are several panics, the message is that of
 /// the first, because a panic of a thread also makes the thread that waits for it panic.
-pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
+pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
         if let Some(listener) = LISTENER.get() {
@@ -88,8 +88,8 @@ mod tests {
 
     #[test]
     fn a_panic_becomes_a_report_of_a_bug_in_this_program() {
-        assert_eq!(caught(|| 3), Ok(3));
-        let told = caught(|| -> i32 { panic!("row {} is odd", 7) }).unwrap_err().0;
+        assert_eq!(catch_panic(|| 3), Ok(3));
+        let told = catch_panic(|| -> i32 { panic!("row {} is odd", 7) }).unwrap_err().0;
         assert!(told.starts_with("row 7 is odd"), "{told}");
         let report = report(&told);
         assert!(report.starts_with("this is a bug of hubslosh") && report.contains("row 7 is odd"));

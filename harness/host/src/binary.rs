@@ -124,7 +124,7 @@ impl Binary {
     /// Lists all reasons why the binary could not be loaded on a machine without development tools, or why a host would
     /// not find the functions `wanted`. Each item is a sentence.
     pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
-        let (loading, lacking) = (self.loading_faults(), self.lacking(wanted));
+        let (loading, lacking) = (self.loading_faults(), self.missing_exports(wanted));
         loading.into_iter().chain(lacking).chain(self.surplus()).collect()
     }
 
@@ -170,7 +170,7 @@ impl Binary {
     }
 
     /// Returns a sentence with the functions of `wanted` that the binary does not export, or `None` if it exports all.
-    pub fn lacking(&self, wanted: &[&str]) -> Option<String> {
+    pub fn missing_exports(&self, wanted: &[&str]) -> Option<String> {
         let lacking: Vec<_> =
             wanted.iter().filter(|w| !self.exports.iter().any(|e| e == **w)).copied().collect();
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
@@ -426,7 +426,7 @@ pub fn part<'a>(bytes: &'a [u8], architecture: &str) -> &'a [u8] {
 mod tests {
     use super::*;
 
-    fn good(kind: Kind) -> Binary {
+    fn faultless(kind: Kind) -> Binary {
         let (architectures, library, needs) = match kind {
             Kind::Linux => (vec!["x86_64"], "libc.so.6", Some(GLIBC)),
             Kind::LinuxArm => (vec!["arm64"], "ld-linux-aarch64.so.1", Some(GLIBC)),
@@ -448,14 +448,14 @@ mod tests {
     #[test]
     fn a_binary_that_needs_only_the_system_has_no_fault() {
         for kind in [Kind::Linux, Kind::LinuxArm, Kind::Windows, Kind::MacOs] {
-            assert_eq!(good(kind).faults(&["fmi2DoStep"]), [""; 0], "{kind:?}");
+            assert_eq!(faultless(kind).faults(&["fmi2DoStep"]), [""; 0], "{kind:?}");
         }
     }
 
     /// The binary needs a library and a glibc that not every system has, exports other names, and has a library search path.
     #[test]
     fn all_faults_of_a_binary_are_reported_at_once() {
-        let mut linux = good(Kind::Linux);
+        let mut linux = faultless(Kind::Linux);
         linux.libraries.push("libgcc_s.so.1".into());
         linux.needs = glibc_version("GLIBC_2.34");
         linux.exports.push("rust_eh_personality".into());
@@ -470,10 +470,10 @@ mod tests {
                 "it also exports rust_eh_personality",
             ]
         );
-        let mut windows = good(Kind::Windows);
+        let mut windows = faultless(Kind::Windows);
         windows.libraries.push("VCRUNTIME140.dll".into());
         assert_eq!(windows.faults(&[]).len(), 1);
-        let mut macos = good(Kind::MacOs);
+        let mut macos = faultless(Kind::MacOs);
         macos.architectures.pop();
         macos.needs = Some(Version(12, 0));
         macos.signature = Some("it is not signed".into());

@@ -137,7 +137,7 @@ pub fn run<A: AsRef<OsStr>>(
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let shown = output == Output::Shown;
-    let readers = [reader(first, shown), reader(second, shown)];
+    let readers = [start_reader(first, shown), start_reader(second, shown)];
     let started = Instant::now();
     let child = {
         // The process is registered, so that [`end_all`] finds it.
@@ -150,7 +150,7 @@ pub fn run<A: AsRef<OsStr>>(
     drop(command); // with its ends of the pipes
     let flood = if shown { FLOOD_SHOWN } else { FLOOD };
     let floods = || readers.iter().any(|reader| lock(&reader.printed).more > flood);
-    let cause = watch(child, &mut news, started, limits, &files, &floods)?;
+    let cause = wait_for_end(child, &mut news, started, limits, &files, &floods)?;
     let printed = readers.map(|reader| {
         // A process that was not found may keep the pipe open.
         let _ = reader.end.recv_timeout(Duration::from_millis(500));
@@ -164,7 +164,7 @@ pub fn run<A: AsRef<OsStr>>(
 }
 
 /// Waits until a process ends, or kills it if it exceeds a limit. Returns the reason why it ended.
-fn watch(
+fn wait_for_end(
     mut child: Child,
     news: &mut Messages<impl FnMut(&[u8])>,
     started: Instant,
@@ -206,7 +206,7 @@ fn watch(
         {
             counted_at = now;
             let most = limits.memory;
-            if disk_usage(files).saturating_sub(before) > most || shared(child.id()) > most {
+            if disk_usage(files).saturating_sub(before) > most || shared_memory(child.id()) > most {
                 cause = Some(Cause::Hoard);
                 break;
             }
@@ -265,7 +265,7 @@ fn on_disk(file: &std::fs::Metadata) -> u64 {
 /// Returns the memory that a process shares with other processes, bytes: the mapped memory, or the size of open files
 /// that are in no folder, whichever is larger.
 #[cfg(target_os = "linux")]
-fn shared(id: u32) -> u64 {
+fn shared_memory(id: u32) -> u64 {
     let process = Path::new("/proc").join(id.to_string());
     let status = std::fs::read_to_string(process.join("status")).unwrap_or_default();
     let mapped = kilobytes(&status, "RssShmem:").unwrap_or(0) << 10;
@@ -291,7 +291,7 @@ fn identity(file: &std::fs::Metadata) -> (u64, u64) {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn shared(_: u32) -> u64 {
+fn shared_memory(_: u32) -> u64 {
     0
 }
 
@@ -477,7 +477,7 @@ pub fn spawn(work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
 }
 
 /// Starts a thread that reads a pipe to its end and stores the beginning, so that the writer never has to wait.
-fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
+fn start_reader(mut pipe: PipeReader, shown: bool) -> Reader {
     let (printed, (tell, end)) = (Arc::<Mutex<Printed>>::default(), channel());
     let to = printed.clone();
     spawn(move || {
@@ -770,7 +770,7 @@ mod tests {
     #[test]
     fn a_panic_that_was_caught_does_not_explain_a_later_crash() {
         let cause = end_of("a_panic_that_was_caught_does_not_explain_a_later_crash", || {
-            bug::caught(|| -> i32 { panic!("a damaged file") }).unwrap_err();
+            bug::catch_panic(|| -> i32 { panic!("a damaged file") }).unwrap_err();
             std::process::abort();
         });
         assert!(matches!(cause, Cause::Ended(_)), "{cause:?}");

@@ -111,7 +111,7 @@ fn text(value: &Value) -> String {
     }
 }
 
-fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
+fn refuse_duplicates(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     for (k, parameter) in parameters.iter().enumerate() {
         let Parameter { name, line, .. } = parameter;
         if let Some(first) = parameters[..k].iter().find(|other| other.name == *name) {
@@ -166,7 +166,7 @@ fn from_toml(text: &str) -> Result<ParameterSet> {
         "{} cannot be a value of a parameter (allowed: numbers, true and false, texts)",
         wrong.join("; ")
     );
-    once(found)
+    refuse_duplicates(found)
 }
 
 /// A JSON object in which a repeated name is an error, whereas a map would silently keep the last value.
@@ -334,7 +334,7 @@ fn from_ssv(text: &str) -> Result<ParameterSet> {
         });
         parameters.push(Parameter { name, value, unit, line });
     }
-    once(parameters)
+    refuse_duplicates(parameters)
 }
 
 #[cfg(test)]

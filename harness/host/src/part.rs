@@ -141,7 +141,7 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
     let start_values = (!written.is_empty()).then_some(written);
     edits.set(&root, key, &token_of_part(token, limits, states, start_values.as_deref())?);
     edits.set(&root, "numberOfEventIndicators", &indicators.to_string());
-    Ok(Part { xml: edits.applied(xml), start_values })
+    Ok(Part { xml: edits.apply_to(xml), start_values })
 }
 
 /// Returns the GUID of a reduced description. Its format is described in `fmu/runtime/src/extent.rs`.
@@ -225,7 +225,7 @@ impl Edits {
         }
     }
 
-    fn applied(mut self, xml: &str) -> String {
+    fn apply_to(mut self, xml: &str) -> String {
         self.0.sort_by_key(|(range, _)| range.start);
         let (mut text, mut at) = (String::with_capacity(xml.len()), 0);
         for (range, value) in self.0 {

@@ -98,7 +98,7 @@ impl Wheel {
     /// Returns the torque on the craft for the commanded torque `asked`, and the time for which it can act, s.
     ///
     /// The torque is limited to `max_torque`. At the largest speed a torque that would increase the speed has no effect.
-    fn limited(&self, asked: f64) -> (f64, f64) {
+    fn limit_torque(&self, asked: f64) -> (f64, f64) {
         let torque = asked.clamp(-self.max_torque, self.max_torque);
         let rate = -torque / self.inertia;
         let left = self.max_speed.copysign(rate) - self.speed;
@@ -224,7 +224,7 @@ impl Feedback {
         };
         let mut acting = self.now.clone();
         for wheel in &wheels.each {
-            acting[wheel.place] = wheel.limited(self.now[wheel.place]).0;
+            acting[wheel.place] = wheel.limit_torque(self.now[wheel.place]).0;
         }
         self.commands.push(&acting);
         self.record_speeds();
@@ -248,7 +248,7 @@ impl Feedback {
             *h += *slope * wheels.step;
             *slope = 0.0;
         }
-        let full_at = |wheel: &Wheel| begin + wheel.limited(self.now[wheel.place]).1;
+        let full_at = |wheel: &Wheel| begin + wheel.limit_torque(self.now[wheel.place]).1;
         for wheel in &mut wheels.each {
             if full_at(wheel) <= begin {
                 wheel.speed = wheel.max_speed.copysign(-self.now[wheel.place]);
@@ -257,7 +257,7 @@ impl Feedback {
         let stop = wheels.each.iter().map(full_at).fold(end, f64::min);
         wheels.step = stop - begin;
         for wheel in &mut wheels.each {
-            let (torque, _) = wheel.limited(self.now[wheel.place]);
+            let (torque, _) = wheel.limit_torque(self.now[wheel.place]);
             for (slope, axis) in wheels.slope.iter_mut().zip(wheel.axis) {
                 *slope -= torque * axis;
             }

@@ -67,7 +67,7 @@ impl Instance {
         calls: impl FnOnce(&mut Held) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         let (result, warnings) = py.detach(|| {
-            self.alone(|held| {
+            self.with_exclusive_access(|held| {
                 let held = held.as_mut().ok_or(FmuError::new_err("the instance is closed"))?;
                 let result = calls(held);
                 Ok((result, held.instance.take_warnings()))
@@ -81,7 +81,10 @@ impl Instance {
         result
     }
 
-    fn alone<T>(&self, calls: impl FnOnce(&mut Option<Held>) -> PyResult<T>) -> PyResult<T> {
+    fn with_exclusive_access<T>(
+        &self,
+        calls: impl FnOnce(&mut Option<Held>) -> PyResult<T>,
+    ) -> PyResult<T> {
         if self.caller.load(Ordering::Relaxed) == this_thread() {
             return Err(FmuError::new_err(
                 "the instance cannot be closed while one of its calls is running; wait for the end of the call",
@@ -117,7 +120,7 @@ impl Instance {
     /// Free the instance; a call that another thread is making ends first.
     fn close(&self, py: Python) -> PyResult<()> {
         py.detach(|| {
-            self.alone(|held| {
+            self.with_exclusive_access(|held| {
                 *held = None;
                 Ok(())
             })

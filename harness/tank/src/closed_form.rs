@@ -18,7 +18,7 @@ const ERROR: f64 = 1e-11;
 /// Returns the sum of tanh(k h/2)/k^5 over all wave numbers k above `last`, which are `step` apart: the remainder of a
 /// series. The sum is replaced by the integral (1/step) int dk (midpoint rule in reverse), with u = 1/k. The terms fall
 /// as k^-5 for large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
-fn tail(last: f64, step: f64, h: f64) -> f64 {
+fn series_remainder(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
     let of_node = |(v, w): (&f64, &f64)| w * (v * end).powi(3) * (0.5 * h / (v * end)).tanh();
@@ -66,7 +66,7 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
 
 /// Returns the elevation of a mode with the wave number `k`, 1/m, sampled over the free surface
 /// between the radii `inner` and `outer`, m.
-fn sampled([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> Surface {
+fn sample_surface([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
     Surface {
@@ -108,7 +108,7 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
         let square = xi * xi - 1.0;
         let m = m_liq * 2.0 * r * (k * h).tanh() / (xi * square * h);
         let wave = 2.0 * r / square;
-        let mut surface = sampled([0.0, r], k, |x| wave * libm::j1(k * x) / libm::j1(xi));
+        let mut surface = sample_surface([0.0, r], k, |x| wave * libm::j1(k * x) / libm::j1(xi));
         if n == 0 {
             surface.peak = Some([r, wave]);
         }
@@ -119,7 +119,7 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
         mode
     };
     let sum: f64 = xi.iter().map(|x| (0.5 * x * h / r).tanh() / (x.powi(3) * (x * x - 1.0))).sum();
-    let sum = sum + tail(xi[xi.len() - 1], PI, h / r);
+    let sum = sum + series_remainder(xi[xi.len() - 1], PI, h / r);
     let i_eff = m_liq * (h * h / 12.0 - 0.75 * r * r + 16.0 * r.powi(3) / h * sum);
     let wall = vec![Segment::line([0.0, 0.0], [r, 0.0]), Segment::line([r, 0.0], [r, h])];
     let inertias = [m_liq * (0.25 * r * r + h * h / 12.0), 0.5 * m_liq * r * r, i_eff];
@@ -177,7 +177,7 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
         let Radial { k, a, n, at_inner, at_outer } = all[i];
         let m = rho * PI * k * (k * h).tanh() * a * a / n;
         let c = |r: f64| libm::j1(k * r) * y1_slope(k * ro) - libm::y1(k * r) * j1_slope(k * ro);
-        let mut surface = sampled([ri, ro], k, |r| a * c(r) / n);
+        let mut surface = sample_surface([ri, ro], k, |r| a * c(r) / n);
         if i == 0 {
             let peak =
                 surface.shape.iter().copied().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()));
@@ -201,7 +201,7 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
     let weight = |x: &Radial| 8.0 * x.a * x.a / x.n * x.k.powi(4);
     let terms = all.iter().map(|x| weight(x) * (0.5 * x.k * h).tanh() / x.k.powi(5));
     let apart = 2.0 * PI / (ro - ri);
-    let tails = all[all.len() - 2..].iter().map(|x| weight(x) * tail(x.k, apart, h));
+    let tails = all[all.len() - 2..].iter().map(|x| weight(x) * series_remainder(x.k, apart, h));
     let sum = terms.sum::<f64>() + tails.sum::<f64>();
     let rigid = area * h.powi(3) / 12.0 - 0.75 * h * (ro.powi(4) - ri.powi(4));
     let axial = 0.5 * m_liq * (ro * ro + ri * ri);
@@ -250,7 +250,7 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
         let m = m_liq * 8.0 * (k * h).tanh() / (a * a * h * k.powi(3));
         let wave = 4.0 / (a * k * k);
         let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let surface = sampled([0.0, 0.5 * a], k, |x| sign * wave * (k * x).sin());
+        let surface = sample_surface([0.0, 0.5 * a], k, |x| sign * wave * (k * x).sin());
         let shallow = 2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh();
         let beta = 2.0 / a + 2.0 / width + shallow;
         let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
@@ -276,7 +276,7 @@ fn effective(a: f64, b: f64) -> f64 {
             (0.5 * k * b).tanh() / k.powi(5)
         })
         .sum();
-    let sum = sum + tail((2 * TERMS - 1) as f64 * PI / a, 2.0 * PI / a, b);
+    let sum = sum + series_remainder((2 * TERMS - 1) as f64 * PI / a, 2.0 * PI / a, b);
     b * b / 12.0 - 0.25 * a * a + 64.0 / (a * a * b) * sum
 }
 

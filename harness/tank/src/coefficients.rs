@@ -99,7 +99,7 @@ pub enum EnergySource {
 }
 
 impl EnergySource {
-    pub fn words(self) -> &'static str {
+    pub fn describe(self) -> &'static str {
         match self {
             EnergySource::CylinderTable => "upright cylinders",
             EnergySource::SphereTable => "spheres",
@@ -121,7 +121,7 @@ pub enum LimitSource {
 }
 
 impl LimitSource {
-    pub fn words(self) -> &'static str {
+    pub fn describe(self) -> &'static str {
         match self {
             LimitSource::PotentialFlow => {
                 "fully nonlinear potential flow in this shape, free and forced"

@@ -366,7 +366,7 @@ impl Contour {
                     .zip(there)
                     .any(|(a, b)| (a - b).abs() > 2.0 * SHOULDER / STEEP * self.size)
                 {
-                    return Err(shoulder(fill));
+                    return Err(horizontal_wall_problem(fill));
                 }
             }
         }
@@ -380,7 +380,9 @@ impl Contour {
                 wall.push(segment.part(from, to));
             }
         }
-        let Some(end) = wall.last().map(Segment::end) else { return Err(shoulder(fill)) };
+        let Some(end) = wall.last().map(Segment::end) else {
+            return Err(horizontal_wall_problem(fill));
+        };
         let start = wall[0].start();
         let r_inner = if down.is_some() { start[0] } else { 0.0 };
         if end[0] - r_inner < 1e-6 * self.size {
@@ -393,7 +395,7 @@ impl Contour {
         let steep = |tangent: Point| tangent[1].abs() > STEEP;
         let outer = wall[wall.len() - 1].tangent(1.0);
         if !steep(outer) || (down.is_some() && !steep(wall[0].tangent(0.0))) {
-            return Err(shoulder(fill));
+            return Err(horizontal_wall_problem(fill));
         }
         Ok(Wall { segments: wall, r_outer: end[0], r_inner, z_surface: z })
     }
@@ -404,12 +406,12 @@ impl Contour {
         let start = self.segments[0].start();
         let level = LEVEL * self.size;
         if start[1] < z - level && start[0] > level {
-            return Err(shoulder(fill));
+            return Err(horizontal_wall_problem(fill));
         }
         match crossings[..] {
             [up] if up.up => Ok((None, up)),
             [down, up] if !down.up && up.up => Ok((Some(down), up)),
-            [] => Err(shoulder(fill)),
+            [] => Err(horizontal_wall_problem(fill)),
             _ => Err(format!(
                 "At a fill of {fill} m the height of the free surface passes through the contour {} times: \
                  separate pools or trapped gas, which one set of modes cannot represent.",
@@ -445,7 +447,7 @@ impl Contour {
                     b = a;
                 }
                 let is_above = |t: f64| segment.curve.point_at(t)[1] >= z;
-                let [a, b] = narrowed([a, b], |t| is_above(t) == above);
+                let [a, b] = bisect_change([a, b], |t| is_above(t) == above);
                 found.push(Crossing { segment: i, t: 0.5 * (a + b), up: next_above });
                 above = next_above;
             }
@@ -454,7 +456,7 @@ impl Contour {
     }
 }
 
-fn shoulder(fill: f64) -> Problems {
+fn horizontal_wall_problem(fill: f64) -> Problems {
     format!(
         "At a fill of {fill} m the free surface lies at a horizontal part of the wall, where the modes \
          are not defined; take a slightly different fill."
@@ -525,12 +527,12 @@ fn samples(segment: &Segment) -> usize {
 /// Returns, by bisection, the position between `first` and `second` at which the value of `holds` changes.
 pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let here = holds(first);
-    narrowed([first, second], |at| holds(at) == here)[0]
+    bisect_change([first, second], |at| holds(at) == here)[0]
 }
 
 /// Bisects between the positions `near` and `far`, until both are as close as possible to the position at which
 /// `is_near` changes from true (at `near`) to false (at `far`), and returns both.
-fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
+fn bisect_change([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..80 {
         let middle = 0.5 * (near + far);
         *if is_near(middle) { &mut near } else { &mut far } = middle;

@@ -8,7 +8,7 @@ use crate::coefficients::Coefficients;
 use crate::interpolation::Monotone;
 use crate::modal::ModalData;
 use crate::parameters::ParameterSet;
-use crate::table::{short, significant};
+use crate::table::{format_length, significant};
 
 /// Largest interpolation error between two points of a fill table, of s relative to 1 + |s| or of kappa relative to 1 +
 /// |kappa|. A larger error gives a warning.
@@ -56,7 +56,7 @@ fn coefficients(known: &Coefficients) -> [f64; 2] {
 }
 
 fn fills(rows: &[&AtFill]) -> String {
-    let all: Vec<String> = rows.iter().map(|at| short(at.fill)).collect();
+    let all: Vec<String> = rows.iter().map(|at| format_length(at.fill)).collect();
     all.join(", ")
 }
 
@@ -117,7 +117,7 @@ pub(crate) fn columns(
         };
         notes.push(format!(
             "fill {} m: s = {}, kappa = {}, {from}",
-            short(at.fill),
+            format_length(at.fill),
             significant(*s),
             significant(*kappa)
         ));
@@ -144,7 +144,7 @@ pub(crate) fn columns(
         let text = format!(
             "between the points s and kappa of mode {n} are within {worst:.0e} of 1 + |s| and 1 + |kappa|, the largest error at \
              a fill of {} m",
-            short(fill)
+            format_length(fill)
         );
         if worst > LARGEST {
             warnings.push(format!("{PREFIX}{text}: {} points are too few there", points.len()));

@@ -20,7 +20,7 @@ use crate::interpolation::Monotone;
 use crate::modal::ModalData;
 use crate::parameters::{Liquid, ParameterSet, Target, Value};
 use crate::sweep::{self, Sweep};
-use crate::table::{short, significant};
+use crate::table::{format_length, significant};
 use crate::tank::Tank;
 
 const CANDIDATES: usize = 97;
@@ -58,7 +58,7 @@ impl Curves {
         let curves = |n: usize| {
             [
                 rows.iter().map(|row| 1.0 / row.modes[n].l).collect(),
-                rows.iter().map(|row| bob(row, n)).collect(),
+                rows.iter().map(|row| bob_height(row, n)).collect(),
                 rows.iter().map(|row| row.modes[n].m / row.m_liq).collect(),
             ]
         };
@@ -104,7 +104,7 @@ impl Curves {
 
 /// Returns the height of the slosh mass of mode number `n` at rest, m. For a mode without mass,
 /// whose height is not defined, it is the height of the liquid's centre of mass.
-fn bob(row: &ModalData, n: usize) -> f64 {
+fn bob_height(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
 
@@ -264,8 +264,8 @@ pub fn parameters(
     set.notes.push(format!(
         "table of {} fills, {} to {} m; liquid_0 is the mass of liquid at the largest fill, outlet is the tank's lowest point",
         rows.len(),
-        short(first.fill),
-        short(last.fill)
+        format_length(first.fill),
+        format_length(last.fill)
     ));
     if let Some(Between { error: [frequency, mass, hinge], .. }) = between {
         set.notes.push(format!(
@@ -307,7 +307,7 @@ pub fn parameters(
             let mode = &row.modes[n];
             real(&fill::MASS.element([n + 1, at]), mode.m);
             real(&fill::LENGTH.element([n + 1, at]), mode.l);
-            real(&fill::HINGE.element([n + 1, at]), bob(row, n) + mode.l);
+            real(&fill::HINGE.element([n + 1, at]), bob_height(row, n) + mode.l);
             if liquid.nu.is_some() {
                 real(&fill::ZETA.element([n + 1, at]), ratios[i][n]);
             }

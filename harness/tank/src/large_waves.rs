@@ -829,7 +829,7 @@ fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
 }
 
 /// Returns the restoring force divided by the displacement, for m = g = l = 1; `u` is the squared displacement.
-fn pull(terms: &EnergyTerms, u: f64) -> f64 {
+fn restoring_stiffness(terms: &EnergyTerms, u: f64) -> f64 {
     1.0 / (1.0 - u).sqrt() + (terms.pair[1] - 1.0) * u / 2.0 + 0.375 * terms.next[1] * u * u
 }
 
@@ -837,7 +837,7 @@ fn pull(terms: &EnergyTerms, u: f64) -> f64 {
 /// frequency of small motion.
 fn circular_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let (u, [t, t_2]) = (angle.sin().powi(2), terms.rotary);
-    (pull(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()
+    (restoring_stiffness(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()
 }
 
 /// Returns the angle limit of a third-order slosh mass with the coefficients `pair` = (s, kappa), in a tank whose
@@ -910,7 +910,7 @@ fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
         .iter()
         .map(|wave| {
             let u = square(wave);
-            [u, (pull(&terms, u) / wave.frequency.powi(2) - 1.0) / u]
+            [u, (restoring_stiffness(&terms, u) / wave.frequency.powi(2) - 1.0) / u]
         })
         .collect();
     let [t, t_2] = line(&turns);

@@ -707,8 +707,8 @@ mod tests {
         let mesh = Discretisation::new(&wall.segments, modes, 16, false);
         // Above 20 points the rules for points close to the panel do not get more accurate.
         let top = (1000 / mesh.panel_count()).clamp(8, 20);
-        let [rough, exact] = [top - 4, top]
-            .map(|order| approximate(&mesh.halved(order), &wall, &volume, 1.0, modes));
+        let [rough, exact] =
+            [top - 4, top].map(|order| approximate(&mesh.halve(order), &wall, &volume, 1.0, modes));
         let (rough, exact) = (rough?, exact?);
         // The stated error is twice the difference.
         let off = |a: &Approximation| {

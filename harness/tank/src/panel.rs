@@ -179,7 +179,7 @@ impl Boundary {
     }
 
     #[cfg(test)]
-    pub(crate) fn halved(panels: &[Panel]) -> Vec<Panel> {
+    pub(crate) fn halve(panels: &[Panel]) -> Vec<Panel> {
         let halves = |panel: &Panel| {
             let length = 0.5 * panel.length;
             let inner = Panel { length, ..*panel };

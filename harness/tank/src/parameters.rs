@@ -14,7 +14,7 @@ use formulas::limits::LOW_BOND;
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
 use crate::spin::spin;
-use crate::table::{short, significant};
+use crate::table::{format_length, significant};
 use crate::tank::{Fill, Geometry, Shape, Tank};
 use crate::{damping, modal};
 
@@ -315,7 +315,7 @@ impl ParameterSet {
         has_energy: bool,
     ) -> Result<ParameterSet, Problems> {
         let name = data.name.as_deref().unwrap_or("tank");
-        let (fill, ModalData { error, error_i_0, .. }) = (short(data.fill), data);
+        let (fill, ModalData { error, error_i_0, .. }) = (format_length(data.fill), data);
         let mut set = ParameterSet::default();
         set.notes.push(format!(
             "{name}, fill {fill} m: modal parameters with an error of {error:.0e}, of I_0 {error_i_0:.0e} m R^2"
@@ -462,7 +462,7 @@ impl ParameterSet {
                 set.notes.push(format!(
                     "nonlinear_inertia[{n}] to rotary_inertia_2[{n}]: fully nonlinear potential flow in {}, frequency (error {:.0e}) and \
                      energy (error {:.0e}) of the wave up to {:.1} degrees; angle_limit is {:.1} degrees",
-                    energy.source.words(),
+                    energy.source.describe(),
                     energy.frequency_error,
                     energy.energy_error,
                     energy.frequency_limit.to_degrees(),
@@ -481,7 +481,7 @@ impl ParameterSet {
                     false => format!("error {:.0e}", known.error),
                 },
                 known.angle_limit.to_degrees(),
-                known.angle_limit_from.words()
+                known.angle_limit_from.describe()
             ));
         }
         if is_linear {

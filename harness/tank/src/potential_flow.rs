@@ -84,8 +84,8 @@ impl Discretisation {
     }
 
     #[cfg(test)]
-    pub(crate) fn halved(&self, order: usize) -> Discretisation {
-        Discretisation::on_panels(self.boundary.clone(), Boundary::halved(&self.panels), order)
+    pub(crate) fn halve(&self, order: usize) -> Discretisation {
+        Discretisation::on_panels(self.boundary.clone(), Boundary::halve(&self.panels), order)
     }
 
     pub(crate) fn panel_count(&self) -> usize {

@@ -42,7 +42,7 @@ impl Recognised {
 /// Recognises a wetted wall as a sphere, upright cylinder, cone or torus. `fill` is the height of the free
 /// surface above the lowest point, m.
 pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
-    let points = sampled(wall, PLACES);
+    let points = sample_points(wall, PLACES);
     let cut = Cut::from_whole_wall(&points, fill)?;
     KINDS.into_iter().find_map(|kind| {
         let shape = kind.shape_through(cut)?;
@@ -69,7 +69,7 @@ pub(crate) struct Part {
 /// the fill and in the shape of the tank.
 pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     let places = (SAMPLES / wall.segments.len()).clamp(2, PLACES);
-    let points = sampled(wall, places);
+    let points = sample_points(wall, places);
     let mut found: Vec<Part> =
         KINDS.into_iter().filter_map(|kind| kind.part(&points, fill)).collect();
     // A shallow wall can be similar to several shapes. Their shares are weighted so that the ratio of each share to the
@@ -94,7 +94,7 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
 /// Returns the measured shapes that are similar to the whole wetted wall. The share of a shape falls from 1 for an
 /// exact wall to 0 at the distance [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
 pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
-    let points = sampled(wall, PLACES);
+    let points = sample_points(wall, PLACES);
     let Some(cut) = Cut::from_whole_wall(&points, fill) else { return Vec::new() };
     let widest = points.iter().fold(0.0, |widest: f64, p| widest.max(p[0]));
     // The radius of a flat pool or the height of a thin pipe would be too large a size: every shape would be similar
@@ -121,7 +121,7 @@ const LEAST: f64 = 0.02;
 
 const SAMPLES: usize = 256;
 
-fn sampled(wall: &Wall, places: usize) -> Vec<Point> {
+fn sample_points(wall: &Wall, places: usize) -> Vec<Point> {
     let on = |part: &Segment| -> Vec<Point> {
         (0..=places).map(|i| part.point_at(i as f64 / places as f64)).collect()
     };

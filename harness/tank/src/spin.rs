@@ -62,7 +62,7 @@ pub fn spin(
             .into());
     };
     let volume = data.m_liq / data.rho;
-    let surface = Surface::holding(contour, volume, omega, gravity);
+    let surface = Surface::with_volume(contour, volume, omega, gravity);
     if contour.count_pools(|z| surface.inner(z)) != 1 {
         return Err(format!(
             "At {omega} rad/s the surface meets the wall at several heights, so that the liquid may lie in separate pools, \
@@ -150,7 +150,7 @@ struct Surface {
 impl Surface {
     /// Returns the surface of the rotating liquid if `contour` contains the volume `volume`, m3, of liquid. `omega` is
     /// the rate, rad/s, `gravity` the specific force, m/s2.
-    fn holding(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
+    fn with_volume(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();
         let low = gravity * bottom - 0.5 * omega * omega * radius * radius;

@@ -38,7 +38,7 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
             cross(a, b).atan2(dot(a, b)).abs() > CORNER
         };
         if corner || last {
-            smooth(&thinned(&points[first..=i], points.len()), &mut segments);
+            smooth(&thin_points(&points[first..=i], points.len()), &mut segments);
             first = i;
         }
     }
@@ -46,7 +46,7 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
 }
 
 /// Keeps every k-th point and both ends, with k so that `total` points give about 100 segments.
-fn thinned(points: &[Point], total: usize) -> Vec<Point> {
+fn thin_points(points: &[Point], total: usize) -> Vec<Point> {
     let every = total.div_ceil(MANY);
     let last = points.len() - 1;
     let count = last.div_ceil(every);

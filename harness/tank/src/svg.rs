@@ -95,13 +95,13 @@ fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, Fault> {
             PathSegment::Quadratic { abs, x1, y1, x, y } => {
                 let (c, d) = (to(abs, x1, y1), to(abs, x, y));
                 next = Some((c, false));
-                segments.push(raised([here, c, d].map(place)));
+                segments.push(cubic_from_quadratic([here, c, d].map(place)));
                 d
             }
             PathSegment::SmoothQuadratic { abs, x, y } => {
                 let (c, d) = (mirrored(false), to(abs, x, y));
                 next = Some((c, false));
-                segments.push(raised([here, c, d].map(place)));
+                segments.push(cubic_from_quadratic([here, c, d].map(place)));
                 d
             }
             PathSegment::EllipticalArc { abs, rx, ry, x_axis_rotation, large_arc, sweep, x, y } => {
@@ -146,7 +146,7 @@ fn bezier([a, b, c, d]: [Point; 4]) -> Segment {
     Segment { curve: Curve::Cubic { c: coefficients }, from: 0.0, to: 1.0 }
 }
 
-fn raised([a, b, c]: [Point; 3]) -> Segment {
+fn cubic_from_quadratic([a, b, c]: [Point; 3]) -> Segment {
     let third = |p: Point, q: Point| [(p[0] + 2.0 * q[0]) / 3.0, (p[1] + 2.0 * q[1]) / 3.0];
     bezier([a, third(a, b), third(c, b), c])
 }

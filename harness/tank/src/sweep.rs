@@ -38,7 +38,7 @@ pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems
 }
 
 impl Sweep {
-    pub fn damp(&mut self, tank: &Tank, nu: f64, liquid: Liquid) -> Result<(), Problems> {
+    pub fn add_damping(&mut self, tank: &Tank, nu: f64, liquid: Liquid) -> Result<(), Problems> {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
             row.damping = Some(tank_damping(tank, row, nu, liquid)?);
         }

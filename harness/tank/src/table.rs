@@ -4,7 +4,7 @@ use crate::coefficients::FiniteAmplitude;
 use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest, Spin};
 
 /// Formats a length in m to 1e-9 m without trailing zeros, because fills from a volume have 17 digits.
-pub(crate) fn short(length: f64) -> String {
+pub(crate) fn format_length(length: f64) -> String {
     format!("{length:.9}").trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
@@ -17,7 +17,8 @@ pub(crate) fn significant(value: f64) -> String {
 /// `gravity`, m/s², unless the data have frequencies with surface tension.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = Text::default();
-    let (name, fill, rho) = (data.name.as_deref().unwrap_or("tank"), short(data.fill), data.rho);
+    let (name, fill, rho) =
+        (data.name.as_deref().unwrap_or("tank"), format_length(data.fill), data.rho);
     text.line(format!("{name}: fill {fill} m, density {rho} kg/m³"));
     text.line(format!("  heights               {}", data.origin()));
     if data.modes.is_empty() {
@@ -146,7 +147,7 @@ impl Text {
                 })
             };
             let swirl = rotary(known.swirl_limit);
-            let (limit, from) = (known.angle_limit.to_degrees(), known.angle_limit_from.words());
+            let (limit, from) = (known.angle_limit.to_degrees(), known.angle_limit_from.describe());
             self.line(format!("  in range: {frequency}up to {limit:.1} degrees{swirl} ({from})"));
             if let Some(energy) = &known.energy {
                 let [s, kappa, s_2, kappa_2, t, t_2] = energy.parameters().map(|(_, value)| value);

@@ -398,8 +398,9 @@ impl Tank {
                 }
             }),
         };
-        let full = if problems.is_empty() && solved.is_err() { self.full(fill) } else { None };
-        Ok(self.described(with_problems(problems, full.map_or(solved, Ok))?))
+        let full =
+            if problems.is_empty() && solved.is_err() { self.full_tank_data(fill) } else { None };
+        Ok(self.with_name_and_lowest_point(with_problems(problems, full.map_or(solved, Ok))?))
     }
 
     fn contour(&self) -> Option<&Contour> {
@@ -417,10 +418,10 @@ impl Tank {
         let bottom = self.contour().map_or(0.0, Contour::bottom);
         let data =
             ModalData::new(self.kind(), self.density, 0.0, 0.0, bottom, [0.0; 3], Vec::new());
-        self.described(data)
+        self.with_name_and_lowest_point(data)
     }
 
-    fn described(&self, mut data: ModalData) -> ModalData {
+    fn with_name_and_lowest_point(&self, mut data: ModalData) -> ModalData {
         data.name.clone_from(&self.name);
         if let Geometry::Revolution { contour, shape: None } = &self.geometry {
             data.z_lowest = contour.bottom();
@@ -430,7 +431,7 @@ impl Tank {
 
     /// Returns the modal data of the full closed tank, which has neither a free surface nor modes;
     /// `None` if `fill` is not the full height.
-    fn full(&self, fill: f64) -> Option<ModalData> {
+    fn full_tank_data(&self, fill: f64) -> Option<ModalData> {
         let contour = self.contour()?;
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
             return None;

@@ -166,7 +166,7 @@ impl Tested for Fmi2 {
             let _ = session.instance.exit_initialization_mode();
         });
         if session.initialise().is_ok() {
-            session.refused();
+            session.provoke_refusal();
             let _ = session.advance(STEPS); // after an error an FMU may refuse all calls
         }
         all.extend(session.instance.take_messages());

@@ -309,10 +309,11 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
     let mut heard = 0;
     let mut run = |mut using: Use| -> Result<()> {
         let stepping = using.interface == Interface::CoSimulation;
-        using.updates = stepping && subject.can(using.interface, "providesIntermediateUpdate");
+        using.updates =
+            stepping && subject.has_capability(using.interface, "providesIntermediateUpdate");
         let mut session = subject.running(using)?;
         session.advance(2)?;
-        heard += session.refused().map_or(0, |error| error.messages.len());
+        heard += session.provoke_refusal().map_or(0, |error| error.messages.len());
         heard += session.instance.take_messages().len() + session.instance.updates();
         Ok(())
     };
@@ -334,7 +335,7 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
 
 pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
-    if let Some(error) = session.refused()
+    if let Some(error) = session.provoke_refusal()
         && error.status == Status::Error
         && error.messages.is_empty()
     {

@@ -519,7 +519,7 @@ fn real(values: &[Value]) -> Vec<f64> {
 }
 
 /// Returns the value of `unknown` while one element of `known` is displaced by `by` from `base`.
-fn displaced(
+fn unknown_at_displacement(
     session: &mut Session,
     unknown: &Variable,
     known: &Variable,
@@ -587,8 +587,16 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 )?;
                 let h = 1e-5 * base[element].abs().max(1e-3 * known.nominal()).max(1e-6);
                 let mut differences = |h: f64| -> Result<Vec<Difference>> {
-                    let plus = displaced(&mut session, &unknown, &known, &base, element, h)?;
-                    let minus = displaced(&mut session, &unknown, &known, &base, element, -h)?;
+                    let plus =
+                        unknown_at_displacement(&mut session, &unknown, &known, &base, element, h)?;
+                    let minus = unknown_at_displacement(
+                        &mut session,
+                        &unknown,
+                        &known,
+                        &base,
+                        element,
+                        -h,
+                    )?;
                     Ok(plus.iter().zip(&minus).map(|(a, b)| Difference::new(*a, *b, h)).collect())
                 };
                 let mut last = differences(h)?;
@@ -622,7 +630,7 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = require_derivatives(subject, "providesAdjointDerivatives")?;
-    if !subject.can(using.interface, "providesDirectionalDerivatives") {
+    if !subject.has_capability(using.interface, "providesDirectionalDerivatives") {
         return skip(
             "the FMU provides no directional derivatives with which adjoint ones can be compared",
         );
@@ -711,7 +719,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
             for element in 0..base.len() {
                 let by = 1e-2 * base[element].abs().max(known.nominal());
                 subject.announce(format!("moving {} and reading {}", known.name, v.name));
-                let after = displaced(&mut session, v, known, &base, element, by)?;
+                let after = unknown_at_displacement(&mut session, v, known, &base, element, by)?;
                 if after.iter().zip(&before).any(|(a, b)| follows(*a, *b)) {
                     findings.at(format!("line {}, {}, {}", unknown.line, unknown.list, v.name)).add(format!(
                             "the unknown changes with {}, which is not among its dependencies: {before:?} becomes {after:?}",
@@ -727,8 +735,9 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let uses = subject.plain_uses().into_iter();
-    let using =
-        uses.into_iter().find(|u| subject.can(u.interface, "providesPerElementDependencies"));
+    let using = uses
+        .into_iter()
+        .find(|u| subject.has_capability(u.interface, "providesPerElementDependencies"));
     let Some(using) = using else {
         return skip("providesPerElementDependencies is not declared");
     };

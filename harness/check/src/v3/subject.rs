@@ -60,11 +60,11 @@ impl Tested for Fmi3 {
     fn uses(fmu: &Subject) -> Vec<Use> {
         let mut uses = fmu.plain_uses();
         let stepping = Interface::CoSimulation;
-        if fmu.has(stepping) && fmu.can(stepping, "hasEventMode") {
+        if fmu.has(stepping) && fmu.has_capability(stepping, "hasEventMode") {
             uses.push(Use { event_mode: true, ..Use::PLAIN });
             uses.push(Use { event_mode: true, early_return: true, ..Use::PLAIN });
         }
-        if fmu.has(stepping) && fmu.can(stepping, "mightReturnEarlyFromDoStep") {
+        if fmu.has(stepping) && fmu.has_capability(stepping, "mightReturnEarlyFromDoStep") {
             uses.push(Use { early_return: true, ..Use::PLAIN });
         }
         uses
@@ -127,7 +127,7 @@ impl Tested for Fmi3 {
     fn provoke_messages(fmu: &Subject) -> Result<(Vec<Message>, usize)> {
         let mut session = fmu.running(fmu.plain_uses()[0])?;
         session.advance(2)?;
-        let refused = session.refused();
+        let refused = session.provoke_refusal();
         let mut messages = session.instance.take_messages();
         messages.extend(refused.into_iter().flat_map(|error| error.messages));
         Ok((messages, session.instance.uncategorised()))
@@ -164,12 +164,14 @@ impl Session<'_> {
     pub fn enter_initialization(&mut self) -> Result<()> {
         self.fmu.announce("fmi3EnterInitializationMode");
         let tolerance = self.fmu.experiment().tolerance;
-        self.instance.enter_initialization_mode(tolerance, self.time, None).map_err(starts)
+        self.instance
+            .enter_initialization_mode(tolerance, self.time, None)
+            .map_err(initialisation_failure)
     }
 
     pub fn leave_initialization(&mut self) -> Result<()> {
         self.fmu.announce("fmi3ExitInitializationMode");
-        self.instance.exit_initialization_mode().map_err(starts)?;
+        self.instance.exit_initialization_mode().map_err(initialisation_failure)?;
         if self.using.event_mode || self.using.interface == Interface::ModelExchange {
             self.leave_event()?;
         }
@@ -273,7 +275,7 @@ impl Session<'_> {
     }
 }
 
-fn starts(error: CallError) -> anyhow::Error {
+fn initialisation_failure(error: CallError) -> anyhow::Error {
     Unusable { rule: "load.initialises", why: error.to_string() }.into()
 }
 

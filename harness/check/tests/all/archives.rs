@@ -7,24 +7,24 @@ use host::xml::Element;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::common::{XML, binary, breaks, broken, look, ours, with, xml, zipped};
+use crate::common::{XML, binary, breaks, broken_rules, check_bytes, our_files, with, xml, zipped};
 
 #[test]
 fn archives_that_break_hosts_are_reported() {
     const DEFLATED: CompressionMethod = CompressionMethod::Deflated;
-    let whole = zipped(ours(), DEFLATED);
+    let whole = zipped(our_files(), DEFLATED);
     let renamed = |from: &str, to: &str| {
-        let mut files = ours().clone();
+        let mut files = our_files().clone();
         files.iter_mut().find(|(name, _)| name == from).unwrap().0 = to.into();
         zipped(&files, DEFLATED)
     };
     let without = |start: &str| {
-        let mut files = ours().clone();
+        let mut files = our_files().clone();
         files.retain(|(name, _)| !name.starts_with(start));
         zipped(&files, DEFLATED)
     };
     let plus = |name: &str| {
-        let mut files = ours().clone();
+        let mut files = our_files().clone();
         files.push((name.into(), b"x".to_vec()));
         zipped(&files, DEFLATED)
     };
@@ -58,7 +58,7 @@ fn archives_that_break_hosts_are_reported() {
         to.add_symlink("extra/link", "../../outside", SimpleFileOptions::default()).unwrap();
         to.finish().unwrap().into_inner()
     };
-    let mut swapped = ours().clone();
+    let mut swapped = our_files().clone();
     swapped.swap(0, 1);
     breaks(
         vec![
@@ -158,9 +158,9 @@ fn archives_that_break_hosts_are_reported() {
 #[test]
 fn a_file_that_is_not_an_fmu_breaks_a_rule_whatever_rules_are_selected() {
     let mut link =
-        ZipWriter::new_append(Cursor::new(zipped(ours(), CompressionMethod::Stored))).unwrap();
+        ZipWriter::new_append(Cursor::new(zipped(our_files(), CompressionMethod::Stored))).unwrap();
     link.add_symlink("extra/link", "../../outside", SimpleFileOptions::default()).unwrap();
-    let without_description = ours().iter().filter(|(name, _)| name != XML).cloned().collect();
+    let without_description = our_files().iter().filter(|(name, _)| name != XML).cloned().collect();
     let cut = xml().into_bytes()[..1000].to_vec();
     for (content, rule) in [
         (b"not a zip archive".to_vec(), "zip.readable"),
@@ -170,11 +170,15 @@ fn a_file_that_is_not_an_fmu_breaks_a_rule_whatever_rules_are_selected() {
         (zipped(&with(XML, cut), CompressionMethod::Stored), "xml.well_formed"),
     ] {
         for only in ["xml.guid", "zip.capitals", "bin.name", "load.version"] {
-            let report = look(&content, &[only]);
-            assert!(broken(&report).contains(rule), "{rule}, --only {only}: {}", report.text());
+            let report = check_bytes(&content, &[only]);
+            assert!(
+                broken_rules(&report).contains(rule),
+                "{rule}, --only {only}: {}",
+                report.text()
+            );
         }
     }
-    let report = look(&zipped(ours(), CompressionMethod::Stored), &["xml.guid"]);
+    let report = check_bytes(&zipped(our_files(), CompressionMethod::Stored), &["xml.guid"]);
     assert_eq!((report.unchecked.clone(), report.outcomes.len()), (None, 1), "{}", report.text());
 }
 
@@ -183,9 +187,9 @@ fn a_report_without_a_checked_rule_is_an_error_in_sarif_and_junit() {
     for (content, only) in [
         (&b"not a zip archive"[..], "xml"),
         // a rule that exists only for FMI 3.0
-        (&zipped(ours(), CompressionMethod::Stored), "events"),
+        (&zipped(our_files(), CompressionMethod::Stored), "events"),
     ] {
-        let report = look(content, &[only]);
+        let report = check_bytes(content, &[only]);
         let mut file = Vec::new();
         check::sarif::write(&report, &mut file).unwrap();
         let sarif: serde_json::Value = serde_json::from_slice(&file).unwrap();

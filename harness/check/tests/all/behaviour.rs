@@ -8,15 +8,15 @@ use host::fmu::Fmu;
 use zip::CompressionMethod;
 
 use crate::common::{
-    binary, broken, cases, changed, check_rules, compiled, described, keep, look, ours, with, xml,
-    zipped,
+    binary, broken_rules, cases, changed, check_bytes, check_rules, compiled, keep, our_files,
+    our_fmu_with_description, with, xml, zipped,
 };
 
 /// Returns our FMU with one misbehaviour of the shim around its binary; `word` names the misbehaviour in shim.c.
 fn misbehaving(word: &str) -> Vec<u8> {
     let name = binary();
     let folder = format!("binaries/{PLATFORM}");
-    let ours = ours().iter().find(|(n, _)| *n == name).unwrap().1.clone();
+    let ours = our_files().iter().find(|(n, _)| *n == name).unwrap().1.clone();
     let mut files = with(&name, compiled("shim.c", &[]));
     let text = xml();
     let guid = text.split("guid=\"").nth(1).unwrap().split('"').next().unwrap();
@@ -36,7 +36,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     let path = folder.path().join("Mutant.fmu");
     std::fs::write(&path, misbehaving("hands_its_own")).unwrap();
     let report = check_rules(&path, &["log", "instantiate", "life.order", "values.unknown"], 60.0);
-    assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
     let fmu = Fmu::open(&path).unwrap();
     let begin = |friction: &str| -> anyhow::Result<()> {
         let mut instance = fmu.instantiate("a")?;
@@ -145,13 +145,13 @@ fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
     let rules: Vec<&str> = rules.into_iter().collect();
     // Without a misbehaviour the library breaks no rule.
     keep("none", &misbehaving("none"), &[]);
-    let report = look(&misbehaving("none"), &rules);
-    assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
+    let report = check_bytes(&misbehaving("none"), &rules);
+    assert_eq!(broken_rules(&report), BTreeSet::new(), "{}", report.text());
     let mut untold = Vec::new();
     for (word, rule) in MISBEHAVIOURS {
         keep(word, &misbehaving(word), &[rule]);
-        let report = look(&misbehaving(word), &[rule]);
-        if !broken(&report).contains(rule) {
+        let report = check_bytes(&misbehaving(word), &[rule]);
+        if !broken_rules(&report).contains(rule) {
             untold.push(format!("{word} is not told by {rule}: {}", report.text()));
         }
     }
@@ -160,7 +160,7 @@ fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
 
 #[cfg(target_os = "linux")]
 fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
-    let report = look(&misbehaving(word), &[rule]);
+    let report = check_bytes(&misbehaving(word), &[rule]);
     (report.all().map(|(_, finding)| finding.severity).collect(), report.text())
 }
 
@@ -186,7 +186,7 @@ fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_
     assert!(found.is_empty(), "{text}");
     // a tunable parameter that is declared as fixed
     let fixed = changed("name=\"friction.b\"", "tunable", "fixed");
-    let report = look(&fixed, &["values.fixed"]);
+    let report = check_bytes(&fixed, &["values.fixed"]);
     let all: Vec<_> = report.all().collect();
     let [(_, finding)] = &all[..] else { panic!("{}", report.text()) };
     assert_eq!(finding.severity, Severity::Error);
@@ -237,7 +237,7 @@ fn descriptions_that_do_not_fit_the_binary_are_reported() {
             .replacen("valueReference=\"0\"", "valueReference=\"_\"", 1)
             .replacen("valueReference=\"1\"", "valueReference=\"0\"", 1)
             .replacen("valueReference=\"_\"", "valueReference=\"1\"", 1);
-        described(text)
+        our_fmu_with_description(text)
     };
     let unknown = |list: &str, name: &str, from: &str, to: &str| {
         let text = xml();
@@ -250,12 +250,12 @@ fn descriptions_that_do_not_fit_the_binary_are_reported() {
         let (head, tail) = text.split_at(at);
         assert!(tail.starts_with(&after) && tail[..tail.find("/>").unwrap()].contains(from));
         let text = format!("{head}{}", tail.replacen(from, to, 1));
-        described(text)
+        our_fmu_with_description(text)
     };
     let without_line = |word: &str| {
         let text = xml();
         let line = text.lines().find(|line| line.contains(word)).unwrap();
-        described(text.replacen(line, "", 1))
+        our_fmu_with_description(text.replacen(line, "", 1))
     };
     let words = cases::<5>(WORDS).into_iter();
     let words = words.map(|[name, after, from, to, rule]| (name, changed(after, from, to), rule));
@@ -307,8 +307,8 @@ fn descriptions_that_do_not_fit_the_binary_are_reported() {
     ];
     for (name, bytes, rule) in words.chain(others) {
         keep(name, &bytes, &[rule]);
-        let report = look(&bytes, &[rule]);
-        if !broken(&report).contains(rule) {
+        let report = check_bytes(&bytes, &[rule]);
+        if !broken_rules(&report).contains(rule) {
             wrong.push(format!("{name} is not told by {rule}: {}", report.text()));
         }
     }
@@ -317,9 +317,9 @@ fn descriptions_that_do_not_fit_the_binary_are_reported() {
 
 #[test]
 fn an_fmu_that_gives_no_instance_is_reported_once() {
-    let report = look(
+    let report = check_bytes(
         &changed("<fmiModelDescription", "guid=\"{", "guid=\"{x"),
         &["load", "life", "values", "steps"],
     );
-    assert_eq!(broken(&report), BTreeSet::from(["load.instance"]), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::from(["load.instance"]), "{}", report.text());
 }

@@ -7,7 +7,9 @@ use host::fmi2::PLATFORM;
 use pack::packed_for_tests;
 use zip::CompressionMethod;
 
-use crate::common::{binary, breaks, broken, changed, check_rules, look, ours, with, zipped};
+use crate::common::{
+    binary, breaks, broken_rules, changed, check_bytes, check_rules, our_files, with, zipped,
+};
 
 /// Our FMU, as it is packed for tests, has no finding except for the rule on system libraries.
 #[test]
@@ -31,7 +33,7 @@ fn our_own_fmu_breaks_no_rule() {
 #[test]
 fn binaries_that_no_host_can_use_are_reported() {
     let name = binary();
-    let ours = ours().iter().find(|(n, _)| *n == name).unwrap().1.clone();
+    let ours = our_files().iter().find(|(n, _)| *n == name).unwrap().1.clone();
     let at = |text: &[u8]| ours.windows(text.len()).position(|w| w == text).unwrap();
     let patched = |text: &[u8], to: &[u8]| {
         let mut bytes = ours.clone();
@@ -39,7 +41,7 @@ fn binaries_that_no_host_can_use_are_reported() {
         zipped(&with(&name, bytes), CompressionMethod::Stored)
     };
     let renamed = |to: &str| {
-        let mut files = self::ours().clone();
+        let mut files = self::our_files().clone();
         files.iter_mut().find(|(n, _)| *n == name).unwrap().0 = to.into();
         zipped(&files, CompressionMethod::Stored)
     };
@@ -51,7 +53,7 @@ fn binaries_that_no_host_can_use_are_reported() {
     };
     let (x86, arm) = (machine(62), machine(183)); // EM_X86_64, EM_AARCH64
     let both = |x86_64: &[u8], aarch64: &[u8]| {
-        let mut files = self::ours().clone();
+        let mut files = self::our_files().clone();
         files.retain(|(n, _)| *n != name);
         files.push(("binaries/linux64/HubSlosh.so".into(), x86_64.into()));
         files.push(("binaries/aarch64-linux/HubSlosh.so".into(), aarch64.into()));
@@ -134,13 +136,14 @@ fn binaries_that_no_host_can_use_are_reported() {
 /// The folder of the binary has wrong capitals, so no binary for this platform is found.
 #[test]
 fn a_check_that_could_not_call_the_fmu_states_this_in_its_report() {
-    let mut files = ours().clone();
+    let mut files = our_files().clone();
     let name = binary();
     files.iter_mut().find(|(n, _)| *n == name).unwrap().0 =
         "binaries/Linux64/HubSlosh.so".to_string();
     files.push(("binaries/win64/HubSlosh.dll".into(), b"MZ".to_vec()));
-    let report = look(&zipped(&files, CompressionMethod::Stored), &["zip", "bin.this_platform"]);
+    let report =
+        check_bytes(&zipped(&files, CompressionMethod::Stored), &["zip", "bin.this_platform"]);
     let expected = BTreeSet::from(["zip.capitals", "bin.this_platform"]);
-    assert_eq!(broken(&report), expected, "{}", report.text());
+    assert_eq!(broken_rules(&report), expected, "{}", report.text());
     assert!(report.count_findings(Severity::Error) > 0);
 }

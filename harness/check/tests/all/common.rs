@@ -17,7 +17,7 @@ pub type Files = Vec<(String, Vec<u8>)>;
 
 pub const XML: &str = "modelDescription.xml";
 
-pub fn ours() -> &'static Files {
+pub fn our_files() -> &'static Files {
     static FILES: OnceLock<Files> = OnceLock::new();
     FILES.get_or_init(|| {
         let file = std::fs::File::open(packed_for_tests()).unwrap();
@@ -48,16 +48,16 @@ pub fn binary() -> String {
 }
 
 pub fn xml() -> String {
-    String::from_utf8(ours().iter().find(|(name, _)| name == XML).unwrap().1.clone()).unwrap()
+    String::from_utf8(our_files().iter().find(|(name, _)| name == XML).unwrap().1.clone()).unwrap()
 }
 
 pub fn with(name: &str, content: Vec<u8>) -> Files {
-    let mut files = ours().clone();
+    let mut files = our_files().clone();
     files.iter_mut().find(|(n, _)| n == name).unwrap().1 = content;
     files
 }
 
-pub fn look(bytes: &[u8], only: &[&str]) -> Report {
+pub fn check_bytes(bytes: &[u8], only: &[&str]) -> Report {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("Mutant.fmu");
     std::fs::write(&path, bytes).unwrap();
@@ -73,7 +73,7 @@ pub fn check_rules(path: &Path, only: &[&str], limit: f64) -> Report {
     check::check(path, &options, |_| {}).unwrap()
 }
 
-pub fn broken(report: &Report) -> BTreeSet<&'static str> {
+pub fn broken_rules(report: &Report) -> BTreeSet<&'static str> {
     report.all().map(|(rule, _)| rule.id).collect()
 }
 
@@ -97,8 +97,8 @@ pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {
         keep(name, &bytes, meant);
-        let report = look(&bytes, groups);
-        let found = broken(&report);
+        let report = check_bytes(&bytes, groups);
+        let found = broken_rules(&report);
         if found != meant.iter().copied().collect() {
             wrong.push(format!("{name}: meant {meant:?}, found {found:?}\n{}", report.text()));
         }
@@ -115,7 +115,7 @@ pub fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
 
-pub fn described(text: String) -> Vec<u8> {
+pub fn our_fmu_with_description(text: String) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
 

@@ -6,7 +6,8 @@ use check::{RULES, Severity};
 use zip::CompressionMethod;
 
 use crate::common::{
-    XML, breaks, broken, changed, described, look, with, words_break, xml, zipped,
+    XML, breaks, broken_rules, changed, check_bytes, our_fmu_with_description, with, words_break,
+    xml, zipped,
 };
 
 /// Returns a DOCTYPE that defines ten entities, each of which expands to ten times the one before:
@@ -32,13 +33,15 @@ fn nested(levels: usize) -> String {
 #[test]
 fn xml_nested_200_000_levels_deep_is_refused_as_too_deep() {
     let bytes = zipped(&with(XML, nested(200_000).into_bytes()), CompressionMethod::Deflated);
-    let report = look(&bytes, &[]);
-    assert_eq!(broken(&report), BTreeSet::from(["xml.size"]), "{}", report.text());
+    let report = check_bytes(&bytes, &[]);
+    assert_eq!(broken_rules(&report), BTreeSet::from(["xml.size"]), "{}", report.text());
     assert!(report.text().contains("256 levels"), "{}", report.text());
     // Annotations of vendors with 50 levels are accepted.
-    let report =
-        look(&zipped(&with(XML, nested(50).into_bytes()), CompressionMethod::Stored), &["xml"]);
-    assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
+    let report = check_bytes(
+        &zipped(&with(XML, nested(50).into_bytes()), CompressionMethod::Stored),
+        &["xml"],
+    );
+    assert_eq!(broken_rules(&report), BTreeSet::new(), "{}", report.text());
 }
 
 #[test]
@@ -157,9 +160,9 @@ fn malicious_xml_and_elements_out_of_order_break_the_intended_rules() {
     let long = format!("hub.{}", "I".repeat(60));
     breaks(
         vec![
-            ("order of elements", described(no_order), &["xml.schema"][..]),
-            ("an entity bomb", described(entity_bomb()), &["xml.doctype"]),
-            ("200,000 levels", described(nested(200_000)), &["xml.size"]),
+            ("order of elements", our_fmu_with_description(no_order), &["xml.schema"][..]),
+            ("an entity bomb", our_fmu_with_description(entity_bomb()), &["xml.doctype"]),
+            ("200,000 levels", our_fmu_with_description(nested(200_000)), &["xml.size"]),
             ("a long name", changed("name=\"hub.I\"", "hub.I", &long), &["xml.parameter_names"]),
         ],
         &["xml"],
@@ -192,7 +195,11 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
             ("an initial unknown missing", without(initial), &["xml.initial_unknowns"]),
             ("an initial unknown twice", twice(initial), &["xml.initial_unknowns"]),
             ("initial unknowns unsorted", swapped, &["xml.initial_unknowns"]),
-            ("no dependencies", described(undeclared), &["xml.dependencies_written"]),
+            (
+                "no dependencies",
+                our_fmu_with_description(undeclared),
+                &["xml.dependencies_written"],
+            ),
         ],
         &["xml"],
     );
@@ -208,13 +215,13 @@ fn the_attribute_derivative_by_itself_makes_no_state() {
         changed(&format!("name=\"{variable}\""), "<Real", &derivative)
     };
     for (variable, index) in [("omega_dot", "2"), ("tau_ext", "13"), ("F_radial", "8")] {
-        let report = look(&of(variable, index), &["xml"]);
-        let rules = broken(&report);
+        let report = check_bytes(&of(variable, index), &["xml"]);
+        let rules = broken_rules(&report);
         let others: Vec<_> = rules.iter().filter(|rule| **rule != "xml.derivative_units").collect();
         assert!(others.is_empty(), "{variable}: {}", report.text());
     }
-    let report = look(&of("omega_dot", "9999"), &["xml"]);
-    assert_eq!(broken(&report), BTreeSet::from(["xml.states"]), "{}", report.text());
+    let report = check_bytes(&of("omega_dot", "9999"), &["xml"]);
+    assert_eq!(broken_rules(&report), BTreeSet::from(["xml.states"]), "{}", report.text());
 }
 
 #[test]
@@ -226,7 +233,7 @@ fn an_fmu_of_another_version_of_fmi_gets_one_finding() {
             &format!("fmiVersion=\"{version}\" odd=\"\""),
         );
         for only in [&[][..], &["zip"]] {
-            let report = look(&fmu, only);
+            let report = check_bytes(&fmu, only);
             let all: Vec<_> = report.all().collect();
             let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
             assert_eq!((rule.id, finding.severity), ("xml.fmi_version", Severity::Error));

@@ -8,7 +8,7 @@ use check::rules::fmi3;
 use host::fmi3::PLATFORM;
 use zip::CompressionMethod;
 
-use crate::common::{Files, broken, cases, compiled, look, zipped};
+use crate::common::{Files, broken_rules, cases, check_bytes, compiled, zipped};
 
 const XML: &str = include_str!("model3.xml");
 
@@ -25,7 +25,7 @@ fn files(mutant: u32) -> Files {
 }
 
 fn report(files: &Files, only: &[&str]) -> Report {
-    look(&zipped(files, CompressionMethod::Deflated), only)
+    check_bytes(&zipped(files, CompressionMethod::Deflated), only)
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn a_wrong_attribute_in_the_description_of_an_fmu_3_is_reported() {
         assert_eq!(XML.matches(&from).count(), 1, "{from}");
         files[0].1 = XML.replace(&from, &to).into();
         let report = report(&files, &["zip", "xml", "bin"]);
-        if !broken(&report).contains(rule) {
+        if !broken_rules(&report).contains(rule) {
             wrong.push(format!("{from} -> {to}: meant {rule}\n{}", report.text()));
         }
     }
@@ -113,7 +113,7 @@ fn co_simulation_of_an_fmu_with_clocks_is_not_called() {
     let mut files = files(0);
     files[0].1 = XML.replace("</ModelVariables>", clock).into_bytes();
     let report = report(&files, &["load", "steps.answers"]);
-    assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::new(), "{}", report.text());
     let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some());
     let skipped: Vec<_> = skipped.map(|o| o.rule.id).collect();
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
@@ -160,7 +160,7 @@ fn a_wrong_archive_of_an_fmu_3_is_reported() {
         files.extend(more.clone().map(|(name, text)| (name, text.into_bytes())));
         let report = report(&files, &["zip", "xml", "bin"]);
         assert!(
-            broken(&report).contains(rule),
+            broken_rules(&report).contains(rule),
             "{place}, {more:?}: meant {rule}\n{}",
             report.text()
         );
@@ -213,7 +213,7 @@ fn an_fmu_3_that_misbehaves_is_reported_by_the_intended_rule() {
     let mut wrong = Vec::new();
     for (mutant, rule) in BEHAVIOUR {
         let report = report(&files(*mutant), &[rule]);
-        if !broken(&report).contains(rule) {
+        if !broken_rules(&report).contains(rule) {
             wrong.push(format!("mutant {mutant}: meant {rule}\n{}", report.text()));
         }
     }
@@ -223,14 +223,14 @@ fn an_fmu_3_that_misbehaves_is_reported_by_the_intended_rule() {
 #[test]
 fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
     let report = report(&files(35), &["log", "instantiate", "intermediate", "steps", "values"]);
-    assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
 }
 
 /// If every run differs from every other run, a difference after a reset shows nothing.
 #[test]
 fn the_rule_on_reset_is_skipped_if_runs_differ_without_a_reset() {
     let report = report(&files(39), &["life"]);
-    assert_eq!(broken(&report), BTreeSet::from(["life.deterministic"]), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::from(["life.deterministic"]), "{}", report.text());
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn an_interface_that_cannot_be_loaded_is_reported_and_the_other_is_checked() {
         .into_bytes();
     files.push((binary().replace("Model3", "Other"), b"text".to_vec()));
     let report = report(&files, &["load", "exchange", "steps.answers"]);
-    assert_eq!(broken(&report), BTreeSet::from(["load.opens"]), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::from(["load.opens"]), "{}", report.text());
     let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some());
     let skipped: Vec<_> = skipped.map(|o| o.rule.id).collect();
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
@@ -263,5 +263,5 @@ fn an_fmu_3_that_declares_one_instance_per_process_passes_the_check() {
     let report = report(&declared, &[]);
     assert_eq!(report.all().count(), 0, "{}", report.text());
     let report = self::report(&undeclared, &["load.instance"]);
-    assert_eq!(broken(&report), BTreeSet::from(["load.instance"]), "{}", report.text());
+    assert_eq!(broken_rules(&report), BTreeSet::from(["load.instance"]), "{}", report.text());
 }

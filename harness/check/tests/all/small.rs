@@ -7,7 +7,7 @@ use check::{Report, Severity};
 use host::fmi2::PLATFORM;
 use zip::{CompressionMethod, ZipArchive};
 
-use crate::common::{Files, XML, broken, compiled, keep, look, zipped};
+use crate::common::{Files, XML, broken_rules, check_bytes, compiled, keep, zipped};
 
 struct Small<'a> {
     definitions: &'a [&'a str],
@@ -17,27 +17,29 @@ struct Small<'a> {
 }
 
 impl Small<'_> {
-    fn offers(&self, interface: &str) -> bool {
+    fn has_definition(&self, interface: &str) -> bool {
         self.definitions.contains(&interface)
     }
 
     fn xml(&self) -> String {
         let flags = "canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" \
                      canSerializeFMUstate=\"true\"";
-        let once = self.offers("-DONCE").then_some(" canBeInstantiatedOnlyOncePerProcess=\"true\"");
+        let once = self
+            .has_definition("-DONCE")
+            .then_some(" canBeInstantiatedOnlyOncePerProcess=\"true\"");
         let flags = flags.to_string() + once.unwrap_or_default();
-        let exchange = match self.offers("-DMODEL_EXCHANGE") {
+        let exchange = match self.has_definition("-DMODEL_EXCHANGE") {
             true => format!("<ModelExchange modelIdentifier=\"model\" {flags}/>"),
             false => String::new(),
         };
-        let stepping = match self.offers("-DCO_SIMULATION") {
+        let stepping = match self.has_definition("-DCO_SIMULATION") {
             true => format!(
                 "<CoSimulation modelIdentifier=\"model\" \
                  canHandleVariableCommunicationStepSize=\"true\" {flags}/>"
             ),
             false => String::new(),
         };
-        let derivatives = match self.offers("-DHIDDEN_STATE") {
+        let derivatives = match self.has_definition("-DHIDDEN_STATE") {
             true => "",
             false => {
                 "<Derivatives><Unknown index=\"2\" dependencies=\"1 4\" \
@@ -92,7 +94,7 @@ fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     let mut wrong = Vec::new();
     for (name, definitions, rate, experiment) in cases {
         let small = Small { definitions, rate: *rate, experiment };
-        let report = look(&small.packed(), &[]);
+        let report = check_bytes(&small.packed(), &[]);
         // A plain build is for this machine, and one case has a step that is too long on purpose.
         let fine = ["bin.system", "xml.default_experiment"];
         let others: Vec<_> = report.all().filter(|(rule, _)| !fine.contains(&rule.id)).collect();
@@ -139,14 +141,14 @@ fn correct_fmus_get_no_finding_whatever_their_experiment() {
 fn a_model_without_a_solution_is_reported_by_one_rule() {
     let definitions = &["-DMODEL_EXCHANGE", "-DBLOWS_UP"];
     let small = Small { definitions, rate: 10.0, experiment: USUAL };
-    let report = look(&small.packed(), &["life", "exchange", "values", "states"]);
-    assert_eq!(broken(&report), BTreeSet::from(["exchange.run"]), "{}", report.text());
+    let report = check_bytes(&small.packed(), &["life", "exchange", "values", "states"]);
+    assert_eq!(broken_rules(&report), BTreeSet::from(["exchange.run"]), "{}", report.text());
     let text = report.text();
     assert!(text.contains("cannot be followed past t = 0.1"), "{text}");
 }
 
 #[cfg(target_os = "linux")]
-fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
+fn check_co_simulation(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
     let all = [&BOTH[..1], definitions].concat();
     let bytes = Small { definitions: &all, rate: 1.0, experiment }.packed();
     let is_one_of = |list: &[&str]| definitions.iter().all(|one| list.contains(one));
@@ -160,7 +162,7 @@ fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
         let is_faultless = is_one_of(&["-DRESOURCES"]);
         keep(&definitions.concat(), &bytes, if is_faultless { &[] } else { only });
     }
-    look(&bytes, only)
+    check_bytes(&bytes, only)
 }
 
 #[cfg(target_os = "linux")]
@@ -177,7 +179,7 @@ fn outputs_that_lag_by_one_step_are_reported_and_intended_delays_are_not() {
         (&["-DEULER"], None),
         (&[], None),
     ] {
-        let report = stepped(habit, experiment, &["steps.lag"]);
+        let report = check_co_simulation(habit, experiment, &["steps.lag"]);
         let found: Vec<_> = report.all().map(|(_, finding)| finding.severity).collect();
         assert_eq!(found, Vec::from_iter(severity), "{habit:?}: {}", report.text());
         assert_eq!(report.outcomes[0].findings.skipped, None, "{}", report.text());
@@ -193,7 +195,7 @@ fn resources_are_found_by_any_file_uri() {
         (&["-DRESOURCES", "-DNEEDS_AUTHORITY"], &["location file:/"]),
         (&["-DRESOURCES", "-DRAW_LOCATION", "-DNEEDS_AUTHORITY"], &["%20b", "location file:/"]),
     ] {
-        let report = stepped(fault, USUAL, &["instantiate.resources"]);
+        let report = check_co_simulation(fault, USUAL, &["instantiate.resources"]);
         let places: Vec<_> = report.all().map(|(_, finding)| finding.place.as_str()).collect();
         assert_eq!(places.len(), told.len(), "{fault:?}: {}", report.text());
         for (place, part) in places.iter().zip(told) {
@@ -207,15 +209,16 @@ fn resources_are_found_by_any_file_uri() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_log_message_without_category_is_reported() {
-    let report = stepped(&["-DNO_CATEGORY"], USUAL, &["log"]);
-    assert_eq!(broken(&report), BTreeSet::from(["log.categories"]), "{}", report.text());
+    let report = check_co_simulation(&["-DNO_CATEGORY"], USUAL, &["log"]);
+    assert_eq!(broken_rules(&report), BTreeSet::from(["log.categories"]), "{}", report.text());
     assert!(report.text().contains("the category of the message is NULL"), "{}", report.text());
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn an_fmu_that_crashes_in_every_step_gets_a_single_finding() {
-    let report = stepped(&["-DCRASHES"], USUAL, &["life", "host", "values", "states", "steps"]);
+    let report =
+        check_co_simulation(&["-DCRASHES"], USUAL, &["life", "host", "values", "states", "steps"]);
     let all: Vec<_> = report.all().map(|(rule, _)| rule.id).collect();
     assert_eq!(all, ["steps.run"], "{}", report.text());
     let reasons = report.outcomes.iter().filter_map(|outcome| outcome.findings.reason());
@@ -244,7 +247,7 @@ fn a_fault_is_reported_by_its_own_rule_with_its_severity() {
         (&["-DSINGULAR"], &["dependencies", "load"], &[], &[]),
         (&["-DMOVED"], &["dependencies", "values.tunable"], &[], &[]),
     ] {
-        let report = stepped(fault, USUAL, groups);
+        let report = check_co_simulation(fault, USUAL, groups);
         let told = |severity| -> BTreeSet<&str> {
             let of = report.all().filter(|(_, finding)| finding.severity == severity);
             of.map(|(rule, _)| rule.id).collect()
@@ -267,9 +270,9 @@ fn undefined_symbols_of_cpp_and_python_are_reported_in_readable_form() {
         let undefined = format!("-DUNDEFINED={symbol}");
         let definitions = [BOTH, &[&undefined]].concat();
         let small = Small { definitions: &definitions, rate: 1.0, experiment: USUAL };
-        let report = look(&small.packed(), &["bin", "load"]);
+        let report = check_bytes(&small.packed(), &["bin", "load"]);
         let text = report.text();
-        assert!(broken(&report).contains("load.opens"), "{text}");
+        assert!(broken_rules(&report).contains("load.opens"), "{text}");
         assert!(text.contains(told), "{text}");
         assert!(text.contains("1001 symbols, among them pythonfmu::m000, "), "{text}");
         let longest = report.all().map(|(_, finding)| finding.text.len()).max();
@@ -283,7 +286,10 @@ fn windows_finds_a_library_in_other_capitals() {
     let with = |library: &str| {
         let files: Files =
             vec![(XML.into(), small.xml().into_bytes()), (library.into(), b"MZ".to_vec())];
-        broken(&look(&zipped(&files, CompressionMethod::Stored), &["bin.name", "bin.present"]))
+        broken_rules(&check_bytes(
+            &zipped(&files, CompressionMethod::Stored),
+            &["bin.name", "bin.present"],
+        ))
     };
     assert_eq!(with("binaries/win64/Model.dll"), BTreeSet::new());
     assert!(with("binaries/linux64/Model.so").contains("bin.name"));
@@ -316,7 +322,7 @@ fn each_interface_is_called_in_the_binary_that_it_names() {
         documentation("licenses/license.txt"),
         (format!("binaries/{PLATFORM}/other.so"), library(&exchange)),
     ];
-    let report = look(&zipped(&files, CompressionMethod::Stored), &[]);
+    let report = check_bytes(&zipped(&files, CompressionMethod::Stored), &[]);
     let found: Vec<_> = report.all().filter(|(rule, _)| rule.id != "bin.system").collect();
     assert!(found.is_empty(), "{}", report.text());
     let called = |id: &str, report: &Report| {
@@ -325,7 +331,7 @@ fn each_interface_is_called_in_the_binary_that_it_names() {
     assert!(called("exchange.run", &report) && called("steps.run", &report));
     // If the binary of one interface is missing, the other interface is still called.
     files.pop();
-    let report = look(&zipped(&files, CompressionMethod::Stored), &[]);
-    assert!(broken(&report).contains("bin.each_interface"), "{}", report.text());
+    let report = check_bytes(&zipped(&files, CompressionMethod::Stored), &[]);
+    assert!(broken_rules(&report).contains("bin.each_interface"), "{}", report.text());
     assert!(called("steps.run", &report) && !called("exchange.run", &report));
 }

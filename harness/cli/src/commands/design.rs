@@ -148,7 +148,7 @@ impl DesignArgs {
         let (time, torque, by_wheel) = self.torque(&wheel, &mut real)?;
         let bench = Bench::new(&self, &fmu, &mut real)?;
         let full = analysis::statistics::peak(&torque);
-        let (by_angle, torque) = bench.limited(&time, torque)?;
+        let (by_angle, torque) = bench.limit_slosh_angle(&time, torque)?;
         let plan = Plan {
             factor: by_wheel * by_angle,
             peak: analysis::statistics::peak(&torque),
@@ -224,7 +224,7 @@ impl DesignArgs {
         };
         let profile = written(peak).parse::<Written>()?.torque()?;
         let (factor, sweep) =
-            bench.limited(time, time.iter().map(|&t| profile.torque_at(t)).collect())?;
+            bench.limit_slosh_angle(time, time.iter().map(|&t| profile.torque_at(t)).collect())?;
         Ok(Sweep {
             profile: written(factor * peak),
             angle: design::slosh_angle(bench.fmu, &bench.setup, time, &sweep)?,
@@ -288,7 +288,7 @@ impl<'f> Bench<'f> {
         Ok(Bench { fmu, setup, sensor_errors, noise, limit: asked.slosh_angle })
     }
 
-    fn limited(&self, time: &[f64], torque: Vec<f64>) -> Result<(f64, Vec<f64>)> {
+    fn limit_slosh_angle(&self, time: &[f64], torque: Vec<f64>) -> Result<(f64, Vec<f64>)> {
         let Some(limit) = self.limit else { return Ok((1.0, torque)) };
         ensure!(limit > 0.0, "--slosh-angle must be a positive number, rad");
         let factor = design::within_angle(self.fmu, &self.setup, time, &torque, limit)?;
@@ -345,7 +345,7 @@ struct Plan {
 
 impl Plan {
     /// Returns the plain sweep if it determines the parameters more precisely than the planned torque, otherwise `None`.
-    fn better(&self) -> Option<&Sweep> {
+    fn more_precise_sweep(&self) -> Option<&Sweep> {
         let merit = design::merit(&self.bounds);
         self.sweep.as_ref().filter(|sweep| design::merit(&sweep.bounds) < merit)
     }
@@ -371,7 +371,7 @@ impl Plan {
             "slosh_angle": self.angle,
             "parameters": parameters(&self.bounds),
             "sweep": other,
-            "recommended": if self.better().is_some() { "sweep" } else { "this" },
+            "recommended": if self.more_precise_sweep().is_some() { "sweep" } else { "this" },
         })
     }
 
@@ -433,7 +433,7 @@ impl Plan {
             );
             println!(
                 "Recommended: {}",
-                match self.better() {
+                match self.more_precise_sweep() {
                     Some(_) => format!("the sweep, --profile {profile}"),
                     None => "the multisine".into(),
                 }

@@ -114,7 +114,7 @@ struct KnownArgs {
     tolerances: Vec<String>,
     /// Initial guess from which the search for a parameter starts; without it the guess is computed from the data. STD,
     /// if given, is the standard deviation of prior knowledge about the value.
-    #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = started)]
+    #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = parse_start)]
     starts: Vec<(String, f64, Option<f64>)>,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as by a sampled controller)
     /// or smooth (band-limited, as in a sampled recording of a smooth torque) [default: the behaviour that fits best].
@@ -258,7 +258,7 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     Ok(arguments)
 }
 
-fn started(text: &str) -> Result<(String, f64, Option<f64>)> {
+fn parse_start(text: &str) -> Result<(String, f64, Option<f64>)> {
     let (name, numbers) = setting(text)?;
     let number = |text: &str| text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
     let (value, std) = match numbers.split_once(':') {

@@ -154,7 +154,7 @@ impl TankArgs {
                     fill_table::parameters(&tank, &swept, between.as_ref(), target, liquid)
                 })?;
                 if let Some(nu) = self.nu {
-                    swept.damp(&tank, nu, self.liquid()).with_context(read)?;
+                    swept.add_damping(&tank, nu, self.liquid()).with_context(read)?;
                 }
                 let csv = swept.to_csv();
                 let json = serde_json::to_string_pretty(&swept.rows)? + "\n";

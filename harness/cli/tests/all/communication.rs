@@ -12,7 +12,7 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     command.current_dir(directory).args(arguments).output().unwrap()
 }
 
-fn refused(directory: &Path, arguments: &[&str]) -> String {
+fn expect_refusal(directory: &Path, arguments: &[&str]) -> String {
     let done = hubslosh(directory, arguments);
     assert_eq!(done.status.code(), Some(1), "{arguments:?}");
     String::from_utf8(done.stderr).unwrap()
@@ -182,7 +182,7 @@ fn the_option_sample_only_changes_the_interval_between_commands() {
     }
     let fmu = packed_for_tests().to_str().unwrap();
     let profile = "--profile=sine:frequency=30";
-    let said = refused(folder, &["run", "--fmu", fmu, "--out", "a.csv", profile, "--hold"]);
+    let said = expect_refusal(folder, &["run", "--fmu", fmu, "--out", "a.csv", profile, "--hold"]);
     assert!(said.contains("reaches 30 Hz") && said.contains("below 1.667e-2 s"), "{said}");
 }
 
@@ -211,7 +211,8 @@ fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
         let found = impulse("sine:amplitude=1,frequency=50,duration=0.01", step);
         assert!((found * std::f64::consts::TAU * 25.0 - 1.0).abs() < 1e-3, "{step}: {found}");
     }
-    let said = refused(folder, &["torque", "--profile", "lin-sweep:f1=1e9", "--out", "a.csv"]);
+    let said =
+        expect_refusal(folder, &["torque", "--profile", "lin-sweep:f1=1e9", "--out", "a.csv"]);
     assert!(said.contains("commands until 2700 s") && said.contains("is possible"), "{said}");
 }
 
@@ -275,10 +276,10 @@ fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
         "lin-sweep:f0=1,f1=60,duration=100",
         "file:path=in.csv",
     ] {
-        let said = refused(folder, &["design", "--profile", profile, "--fmu", fmu]);
+        let said = expect_refusal(folder, &["design", "--profile", profile, "--fmu", fmu]);
         assert!(said.contains("edges at multiples of 0.02 s, frequencies up to 3.56 Hz"), "{said}");
     }
-    let said = refused(folder, &["design", "--profile", "lin-sweep:f1=1e9", "--fmu", fmu]);
+    let said = expect_refusal(folder, &["design", "--profile", "lin-sweep:f1=1e9", "--fmu", fmu]);
     assert!(said.contains("commands until 2700 s"), "{said}");
 }
 
@@ -299,7 +300,7 @@ fn an_fmu_that_cannot_interpolate_has_inputs_that_are_constant_between_rows() {
     pack::archive::plain(&changed, &binary, "HubSlosh", None, &folder.join("held.fmu")).unwrap();
     write(folder, [(0.0, 0.1), (1.0, 0.2)].into_iter());
     let line = ["run", "--fmu", "held.fmu", "--input", "in.csv", "--out", "a.parquet"];
-    let said = refused(folder, &line);
+    let said = expect_refusal(folder, &line);
     for word in ["HubSlosh cannot interpolate its inputs", "tau_cmd is not constant", "--hold"] {
         assert!(said.contains(word), "{said}");
     }

@@ -20,15 +20,15 @@ fn campaign(directory: &Path, plan: &str) -> Command {
     command
 }
 
-fn said(output: &Output) -> (String, String) {
+fn printed_texts(output: &Output) -> (String, String) {
     let [said, error] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
     (said.into_owned(), error.into_owned())
 }
 
 fn successful(mut command: Command) -> (String, String) {
     let done = command.output().expect("the program runs");
-    assert!(done.status.success(), "{}", said(&done).1);
-    said(&done)
+    assert!(done.status.success(), "{}", printed_texts(&done).1);
+    printed_texts(&done)
 }
 
 fn names(directory: &Path) -> Vec<String> {
@@ -145,7 +145,7 @@ fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
     std::fs::write(&run, &flipped).unwrap();
     std::fs::remove_file(&manifest).unwrap();
     let done = campaign(directory, plan).output().unwrap();
-    let (_, error) = said(&done);
+    let (_, error) = printed_texts(&done);
     assert_eq!(done.status.code(), Some(1), "{error}");
     assert!(error.contains("nothing verifies the stored runs; restore it, or remove"), "{error}");
     std::fs::remove_dir_all(directory.join("c/runs")).unwrap();
@@ -191,7 +191,7 @@ fn a_second_campaign_in_a_directory_is_refused_with_the_name_of_the_first() {
     let plan = "title = \"Second\"\nprofile = \"sine:duration=0.2\"\n";
     let first = Store::take(&directory.join("c"), CAMPAIGN, "the plan \"First\"", None).unwrap();
     let done = campaign(directory, plan).output().unwrap();
-    let (_, error) = said(&done);
+    let (_, error) = printed_texts(&done);
     assert_eq!(done.status.code(), Some(1), "{error}");
     for words in ["c is in use by another campaign", "the plan \"First\"", "--out DIRECTORY"] {
         assert!(error.contains(words), "\"{words}\" is not in: {error}");
@@ -254,7 +254,7 @@ fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() 
 }
 
 #[cfg(unix)]
-fn limited(command: &Command, blocks: usize) -> Command {
+fn with_file_size_limit(command: &Command, blocks: usize) -> Command {
     let mut shell = Command::new("sh");
     // POSIX counts blocks of 512 bytes. With the signal ignored, a write beyond the limit fails as on a full disk.
     shell.args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"")]);
@@ -280,8 +280,8 @@ fn a_full_disk_gives_an_error_with_the_file_and_leaves_the_last_results() {
     let sweep = "title = \"B\"\nprofile = \"exp-sweep:duration=2700\"\n";
     let short = format!("title = \"C\"\nprofile = \"sine:duration=61\"\n{vary}");
     for (plan, file) in [(sweep, "c/runs/linear_100mm_100.parquet"), (&short, "c/report.html")] {
-        let done = limited(&campaign(directory, plan), room).output().unwrap();
-        let (_, error) = said(&done);
+        let done = with_file_size_limit(&campaign(directory, plan), room).output().unwrap();
+        let (_, error) = printed_texts(&done);
         assert_eq!(done.status.code(), Some(1), "{error}");
         assert!(error.contains(file), "{file} is not in: {error}");
         let after = published(directory);
@@ -294,8 +294,8 @@ fn a_full_disk_gives_an_error_with_the_file_and_leaves_the_last_results() {
     }
     let mut torque = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
     torque.current_dir(directory).args(["torque", "--profile", "exp-sweep", "--out", "t.csv"]);
-    let done = limited(&torque, room).output().unwrap();
-    let (_, error) = said(&done);
+    let done = with_file_size_limit(&torque, room).output().unwrap();
+    let (_, error) = printed_texts(&done);
     assert!(!done.status.success() && error.contains("t.csv cannot be written"), "{error}");
     assert!(!directory.join("t.csv").exists());
 }

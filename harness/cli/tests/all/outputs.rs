@@ -10,7 +10,7 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(program).current_dir(directory).args(arguments).output().unwrap()
 }
 
-fn refused(directory: &Path, arguments: &[&str]) -> String {
+fn expect_refusal(directory: &Path, arguments: &[&str]) -> String {
     let output = hubslosh(directory, arguments);
     let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
     assert!(!output.status.success(), "{arguments:?} succeeded: {said}");
@@ -56,7 +56,7 @@ fn no_output_option_replaces_an_input_under_any_of_its_names() {
             .map(|word| if word == "IN" { "input.csv" } else { word })
             .map(|word| if word == "file:path=IN" { "file:path=input.csv" } else { word })
             .collect();
-        let said = refused(directory.path(), &arguments);
+        let said = expect_refusal(directory.path(), &arguments);
         assert!(
             said.contains("is not written: it is the input input.csv") && said.contains(name),
             "{case}: {said}"
@@ -72,7 +72,7 @@ fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
     let at = |name: &str| directory.path().join(name);
     std::fs::write(at("tank.toml"), "density = 1000\nsvg = \"drawing.svg\"\n").unwrap();
     std::fs::write(at("drawing.svg"), "<svg/>").unwrap();
-    let said = refused(
+    let said = expect_refusal(
         directory.path(),
         &["tank", "tank.toml", "--fill", "1", "--picture", "drawing.svg"],
     );
@@ -87,14 +87,16 @@ fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
     std::fs::write(at("A.fmu"), "an FMU").unwrap();
     std::fs::write(at("B.fmu"), "an FMU").unwrap();
     for option in ["--json", "--junit", "--sarif"] {
-        let said = refused(directory.path(), &["check", option, "A.fmu", "B.fmu"]);
+        let said = expect_refusal(directory.path(), &["check", option, "A.fmu", "B.fmu"]);
         assert!(
             said.contains(&format!("{option} would replace A.fmu, an existing .fmu file")),
             "{said}"
         );
     }
-    let said =
-        refused(directory.path(), &["check", "B.fmu", "--json", "c.json", "--sarif", "./c.json"]);
+    let said = expect_refusal(
+        directory.path(),
+        &["check", "B.fmu", "--json", "c.json", "--sarif", "./c.json"],
+    );
     assert!(said.contains("is the file of two outputs (--json, --sarif)"), "{said}");
     assert_eq!(std::fs::read_to_string(at("A.fmu")).unwrap(), "an FMU");
 }
@@ -289,7 +291,7 @@ fn a_named_pipe_is_refused_as_any_input() {
     ] {
         let words: Vec<&str> =
             arguments.split(' ').map(|word| if word == "FMU" { fmu } else { word }).collect();
-        let said = refused(directory.path(), &words);
+        let said = expect_refusal(directory.path(), &words);
         assert!(said.contains("pipe.") && (said.contains("regular file")), "{arguments}: {said}");
     }
 }
@@ -469,7 +471,7 @@ fn a_recording_in_another_unit_or_of_absurd_values_is_refused_at_once() {
         let profile = "lin-sweep:f0=1,f1=3,duration=100";
         let arguments =
             ["analyse", "a.csv", "--profile", profile, "--model", "linear", "--fmu", fmu];
-        let said = refused(directory.path(), &[&arguments[..], &["--out", "a"]].concat());
+        let said = expect_refusal(directory.path(), &[&arguments[..], &["--out", "a"]].concat());
         assert!(said.contains(words) && said.contains("a.csv"), "{words}: {said}");
     }
 }

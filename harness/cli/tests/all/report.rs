@@ -132,7 +132,7 @@ fn row_of<'a>(page: &'a str, quantity: &str) -> Vec<&'a str> {
     row.split("<td>").skip(1).collect()
 }
 
-fn agrees(page: &str, quantity: &str, column: usize) -> bool {
+fn is_marked_yes(page: &str, quantity: &str, column: usize) -> bool {
     let cell = row_of(page, quantity)[3 + column];
     assert_ne!(cell.contains("class=\"yes\""), cell.contains("class=\"no\""), "{cell}");
     cell.contains("class=\"yes\"")
@@ -203,12 +203,12 @@ fn numbers_of_the_thesis_are_compared_with_the_runs() {
     let (linear, spherical) = (0, 1);
     // 2.21 rad/s² were measured; the model has more than twice as much
     let peak = "bench: largest acceleration of the hub at 0.25 N·m, rad/s²";
-    assert!(!agrees(page, peak, linear) && !agrees(page, peak, spherical));
+    assert!(!is_marked_yes(page, peak, linear) && !is_marked_yes(page, peak, spherical));
     let coherence = "bench: mean residual coherence from 0.15 N·m up";
-    assert!(!agrees(page, coherence, linear));
+    assert!(!is_marked_yes(page, coherence, linear));
     let of = figure(swept, "spherical", "coherence");
     let mean = (of[3] + of[4]) / 2.0;
-    assert_eq!(agrees(page, coherence, spherical), (0.45..=0.65).contains(&mean), "{mean}");
+    assert_eq!(is_marked_yes(page, coherence, spherical), (0.45..=0.65).contains(&mean), "{mean}");
     // The synthetic data have a linear liquid, so that other models have no value in these rows.
     let synthetic = row_of(page, "synthetic data: fit in time at 0.25 N·m, %");
     assert!(!synthetic[3 + linear].contains('–') && synthetic[3 + spherical].contains('–'));

@@ -13,14 +13,14 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     command.current_dir(directory).args(arguments).args(fmu).output().expect("the program runs")
 }
 
-fn said(output: &Output) -> String {
+fn stderr_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 const RUN: [&str; 5] =
     ["run", "--profile", "exp-sweep:amplitude=0.1,duration=20", "--set", "tank.d=200mm"];
 
-fn drawn(directory: &Path, file: &str) -> serde_json::Value {
+fn read_page_data(directory: &Path, file: &str) -> serde_json::Value {
     let page = std::fs::read_to_string(directory.join(file)).unwrap();
     for word in [" src=\"", "<link", "@import", "url(http"] {
         assert!(!page.contains(word), "{word} is in the page");
@@ -36,17 +36,22 @@ fn a_run_with_default_columns_becomes_a_page_with_the_run_s_parameters() {
     let directory = directory.path();
     assert!(hubslosh(directory, &[&RUN[..], &["--out", "run.parquet"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "run.parquet", "--from", "5", "--to", "10"]);
-    assert!(done.status.success(), "{}", said(&done));
-    assert_eq!(said(&done), "");
-    let run = drawn(directory, "run.html");
+    assert!(done.status.success(), "{}", stderr_text(&done));
+    assert_eq!(stderr_text(&done), "");
+    let run = read_page_data(directory, "run.html");
     assert_eq!(run["time"]["count"], 251);
     assert_eq!(run["scene"]["geometry"]["tanks"][0]["shape"]["contour"][1][0], 0.1);
     // A CSV file cannot hold the parameters; they are given on the command line, or the command asks for them.
     assert!(hubslosh(directory, &[&RUN[..], &["--out", "run.csv"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "run.csv", "--out", "csv.html"]);
-    assert!(said(&done).contains("does not contain the parameters"), "{}", said(&done));
+    assert!(
+        stderr_text(&done).contains("does not contain the parameters"),
+        "{}",
+        stderr_text(&done)
+    );
     assert_eq!(
-        drawn(directory, "csv.html")["scene"]["geometry"]["tanks"][0]["shape"]["contour"][1][0],
+        read_page_data(directory, "csv.html")["scene"]["geometry"]["tanks"][0]["shape"]["contour"]
+            [1][0],
         0.0815
     );
 }
@@ -70,7 +75,7 @@ fn runs_that_cannot_be_drawn_are_refused_without_a_page() {
     ] {
         let done = hubslosh(directory, &[&["view"], arguments].concat());
         assert_eq!(done.status.code(), Some(1));
-        assert!(said(&done).contains(why), "{arguments:?}: {}", said(&done));
+        assert!(stderr_text(&done).contains(why), "{arguments:?}: {}", stderr_text(&done));
     }
     assert!(!directory.join("run.html").exists());
 }
@@ -99,8 +104,12 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
         let rest = ["--columns", &columns, "--out", "run.parquet"];
         assert!(hubslosh(directory, &[&run[..], &rest].concat()).status.success(), "{model}");
         let done = hubslosh(directory, &["view", "run.parquet"]);
-        assert!(done.status.success() && said(&done).is_empty(), "{model}: {}", said(&done));
-        let page = drawn(directory, "run.html");
+        assert!(
+            done.status.success() && stderr_text(&done).is_empty(),
+            "{model}: {}",
+            stderr_text(&done)
+        );
+        let page = read_page_data(directory, "run.html");
         let modes = page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap();
         let angles = page["tanks"][0]["modes"].as_array().unwrap();
         assert_eq!((modes.len(), angles.len()), (3, 3), "{model}");
@@ -131,16 +140,16 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--set", "slosh.modes=3"];
     assert!(hubslosh(directory, &[&run[..], &["--out", "all.parquet"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "all.parquet"]);
-    assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
-    let page = drawn(directory, "all.html");
+    assert!(done.status.success() && stderr_text(&done).is_empty(), "{}", stderr_text(&done));
+    let page = read_page_data(directory, "all.html");
     assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 3);
     let columns = ["--columns", "omega,slosh_angle,slosh_angle_radial", "--out", "less.parquet"];
     assert!(hubslosh(directory, &[&run[..], &columns].concat()).status.success());
     let done = hubslosh(directory, &["view", "less.parquet"]);
-    let warning = said(&done);
+    let warning = stderr_text(&done);
     assert!(done.status.success() && warning.contains("1 of 3 slosh modes are drawn"), "{warning}");
     assert!(warning.contains("slosh.q_radial[3],slosh.q_tangential[3]"), "{warning}");
-    let page = drawn(directory, "less.html");
+    let page = read_page_data(directory, "less.html");
     assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 1);
 }
 
@@ -160,7 +169,7 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
     let mut tank = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
     tank.current_dir(directory).args(["tank", "sphere.toml", "--fill", "0.14", "--modes", "3"]);
     let solved = tank.args(["--parameters", "liquid.toml"]).output().unwrap();
-    assert!(solved.status.success(), "{fill} m: {}", said(&solved));
+    assert!(solved.status.success(), "{fill} m: {}", stderr_text(&solved));
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5"];
     let rest = ["--parameters", "liquid.toml", "--out", "run.parquet"];
     let columns = [
@@ -168,10 +177,10 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
         "theta,slosh_angle,slosh_angle_radial,slosh.q_radial[2],slosh.q_radial[3],slosh.q_tangential[2],slosh.q_tangential[3]",
     ];
     let done = hubslosh(directory, &[&run[..], &rest, &columns].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    assert!(done.status.success(), "{}", stderr_text(&done));
     let done = hubslosh(directory, &["view", "run.parquet", "--tank", "sphere.toml"]);
-    assert!(done.status.success(), "{}", said(&done));
-    let page = drawn(directory, "run.html");
+    assert!(done.status.success(), "{}", stderr_text(&done));
+    let page = read_page_data(directory, "run.html");
     let modes = page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap();
     assert_eq!(modes.len(), 3);
     for mode in modes {
@@ -207,17 +216,17 @@ fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     let mut tank = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
     tank.current_dir(directory).args(["tank", "box.toml", "--fill", "0.1", "--modes", "2"]);
     let solved = tank.args(["--parameters", "liquid.toml"]).output().unwrap();
-    assert!(solved.status.success(), "{}", said(&solved));
+    assert!(solved.status.success(), "{}", stderr_text(&solved));
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--out", "run.parquet"];
     let rest = ["--parameters", "liquid.toml", "--set", "slosh.model=linear"];
     let states = "slosh.q_tangential[2],slosh.q_radial[3],slosh.q_radial[4]";
     let others = "slosh.q_radial[2],slosh.q_tangential[3],slosh.q_tangential[4]";
     let columns = format!("theta,slosh_angle,slosh_angle_radial,{states},{others}");
     let done = hubslosh(directory, &[&run[..], &rest, &["--columns", &columns]].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    assert!(done.status.success(), "{}", stderr_text(&done));
     let done = hubslosh(directory, &["view", "run.parquet", "--tank", "box.toml"]);
-    assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
-    let page = drawn(directory, "run.html");
+    assert!(done.status.success() && stderr_text(&done).is_empty(), "{}", stderr_text(&done));
+    let page = read_page_data(directory, "run.html");
     let tank = &page["scene"]["geometry"]["tanks"][0];
     assert_eq!(tank["shape"]["box"], serde_json::json!([0.2, 0.3]));
     let modes = tank["modes"].as_array().unwrap();
@@ -238,10 +247,10 @@ fn default_columns_of_a_draining_tank_are_enough_for_its_page() {
     let run =
         ["run", "--profile", "zero", "--drive", "a[1]", "--stop", "2", "--out", "drain.parquet"];
     let done = of_tank(&[&run[..], &set].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    assert!(done.status.success(), "{}", stderr_text(&done));
     let done = of_tank(&["view", "drain.parquet"]);
-    assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
-    let liquid = column(&drawn(directory, "drain.html"), "tank.liquid");
+    assert!(done.status.success() && stderr_text(&done).is_empty(), "{}", stderr_text(&done));
+    let liquid = column(&read_page_data(directory, "drain.html"), "tank.liquid");
     assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
 }
 
@@ -276,7 +285,7 @@ fn a_unit_that_contains_html_markup_does_not_break_the_page() {
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
         let done = command.current_dir(folder.path()).args(arguments.split(' ')).output().unwrap();
-        assert!(done.status.success(), "{}", said(&done));
+        assert!(done.status.success(), "{}", stderr_text(&done));
     }
     let page = std::fs::read_to_string(folder.path().join("run.html")).unwrap();
     let (_, data) = page.split_once("id=\"run\">").unwrap();

@@ -144,7 +144,7 @@ fn fuzz(
         std::fs::write(&path, &bytes).unwrap();
         now.1.lock().unwrap().clone_from(&bytes);
         now.0.store(began.elapsed().as_secs() + 1, Ordering::SeqCst);
-        if let Err(panic) = files::bug::caught(|| read(&path, &bytes)) {
+        if let Err(panic) = files::bug::catch_panic(|| read(&path, &bytes)) {
             let kept = keep(name, ending, &bytes);
             eprintln!("{name}: {panic}: {}", kept.display());
             panic!("{name}: {panic}: {}", kept.display());

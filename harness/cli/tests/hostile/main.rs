@@ -75,7 +75,7 @@ impl Sandbox {
         output
     }
 
-    fn fails(&self, arguments: &[&str]) -> String {
+    fn expect_failure(&self, arguments: &[&str]) -> String {
         let output = self.hubslosh(arguments);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
@@ -244,11 +244,11 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
     for (name, bytes, words) in &set {
         std::fs::write(sandbox.path("a.fmu"), bytes).unwrap();
         if *name != "a library outside" {
-            let said = sandbox.fails(&["variables", "--fmu", "a.fmu"]);
+            let said = sandbox.expect_failure(&["variables", "--fmu", "a.fmu"]);
             assert!(said.contains(words), "{name}: {said}");
         }
         let run = ["run", "--profile", "zero", "--stop", "1", "--fmu", "a.fmu", "--out", "a.csv"];
-        let said = sandbox.fails(&run);
+        let said = sandbox.expect_failure(&run);
         assert!(said.contains(words), "{name}: {said}");
         let output = sandbox.hubslosh(&["check", "a.fmu"]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -342,7 +342,7 @@ fn ends_its_own_process(when: &str) {
             assert!(output.status.success(), "{what}: {said}");
         } else {
             for command in [&run[..], &campaign[..]] {
-                let said = sandbox.fails(command);
+                let said = sandbox.expect_failure(command);
                 let told = said.contains("the FMU has ended the process")
                     || said.contains("has not returned within 0.5 s");
                 assert!(told, "{what}: {said}");
@@ -381,7 +381,7 @@ fn forged_messages_of_an_fmu_are_refused() {
     for when in ["AT_LOAD", "AT_STEP"] {
         std::fs::write(sandbox.path("a.fmu"), harmful(FORGE, when)).unwrap();
         let run = ["run", "--profile", "zero", "--stop", "0.1", "--fmu", "a.fmu", "--out", "a.csv"];
-        let said = sandbox.fails(&run);
+        let said = sandbox.expect_failure(&run);
         assert!(said.contains("the FMU has written to, or has closed, the pipe"), "{when}: {said}");
         let only = if when == "AT_LOAD" { "load.opens" } else { "steps.run" };
         let output = sandbox.hubslosh(&["check", "a.fmu", "--only", only]);
@@ -402,7 +402,8 @@ fn temporary_files_and_shared_memory_count_against_the_memory_limit() {
     for (harm, what) in (FIRST..).zip(["files", "unlinked files", "memfd", "mapped memory"]) {
         std::fs::write(sandbox.path("a.fmu"), harmful(harm, "AT_STEP")).unwrap();
         let run = ["run", "--memory", "48", "--profile", "zero", "--stop", "0.1"];
-        let said = sandbox.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
+        let said =
+            sandbox.expect_failure(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
         assert!(said.contains("of the FMU take more than 48 MiB"), "{what}: {said}");
         assert!(!sandbox.path("a.csv").exists(), "{what}");
     }
@@ -430,7 +431,7 @@ fn a_call_that_never_returns_fails_the_run_at_the_call_limit() {
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("a.fmu"), harmful(LOOP, "AT_GET")).unwrap();
     let run = ["run", "--call-limit", "0.5", "--profile", "zero", "--stop", "0.1"];
-    let said = sandbox.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
+    let said = sandbox.expect_failure(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
     assert!(said.contains("has not returned within 0.5 s"), "{said}");
 }
 
@@ -444,7 +445,7 @@ fn a_value_that_is_nan_and_a_run_without_values_are_failures() {
     let run = ["run", "--profile", "zero", "--stop", "0.1", "--fmu", "a.fmu", "--out", "a.csv"];
     let campaign = ["campaign", "--plan", "plan.toml", "--fmu", "a.fmu", "--out", "campaign"];
     for command in [&run[..], &campaign[..]] {
-        let said = sandbox.fails(command);
+        let said = sandbox.expect_failure(command);
         assert!(said.contains("the FMU gives x = NaN at t = 0.06 s"), "{said}");
     }
     assert!(!sandbox.path("a.csv").exists());
@@ -457,7 +458,7 @@ fn a_value_that_is_nan_and_a_run_without_values_are_failures() {
     for command in [&run[..], &campaign[..]] {
         let command: Vec<_> =
             command.iter().map(|&a| if a == "a.fmu" { "b.fmu" } else { a }).collect();
-        let said = sandbox.fails(&command);
+        let said = sandbox.expect_failure(&command);
         assert!(said.contains(nothing), "{said}");
     }
 }

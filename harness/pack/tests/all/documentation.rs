@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use pack::documentation::page::{Gathered, Page};
 
 pub fn markdown() -> Vec<String> {
-    fn below(folder: &Path, all: &mut Vec<PathBuf>) {
+    fn collect_pages(folder: &Path, all: &mut Vec<PathBuf>) {
         for entry in folder.read_dir().unwrap().flatten() {
             let (path, name) = (entry.path(), entry.file_name());
             let name = name.to_string_lossy();
@@ -12,14 +12,14 @@ pub fn markdown() -> Vec<String> {
                 continue;
             }
             if path.is_dir() {
-                below(&path, all);
+                collect_pages(&path, all);
             } else if name.ends_with(".md") {
                 all.push(path);
             }
         }
     }
     let (root, mut all) = (pack::root(), Vec::new());
-    below(&root, &mut all);
+    collect_pages(&root, &mut all);
     all.iter().map(|path| path.strip_prefix(&root).unwrap().to_string_lossy().into()).collect()
 }
 

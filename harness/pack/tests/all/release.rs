@@ -11,7 +11,7 @@ use pack::{Fmi, MODELS, Model, release};
 
 /// Returns the committed FMUs of this version. After the version in Cargo.toml has changed and before the release is
 /// made, there are none; then the files of an older version must exist.
-fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
+fn committed_fmus() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
     let of = |model| Fmi::ALL.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
     let fmus: Vec<_> = MODELS.iter().flat_map(of).collect();
@@ -28,7 +28,7 @@ fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
 
 #[test]
 fn the_committed_release_has_the_interface_of_the_source() {
-    for (model, fmi, fmu) in released() {
+    for (model, fmi, fmu) in committed_fmus() {
         let source = model.folder().join(match fmi {
             Fmi::V2 => "modelDescription.xml",
             Fmi::V3 => "fmi3/modelDescription.xml",
@@ -47,7 +47,7 @@ fn the_committed_release_has_the_interface_of_the_source() {
 
 #[test]
 fn the_committed_sbom_equals_the_sbom_inside_the_released_fmu() {
-    for (model, _, fmu) in released() {
+    for (model, _, fmu) in committed_fmus() {
         let beside = std::fs::read(fmu.with_extension("cdx.json")).unwrap();
         assert!(beside == release::read(&fmu, &model.sbom()).unwrap());
         let sbom: serde_json::Value = serde_json::from_slice(&beside).unwrap();
@@ -123,7 +123,7 @@ fn tree_with_a_release(folder: &Path) {
 }
 
 #[cfg(unix)]
-fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String> {
+fn gather_release_files(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String> {
     let mut command = Command::new("bash");
     let command = command.current_dir(tree).arg(".github/release-files").args(arguments);
     let done = command.output().unwrap();
@@ -138,14 +138,14 @@ fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String>
 fn release_files_match_the_manifest() {
     let whole = tempfile::tempdir().unwrap();
     tree_with_a_release(whole.path());
-    let found = gathered(whole.path(), &["v1.2.3", "files"]).unwrap();
+    let found = gather_release_files(whole.path(), &["v1.2.3", "files"]).unwrap();
     let mut wanted: BTreeSet<String> =
         ["SHA256SUMS", "notes.md", "HubSlosh-1.2.3-fmi3.cdx.json"].map(String::from).into();
     for model in ["HubSlosh", "Spacecraft", "SloshTank"] {
         wanted.extend(["", "-fmi3", "-fmi3-arrays"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")));
     }
     assert_eq!(found, wanted);
-    let found = gathered(whole.path(), &["v1.2.3", "all", "wheels"]).unwrap();
+    let found = gather_release_files(whole.path(), &["v1.2.3", "all", "wheels"]).unwrap();
     wanted.extend(
         ["hubslosh-1.2.3-py3-none-win_amd64.whl", "hubslosh-1.2.3.tar.gz"].map(String::from),
     );
@@ -179,14 +179,14 @@ fn release_files_match_the_manifest() {
             Some(content) => std::fs::write(tree.path().join(name), content).unwrap(),
             None => std::fs::remove_file(tree.path().join(name)).unwrap(),
         }
-        let said = gathered(tree.path(), &["v1.2.3", "files", "wheels"]).unwrap_err();
+        let said = gather_release_files(tree.path(), &["v1.2.3", "files", "wheels"]).unwrap_err();
         assert!(said.contains(why), "{name}: {said}");
     }
 }
 
 #[test]
 fn release_passed_the_check() {
-    for (.., fmu) in released() {
+    for (.., fmu) in committed_fmus() {
         let report = std::fs::read_to_string(fmu.with_extension("check.txt")).unwrap();
         let sum = report.lines().last().unwrap();
         let name = fmu.file_name().unwrap().to_string_lossy();
@@ -196,7 +196,7 @@ fn release_passed_the_check() {
 
 #[test]
 fn release_is_small_and_for_all_platforms() {
-    for (Model { name, .. }, fmi, fmu) in released() {
+    for (Model { name, .. }, fmi, fmu) in committed_fmus() {
         let mut processors = 0;
         for Platform { folder, ending, .. } in &PLATFORMS {
             // FMI 2.0 has one folder for both processors of macOS.

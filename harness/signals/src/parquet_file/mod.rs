@@ -184,7 +184,7 @@ pub fn read(
 
 /// Turns a panic of the Parquet library, which damaged files cause, into an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    bug::caught(work).unwrap_or_else(|panic| bail!("the Parquet file is damaged: {panic}"))
+    bug::catch_panic(work).unwrap_or_else(|panic| bail!("the Parquet file is damaged: {panic}"))
 }
 
 fn open(path: &Path) -> Result<SerializedFileReader<File>> {

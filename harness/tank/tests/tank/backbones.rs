@@ -40,7 +40,7 @@ fn pair(s: f64, kappa: f64) -> EnergyTerms {
 /// Returns the frequency of the slosh mass on the surface of `fmu/craft/src/surface.rs`, divided by its frequency in small
 /// motion, with l = g = 1: in planar and in circular motion. Planar motion is integrated by quadrature with q = a sin t,
 /// for which the integrand is periodic.
-fn bob(of: &EnergyTerms, angle: f64) -> [f64; 2] {
+fn frequency_ratios(of: &EnergyTerms, angle: f64) -> [f64; 2] {
     let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (of.pair, of.next, of.rotary);
     let a = angle.sin();
     let count = 64;
@@ -67,7 +67,8 @@ fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f6
     let mut last = (0.0, 0.0);
     for (angle, exact) in rows {
         let Some(exact) = exact[motion] else { continue };
-        let (degrees, error) = (angle.to_degrees(), (bob(of, *angle)[motion] / exact - 1.0).abs());
+        let (degrees, error) =
+            (angle.to_degrees(), (frequency_ratios(of, *angle)[motion] / exact - 1.0).abs());
         if error > allowed {
             return Some(last.0 + (degrees - last.0) * (allowed - last.1) / (error - last.1));
         }
@@ -111,7 +112,7 @@ fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
         let limit = limits::cylinder_with_energy(fill).unwrap();
         assert!(limit.forced <= limit.frequency && limit.frequency == known.compared);
         for (angle, exact) in rows.iter().filter(|(angle, _)| *angle < limit.frequency + 1e-9) {
-            let found = bob(&known, *angle);
+            let found = frequency_ratios(&known, *angle);
             for (motion, allowed) in [(0, 6e-4), (1, 1.1e-3)] {
                 let Some(exact) = exact[motion] else { continue };
                 let off = (found[motion] / exact - 1.0).abs();
@@ -138,7 +139,8 @@ fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     for (fill, rows) in all {
         let (s, kappa) = coefficients(fill);
         for (angle, exact) in rows.iter().filter(|(angle, _)| angle.to_degrees() < 16.5) {
-            let [bridged, pendulum] = [pair(s, kappa), pair(1.0, 1.0)].map(|of| bob(&of, *angle));
+            let [bridged, pendulum] =
+                [pair(s, kappa), pair(1.0, 1.0)].map(|of| frequency_ratios(&of, *angle));
             for (motion, exact) in exact.iter().enumerate() {
                 let Some(exact) = exact else { continue };
                 let off = |found: [f64; 2]| (found[motion] / exact - 1.0).abs();

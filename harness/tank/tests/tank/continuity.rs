@@ -11,13 +11,13 @@ use hubslosh_tank::parameters::{Liquid, tank_damping};
 /// correlation for spheres.
 const SLOW: [f64; 2] = [1e-6, 0.3];
 
-fn at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
+fn damping_at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
     let data = tank.solve(fill, 1).unwrap();
     let liquid = Liquid { gravity, nu: Some(nu), sigma: None, contact_angle: 90.0, spin: None };
     tank_damping(tank, &data, nu, liquid).unwrap()
 }
 
-fn of(shape: &str) -> Tank {
+fn tank_with(shape: &str) -> Tank {
     tank(&format!("density = 1000.0\n{shape}"))
 }
 
@@ -58,7 +58,7 @@ const TANKS: [(&str, &str, [f64; 2]); 9] = [
 fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64; 4] {
     let depth = tank.depth().unwrap_or(1.0);
     let numbers = |i: usize| {
-        let mode = at(tank, from + 1e-3 * depth * i as f64, liquid).modes[0];
+        let mode = damping_at(tank, from + 1e-3 * depth * i as f64, liquid).modes[0];
         let [zeta, low, high] = [mode.zeta, mode.interval[0], mode.interval[1]];
         [zeta, zeta / mode.laminar, low / mode.laminar, high / mode.laminar]
     };
@@ -78,7 +78,7 @@ fn the_damping_ratio_has_no_step_at_500_fills() {
     // At a corner of the wall the laminar layer itself changes by 3 % from fill to fill, for example in the
     // cone with a cylinder.
     for (name, shape, liquid) in &TANKS[..7] {
-        let tank = of(shape);
+        let tank = tank_with(shape);
         let from = 0.25 * tank.depth().unwrap_or(1.0);
         let [zeta, ..] = largest_steps(&tank, *liquid, from, 500);
         assert!(zeta < 0.01, "{name}: {zeta}");
@@ -101,7 +101,7 @@ fn damping_has_no_step_where_a_wall_leaves_a_shape() {
         ("dish", &[0.0667]),
     ] {
         let (_, shape, liquid) = TANKS.into_iter().find(|tank| tank.0 == name).unwrap();
-        let tank = of(shape);
+        let tank = tank_with(shape);
         for level in levels {
             let from = level - 4.5e-3 * tank.depth().unwrap();
             let [_, factor, low, high] = largest_steps(&tank, liquid, from, 8);
@@ -117,14 +117,14 @@ fn damping_has_no_step_where_a_wall_leaves_a_shape() {
 #[test]
 fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
     let (_, shape, liquid) = TANKS[1];
-    let tank = of(shape);
+    let tank = tank_with(shape);
     let ratio = |fill: f64| {
-        let mode = at(&tank, fill, liquid).modes[0];
+        let mode = damping_at(&tank, fill, liquid).modes[0];
         mode.zeta / mode.laminar
     };
     // 3.16 layers at the tangent point, without a fall to 1.45 layers there
     assert!((ratio(0.3001) / ratio(0.3) - 1.0).abs() < 2e-3);
-    let full = at(&tank, 0.7, liquid);
+    let full = damping_at(&tank, 0.7, liquid);
     let [part] = &full.parts[..] else { panic!("{full:?}") };
     // The dome is 0.3 m of a wetted height of 0.7 m; the lowest part of the cylinder counts as sphere in part.
     assert!(part.shape == "sphere" && (3.0 / 7.0..0.52).contains(&part.share), "{part:?}");
@@ -148,7 +148,7 @@ fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains
     for (name, fills) in walls {
         let (_, shape, liquid) = TANKS.into_iter().find(|tank| tank.0 == name).unwrap();
         for fill in fills {
-            let found = at(&of(shape), fill, liquid);
+            let found = damping_at(&tank_with(shape), fill, liquid);
             let mode = found.modes[0];
             let [part] = &found.parts[..] else { panic!("{name} {fill}: {found:?}") };
             let both = [1.45, part.factor].map(|factor| factor * mode.laminar);
@@ -170,9 +170,10 @@ fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains
 fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
     let solved = |e: f64| {
         let height = 0.3 * (1.0 + e);
-        let tank =
-            of(&format!("shape = {{ spheroid = {{ radius = 0.3, half_height = {height:?} }} }}"));
-        at(&tank, 1.6 * height, SLOW)
+        let tank = tank_with(&format!(
+            "shape = {{ spheroid = {{ radius = 0.3, half_height = {height:?} }} }}"
+        ));
+        damping_at(&tank, 1.6 * height, SLOW)
     };
     let spheroid = |e: f64| solved(e).modes[0].zeta;
     let capsule = |e: f64| {
@@ -180,9 +181,10 @@ fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
         let text = format!(
             "shape = {{ domed_cylinder = {{ radius = 0.3, height = {height:?}, bottom = 0.3, top = 0.3 }} }}"
         );
-        at(&of(&text), 0.48 * (1.0 + e), SLOW).modes[0].zeta
+        damping_at(&tank_with(&text), 0.48 * (1.0 + e), SLOW).modes[0].zeta
     };
-    let sphere = at(&of("shape = { sphere = { radius = 0.3 } }"), 0.48, SLOW).modes[0].zeta;
+    let sphere =
+        damping_at(&tank_with("shape = { sphere = { radius = 0.3 } }"), 0.48, SLOW).modes[0].zeta;
     for e in [1e-7, 5e-6, 1e-3] {
         for zeta in [spheroid(e), spheroid(-e), capsule(e)] {
             assert!((zeta / sphere - 1.0).abs() < 1e-5 + 10.0 * e, "{e:e}: {zeta} {sphere}");
@@ -211,23 +213,27 @@ fn a_wall_that_is_one_shape_has_its_published_correlation() {
     };
     let [nu, g] = SLOW;
     for x in [0.11, 0.5, 1.0, 1.3, 1.89] {
-        let sphere = of("shape = { sphere = { radius = 0.3 } }");
-        close(at(&sphere, 0.3 * x, SLOW).modes[0].zeta, damping::sphere(0.3, 0.3 * x, nu, g));
+        let sphere = tank_with("shape = { sphere = { radius = 0.3 } }");
+        close(
+            damping_at(&sphere, 0.3 * x, SLOW).modes[0].zeta,
+            damping::sphere(0.3, 0.3 * x, nu, g),
+        );
     }
     for x in [0.1, 0.39, 0.5, 0.8, 2.0] {
-        let cylinder = of("shape = { cylinder = { radius = 0.3, height = 0.9 } }");
+        let cylinder = tank_with("shape = { cylinder = { radius = 0.3, height = 0.9 } }");
         let formula = if x < 0.5 { damping::stephens } else { damping::mikishev_dorozhkin };
-        close(at(&cylinder, 0.3 * x, SLOW).modes[0].zeta, formula(0.3, 0.3 * x, nu, g));
+        close(damping_at(&cylinder, 0.3 * x, SLOW).modes[0].zeta, formula(0.3, 0.3 * x, nu, g));
     }
     for angle in [20.0, 44.0] {
-        let cone = of(&format!("shape = {{ cone = {{ half_angle = {angle:?}, height = 1.0 }} }}"));
+        let cone =
+            tank_with(&format!("shape = {{ cone = {{ half_angle = {angle:?}, height = 1.0 }} }}"));
         let radius = 0.5 * f64::to_radians(angle).tan();
-        close(at(&cone, 0.5, SLOW).modes[0].zeta, damping::cone(radius, angle, nu, g));
+        close(damping_at(&cone, 0.5, SLOW).modes[0].zeta, damping::cone(radius, angle, nu, g));
     }
     let (_, shape, [nu, g]) = TANKS[3];
-    let torus = at(&of(shape), 0.86 * 0.127, [nu, g]);
+    let torus = damping_at(&tank_with(shape), 0.86 * 0.127, [nu, g]);
     close(torus.modes[0].zeta, damping::torus(0.0635, 0.86 * 0.127, nu, g));
-    let wave = at(&of("box = [0.8, 0.5]"), 0.4, SLOW).modes[0];
+    let wave = damping_at(&tank_with("box = [0.8, 0.5]"), 0.4, SLOW).modes[0];
     let layer = &hubslosh_tank::closed_form::box_axis(0.8, 0.5, 0.4, 1.0, 1).modes[0];
     close(wave.zeta, 1.45 * damping::laminar(layer.beta, SLOW[0], (SLOW[1] * layer.lambda).sqrt()));
 }

@@ -13,18 +13,18 @@ use hubslosh_tank::{Fill, Tank, table};
 
 use crate::common::tank;
 
-fn found(text: &str, fill: f64) -> FiniteAmplitude {
+fn amplitude_dependence_at(text: &str, fill: f64) -> FiniteAmplitude {
     let tank = tank(&format!("density = 1000.0\n{text}"));
     amplitude_dependence(&tank, &tank.solve(fill, 1).unwrap())
 }
 
-fn known(text: &str, fill: f64) -> Coefficients {
-    let found = found(text, fill);
+fn coefficients_at(text: &str, fill: f64) -> Coefficients {
+    let found = amplitude_dependence_at(text, fill);
     found.mode.unwrap_or_else(|| panic!("{text} {fill} {found:?}"))
 }
 
-fn refused(text: &str, fill: f64, why: &str) {
-    let found = found(text, fill);
+fn assert_unknown(text: &str, fill: f64, why: &str) {
+    let found = amplitude_dependence_at(text, fill);
     assert_eq!((found.mode, found.mode_y), (None, None), "{text} {fill}");
     assert!(found.warnings[0].contains(why), "{text} {fill} {found:?}");
     assert!(found.warnings[0].contains("pendulum"), "{found:?}");
@@ -39,7 +39,8 @@ fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
         (0.1, [(4.0, 0.998962), (8.0, 0.995954)], [(4.0, 1.00091), (6.0, 1.00208)]),
         (0.05, [(4.0, 0.999368), (8.0, 0.997373)], [(4.0, 1.00104), (6.0, 1.00238)]),
     ] {
-        let known = known("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", fill);
+        let known =
+            coefficients_at("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", fill);
         let (s, kappa) = (known.nonlinear_inertia, known.nonlinear_stiffness);
         assert!((known.planar - (0.375 * kappa - 0.5 * s)).abs() < 1e-12, "{known:?}");
         assert!((known.circular.unwrap() - 0.5 * kappa).abs() < 1e-12, "{known:?}");
@@ -58,11 +59,14 @@ fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
 #[test]
 fn the_methods_for_flat_bottoms_and_for_any_contour_agree_within_their_errors() {
     for fill in [0.5, 1.3, 2.5] {
-        let shape = known("shape = { cylinder = { radius = 1.0, height = 3.0 } }", fill);
-        let profile = known("profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 3] }]", fill);
+        let shape = coefficients_at("shape = { cylinder = { radius = 1.0, height = 3.0 } }", fill);
+        let profile =
+            coefficients_at("profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 3] }]", fill);
         assert_eq!(shape, Coefficients { series_limit: shape.series_limit, ..profile });
-        let domed =
-            known("profile = [{ line = [0, 0, 1, 1e-5] }, { line = [1, 1e-5, 1, 3] }]", fill);
+        let domed = coefficients_at(
+            "profile = [{ line = [0, 0, 1, 1e-5] }, { line = [1, 1e-5, 1, 3] }]",
+            fill,
+        );
         assert!(domed.error < 1e-3 && shape.error < 1e-4, "{domed:?} {shape:?}");
         let allowed = shape.error + domed.error + 1e-4;
         for (a, b) in [
@@ -79,11 +83,11 @@ fn the_methods_for_flat_bottoms_and_for_any_contour_agree_within_their_errors() 
 /// coefficients.
 #[test]
 fn coefficients_depend_only_on_the_shape() {
-    let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.5);
-    let small = known("shape = { sphere = { radius = 0.01 } }", 0.005);
+    let sphere = coefficients_at("shape = { sphere = { radius = 1.0 } }", 0.5);
+    let small = coefficients_at("shape = { sphere = { radius = 0.01 } }", 0.005);
     let capsule =
         "shape = { domed_cylinder = { radius = 1.0, height = 1.0, bottom = 1.0, top = 1.0 } }";
-    let capsule = known(capsule, 0.5);
+    let capsule = coefficients_at(capsule, 0.5);
     for (other, scale) in [(small, 0.01), (capsule, 1.0)] {
         assert!((sphere.nonlinear_inertia - other.nonlinear_inertia).abs() < 1e-6, "{other:?}");
         assert!((sphere.nonlinear_stiffness - other.nonlinear_stiffness).abs() < 1e-6, "{other:?}");
@@ -98,10 +102,15 @@ fn coefficients_depend_only_on_the_shape() {
 /// depths with secondary resonances.
 #[test]
 fn unknown_coefficients_are_refused_with_a_reason() {
-    refused("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3, "ring of liquid");
-    refused("shape = { sphere = { radius = 1.0 } }", 1.95, "are known to");
-    refused("shape = { sphere = { radius = 1.0 } }", 1.12, "mode (2,2)");
-    let shallow = found("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.1);
+    assert_unknown(
+        "shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }",
+        0.3,
+        "ring of liquid",
+    );
+    assert_unknown("shape = { sphere = { radius = 1.0 } }", 1.95, "are known to");
+    assert_unknown("shape = { sphere = { radius = 1.0 } }", 1.12, "mode (2,2)");
+    let shallow =
+        amplitude_dependence_at("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.1);
     assert!(
         shallow.mode.is_some() && shallow.warnings[0].contains("hold up to 1.7"),
         "{shallow:?}"
@@ -113,7 +122,8 @@ fn unknown_coefficients_are_refused_with_a_reason() {
 /// and in shallow liquid. The fold of rotary motion is stated, too.
 #[test]
 fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
-    let at = |fill: f64| known("shape = { cylinder = { radius = 1.0, height = 4.0 } }", fill);
+    let at =
+        |fill: f64| coefficients_at("shape = { cylinder = { radius = 1.0, height = 4.0 } }", fill);
     for i in 0..=60 {
         let fill = 0.25 + 0.05 * f64::from(i);
         let mode = at(fill);
@@ -130,10 +140,11 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
             assert!((limit - expected).abs() < 0.1, "{fill} {limits:?}");
         }
     }
-    let bridged = found("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.8314);
+    let bridged =
+        amplitude_dependence_at("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.8314);
     assert!(bridged.warnings[0].contains("interpolated between h/R 0.7 and 1.2"), "{bridged:?}");
     assert!(bridged.warnings[1].contains("rotary motion folds at"), "{bridged:?}");
-    let other = known("shape = { sphere = { radius = 1.0 } }", 1.5);
+    let other = coefficients_at("shape = { sphere = { radius = 1.0 } }", 1.5);
     assert_eq!((other.angle_limit_from, other.frequency_limit), (LimitSource::Estimate, None));
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
 }
@@ -143,7 +154,7 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
 /// the third-order model differs by 3 %.
 #[test]
 fn limits_of_a_sphere_follow_from_its_forced_waves() {
-    let at = |fill: f64| known("shape = { sphere = { radius = 1.0 } }", fill);
+    let at = |fill: f64| coefficients_at("shape = { sphere = { radius = 1.0 } }", fill);
     for i in 0..=19 {
         let fill = 0.1 + 0.05 * f64::from(i);
         let mode = at(fill);
@@ -179,7 +190,7 @@ fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
             "sphere" => "shape = { sphere = { radius = 1.0 } }",
             _ => "shape = { cylinder = { radius = 1.0, height = 4.0 } }",
         };
-        let mode = known(text, number(1));
+        let mode = coefficients_at(text, number(1));
         let ([s, kappa], planar, rotary) = match mode.energy {
             Some(of) => {
                 ([of.nonlinear_inertia, of.nonlinear_stiffness], of.angle_limit, of.swirl_limit)
@@ -278,7 +289,7 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
 /// strongly with the amplitude than at other fills, so that the range of a pendulum is smaller.
 #[test]
 fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
-    let at = |fill: f64| found("shape = { sphere = { radius = 1.0 } }", fill);
+    let at = |fill: f64| amplitude_dependence_at("shape = { sphere = { radius = 1.0 } }", fill);
     let neighbours = [1.07, 1.3].map(|fill| at(fill).pendulum_limit.unwrap().to_degrees());
     let mut refused = 0;
     for i in 0..=16 {
@@ -446,7 +457,7 @@ fn a_missing_surface_tension_gives_a_warning_at_low_bond_numbers() {
 /// A rectangular box has the planar shifts of the frequency with s = 1; a square box also has circular motion.
 #[test]
 fn boxes_have_third_order_coefficients_for_each_length() {
-    let long = found("box = [0.8, 0.5]", 0.4);
+    let long = amplitude_dependence_at("box = [0.8, 0.5]", 0.4);
     let (x, y) = (long.mode.unwrap(), long.mode_y.unwrap());
     assert!((x.planar + 0.3155).abs() < 1e-4 && (y.planar + 0.3943).abs() < 1e-4, "{x:?} {y:?}");
     for mode in [x, y] {
@@ -454,9 +465,9 @@ fn boxes_have_third_order_coefficients_for_each_length() {
         assert!((0.375 * mode.nonlinear_stiffness - 0.5 - mode.planar).abs() < 1e-12);
     }
     assert!(long.warnings.is_empty(), "{long:?}");
-    let near = found("box = [1.0, 0.95]", 0.6);
+    let near = amplitude_dependence_at("box = [1.0, 0.95]", 0.6);
     assert!(near.warnings[0].contains("exchange energy"), "{near:?}");
-    let square = found("box = [0.5, 0.5]", 0.4);
+    let square = amplitude_dependence_at("box = [0.5, 0.5]", 0.4);
     let mode = square.mode.unwrap();
     assert_eq!(square.mode, square.mode_y);
     assert!((mode.planar - y.planar).abs() < 1e-12 && mode.circular.unwrap() > 0.0, "{mode:?}");

@@ -12,7 +12,7 @@ const RHO: f64 = 1000.0;
 
 /// Returns the volume and the rotating liquid of a tank that is filled to the fraction `share` of its volume, with g =
 /// 1 m/s², or 0 if `weightless` is true, and Omega^2 R/g = `flatness` for R = 1 m.
-fn turned(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Spin) {
+fn spin_tank(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Spin) {
     let tank = Tank::from_shape(shape, RHO).unwrap();
     let data = tank.solve(tank.fill_height(Fill::Share(share)).unwrap(), 1).unwrap();
     let gravity = if weightless { 0.0 } else { 1.0 };
@@ -29,7 +29,7 @@ fn close(found: f64, expected: f64, error: f64) {
 fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
         let shape = Shape::Cylinder { radius: 1.0, height: 4.0 };
-        let (m, found) = turned(shape, h / 4.0, beta, false);
+        let (m, found) = spin_tank(shape, h / 4.0, beta, false);
         close(found.z_cg, h / 2.0 + beta * beta / (96.0 * h), 1e-12);
         close(found.i_axis / m, 0.5 * (1.0 + beta / (12.0 * h)), 1e-12);
         close(found.z_apex.unwrap(), h - beta / 4.0, 1e-12);
@@ -40,13 +40,13 @@ fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
 /// Without thrust the surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 - f^(2/3)) in a sphere.
 #[test]
 fn weightless_liquid_lies_at_the_wall() {
-    let (m, found) = turned(Shape::Cylinder { radius: 1.0, height: 2.0 }, 0.3, 1.0, true);
+    let (m, found) = spin_tank(Shape::Cylinder { radius: 1.0, height: 2.0 }, 0.3, 1.0, true);
     close(found.r_dry, 0.7_f64.sqrt(), 1e-12);
     close(found.i_axis / m, 0.5 * (1.0 + 0.7), 1e-12);
     close(found.z_cg, 1.0, 1e-12);
     assert!(!found.in_range && found.flatness.is_none() && found.ratio.is_none(), "{found:?}");
     for share in [0.25_f64, 0.5, 0.9] {
-        let (m, found) = turned(Shape::Sphere { radius: 1.0 }, share, 1.0, true);
+        let (m, found) = spin_tank(Shape::Sphere { radius: 1.0 }, share, 1.0, true);
         let inner = 1.0 - share.powf(2.0 / 3.0);
         close(found.i_axis / m, inner + 0.4 * (1.0 - inner), 1e-9);
         close(found.z_cg, 1.0, 1e-9);
@@ -58,7 +58,7 @@ fn weightless_liquid_lies_at_the_wall() {
 #[test]
 fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     for (share, flatness) in [(0.25, 5.0), (0.25, 10.0), (0.5, 5.0), (0.5, 30.0)] {
-        let (_, found) = turned(Shape::Sphere { radius: 1.0 }, share, flatness, false);
+        let (_, found) = spin_tank(Shape::Sphere { radius: 1.0 }, share, flatness, false);
         assert!(found.r_dry > 0.0 || found.z_apex.is_none());
         close(found.z_cg - 1.0, -1.0 / flatness, 1e-9);
     }
@@ -76,7 +76,7 @@ fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
         (0.9, 5.0, [-0.072_042_86, 0.433_480_19, 0.382_786_34, 0.101_423_93, 0.839_504_48]),
     ];
     for (share, flatness, [z_cg, i_axis, i_cg, apex, wall]) in rows {
-        let (m, found) = turned(Shape::Sphere { radius: 1.0 }, share, flatness, false);
+        let (m, found) = spin_tank(Shape::Sphere { radius: 1.0 }, share, flatness, false);
         close(found.z_cg - 1.0, z_cg, 2e-8);
         close(found.i_axis / m, i_axis, 2e-8);
         close(found.i_cg / m, i_cg, 2e-8);
@@ -118,7 +118,7 @@ fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liqu
     ];
     for (h, flatness, expected, error) in rows {
         let shape = Shape::Cylinder { radius: 1.0, height: 4.0 };
-        let (_, found) = turned(shape, h / 4.0, flatness, false);
+        let (_, found) = spin_tank(shape, h / 4.0, flatness, false);
         for (f, l) in found.frequencies.unwrap().into_iter().zip(expected) {
             close(f * TAU / l, 1.0, error);
         }
@@ -154,7 +154,7 @@ fn a_spinner_beyond_the_model_is_out_of_range() {
 #[test]
 fn an_annulus_bares_its_floor_at_the_inner_wall() {
     let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };
-    let (m, found) = turned(shape, 0.1, 3.0, false);
+    let (m, found) = spin_tank(shape, 0.1, 3.0, false);
     // z = (r^2 - r_dry^2) Omega^2/(2 g) above the floor, from r_dry to the wall
     assert!(found.r_dry > 0.4 && !found.in_range, "{found:?}");
     let u = 1.0 - found.r_dry * found.r_dry;

@@ -84,7 +84,7 @@ fn a_sweep_has_the_damping_of_every_fill() {
     assert!(!table.to_csv().contains("zeta"));
     let liquid =
         Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0, spin: None };
-    table.damp(&tank, 1e-6, liquid).unwrap();
+    table.add_damping(&tank, 1e-6, liquid).unwrap();
     let csv = table.to_csv();
     let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     let column = |name: &str| lines[0].iter().position(|other| *other == name).unwrap();
