@@ -84,8 +84,6 @@ pub fn harness() -> &'static Path {
 /// # Panics
 ///
 /// If the binary does not compile.
-///
-/// If it does not build.
 pub fn binary(name: &str, of: &[&str]) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
     build.current_dir(pack::root()).args(["build", "--quiet", "--bin", name]).args(of);

@@ -535,7 +535,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     late.set("init.slosh_angle", "0.3").unwrap();
     let error = late.set("tank.h", "-1").unwrap_err();
     assert!(format!("{error:#}").contains("tank.h = -1.0 m (allowed: "), "{error:#}");
-    // While the limits are set one after the other, they contradict each other for a moment.
+    // The test sets the two limits one after the other, so that they contradict each other until both are set.
     late.set("wheel.speed_min", "400").unwrap();
     let error = late.new_discrete_states().unwrap_err();
     assert!(error.text().contains("wheel.speed_max"), "{error}");

@@ -1,5 +1,5 @@
-//! Tests of the slosh model `liquid`: its coefficients equal those of potential flow, and its free oscillations have the
-//! frequency shifts of potential flow.
+//! Tests of the slosh model `liquid`: its coefficients, and the frequency shifts of its free oscillations, equal
+//! those of potential flow.
 
 use formulas::third_order::unbridged;
 use hubslosh_tank::third_order::Overlaps;

@@ -79,8 +79,8 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// A mass of 1e11 kg and corresponding moments of inertia allow the craft to move only about one axis; the other
-/// motion falls as 1/M.
+/// A mass of 1e11 kg and corresponding moments of inertia allow the craft to move only about one axis. Motion in the
+/// other directions is inversely proportional to the mass.
 #[test]
 fn spacecraft_on_one_axis_equals_hubslosh() {
     let fmu = load("HubSlosh");

@@ -46,7 +46,8 @@ pub fn random_session<'f>(
     let parameters = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     for v in parameters {
         let Some(start) = start_value(v) else { continue };
-        // Some effects show only while the other values are at their defaults, for example at zero.
+        // Some effects show only while the other values are at their defaults, for example at zero, so a part of the
+        // attempts leaves these values unchanged.
         let kept = match attempt % 3 {
             0 => 0.0,
             1 => 1.0,

@@ -128,7 +128,7 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut fresh = fmu.session(fmu.first_interface()?)?;
     for (v, start) in settable(fmu) {
         fmu.announce(format!("setting {} to {start}", v.name));
-        // This order is that of hosts which set every start value before fmi2SetupExperiment.
+        // The values are set before fmi2SetupExperiment, because some hosts set every start value in this order.
         if let Err(error) = fresh.set(v, &start) {
             findings
                 .at(v.place())

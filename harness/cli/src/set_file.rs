@@ -6,8 +6,8 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 use host::parameter_set::ParameterSet;
 
-/// A function that returns the description of the FMU for which the parameters are meant. It is needed to convert units
-/// to those of the FMU.
+/// A function that returns the description of the FMU for which the parameters are meant. The description has the units
+/// to which their values are converted.
 pub type Describe<'a> = &'a dyn Fn() -> Result<ModelDescription>;
 
 /// Reads names and values from a file of parameters, in the order of the file. Numbers are converted to the units of the FMU.

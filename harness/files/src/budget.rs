@@ -89,7 +89,7 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
 }
 
 /// Returns the number of threads for `wanted` jobs at the same time, each of which uses `bytes` of memory. If `wanted`
-/// is 0, the number is that of the processor's cores.
+/// is 0, returns the number of the processor's cores.
 ///
 /// # Errors
 /// If more than [`JOBS`] jobs are wanted.

@@ -45,8 +45,8 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[error("{0}")]
 pub struct Panicked(pub String);
 
-/// Runs `work`, and returns the message of its panic if it panics. If there are several panics, the message is that of
-/// the first, because a panic of a thread also makes the thread that waits for it panic.
+/// Runs `work`, and returns the message of its panic if it panics. Of several panics it returns the message of the
+/// first, because a panic of a thread also makes the thread that waits for it panic.
 pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {

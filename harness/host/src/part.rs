@@ -54,7 +54,7 @@ pub fn start_values(
 }
 
 /// Returns the description with only the variables within the limits. `starts` has start values of parameters by name,
-/// in the format of FMI, that replace those of the description.
+/// in the format of FMI, that replace the values in the description.
 ///
 /// # Errors
 ///
@@ -190,7 +190,8 @@ fn is_within(name: &str, limits: &[Limit]) -> bool {
     })
 }
 
-/// Returns the number of an event indicator of FMI 3.0 if the name of the variable is that of an indicator.
+/// Returns the number of the event indicator of FMI 3.0 that a variable's name denotes, or `None` if the variable
+/// is no event indicator.
 fn is_indicator(name: &str) -> Option<usize> {
     name.strip_prefix("event_indicator[")?.strip_suffix(']')?.parse().ok()
 }

@@ -10,7 +10,7 @@ use host::part::{Limit, START_VALUES, describe};
 use crate::archive::{self, Files};
 
 /// Packs an FMU with those variables of `fmu` that are within the limits, and writes it to `out`. `starts` has start
-/// values by name that replace those of the description.
+/// values by name that replace the values in the description.
 ///
 /// # Errors
 ///

@@ -1,7 +1,7 @@
-//! Tanks with modes in closed form: upright circular and annular cylinders, boxes.
+//! Tanks with modes in closed form: upright circular and annular cylinders, and boxes.
 //!
-//! Heights in the formulas are above the flat bottom. The modes follow by separation of variables, those of the
-//! cylinder as in Abramson, NASA SP-106, and Dodge (2000).
+//! Heights in the formulas are above the flat bottom. The modes follow by separation of variables, for the cylinder as in
+//! Abramson, NASA SP-106, and Dodge (2000).
 
 use core::f64::consts::PI;
 

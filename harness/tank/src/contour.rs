@@ -731,8 +731,8 @@ mod tests {
         assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
     }
 
-    /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, whether the tank is that of a model or large.
-    /// A closed contour begins at its highest point. A point within 1e-9 of the size from the axis counts as on the axis.
+    /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, whatever the size is. A closed contour
+    /// begins at its highest point. A point counts as on the axis if its distance from the axis is below 1e-9 of the size.
     #[test]
     fn a_contour_with_a_gap_below_1e_6_of_its_size_counts_as_closed() {
         for size in [1.0 / 64.0, 1.0, 16.0] {

@@ -1,8 +1,8 @@
 //! Third-order coefficients over the fill of a tank that drains: columns for the FMUs' fill tables.
 //!
-//! At some fills s and kappa are not known: near poles, in a nearly full tank, in shallow liquid. A table needs a value
-//! at every point. At these fills it gets bounded values: between known fills those of the FMUs' interpolation,
-//! elsewhere the nearest known value.
+//! At some fills s and kappa are not known: near poles, in a nearly full tank, and in shallow liquid. However, the FMU
+//! needs a value at every point of the table. At a fill between two known fills the table has the value that the FMU would
+//! interpolate between them; at other fills it has the nearest known value.
 
 use crate::coefficients::Coefficients;
 use crate::interpolation::Monotone;

@@ -459,7 +459,7 @@ impl Coefficients {
     ) -> Judged {
         let Some([m, n]) = excited else { return Ok(self) };
         let known = [self.nonlinear_inertia, self.nonlinear_stiffness];
-        // The second difference removes the contributions of the other modes, which change smoothly.
+        // The contributions of the other modes change smoothly with the detuning, so that the second difference removes them.
         let [below, above] = [-2.0, 2.0].map(|factor| detuned(factor * DETUNING));
         let share = (0..2)
             .map(|i| (0.5 * (below[i] + above[i]) - known[i]).abs() / (1.0 + known[i].abs()))

@@ -466,8 +466,8 @@ impl<'a> Solver<'a> {
         z.iter().map(|z| self.side.at(*z)).collect()
     }
 
-    /// Returns the gradient of L, the values of the two constraints, and the derivatives of all of them at `x`. `part`
-    /// is the coefficient that the first mode must have.
+    /// Returns the gradient of L, the values of the two constraints, and the derivatives of gradient and constraints at
+    /// `x`. `part` is the coefficient that the first mode must have.
     fn equations(&self, x: &DVector<f64>, part: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let [nz, nc] = self.sizes();
         let size = nz + nc + 2;
@@ -680,8 +680,9 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Degrees of the harmonics in the truncated expansions. The median over these truncations is used, because in each of
-/// them a few waves are wrong: a multiple of their frequency happens to equal that of a high mode of the truncated liquid.
+/// Degrees of the harmonics in the truncated expansions. The median over these truncations is used, because in each
+/// of them a few waves are wrong: a multiple of the wave's frequency happens to equal the frequency of a high mode
+/// of the truncated liquid.
 const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
 /// Largest azimuthal number, which is also the largest multiple of the frequency.
 const ORDER: usize = 4;

@@ -221,7 +221,8 @@ impl FmuUnderTest {
         d.unknowns(d.words.derivatives).filter_map(pair).collect()
     }
 
-    /// Instantiates the FMU with the arguments `with`. The outer error is that of `make`.
+    /// Instantiates the FMU with the arguments `with`. The outer error ends the rule ([`make`](UnderTest::make)); the
+    /// inner error states why the FMU returned no instance.
     pub fn instantiate(
         &self,
         interface: Interface,

@@ -181,7 +181,7 @@ fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_
         let worst = found.iter().min();
         assert_eq!(worst, Some(&meant), "{word}: {text}");
     }
-    // start values that differ from those of the file only in the last bit
+    // start values of which only the last bit differs from the file
     let (found, text) = severities("last_bit_of_start", "values.start");
     assert!(found.is_empty(), "{text}");
     // a tunable parameter that is declared as fixed

@@ -244,7 +244,7 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
     let json = with(&["--set", "slosh.zeta=0.01", "--json"]);
     let found: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(found["parameters"]["slosh.zeta"]["value"], 0.01, "{json}");
-    // A correlation that --set requests is kept.
+    // If --set requests the correlation, it is used, even if --set also gives a damping ratio.
     let both = ["--set", "slosh.zeta=0.01", "--set", "slosh.zeta_from_correlation=true", "--json"];
     let json = with(&both);
     let found: serde_json::Value = serde_json::from_str(&json).unwrap();

@@ -178,6 +178,6 @@ fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
         smallest = smallest.min(ends / domed.angle_limit);
         println!("{fill} {:.3}", ends / domed.angle_limit);
     }
-    // The share that is used, 0.12, is that of a sphere; the smallest share of cylinders is 0.17.
+    // The library uses the share of a sphere, 0.12; the smallest share of cylinders is 0.17.
     assert!((1.0..1.5).contains(&smallest), "{smallest}");
 }

@@ -204,8 +204,8 @@ fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
     }
 }
 
-/// The wall of these tanks is one measured shape at every fill, so that the damping ratio equals the published formula,
-/// but for the last digit.
+/// The wall of these tanks has one of the measured shapes at every fill, so that the damping ratio equals the published
+/// formula, apart from rounding errors.
 #[test]
 fn a_wall_that_is_one_shape_has_its_published_correlation() {
     let close = |found: f64, expected: f64| {

@@ -47,7 +47,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
             "profile = [{ line = [0, 0.5, 0.5, 0.5] }, { line = [0.5, 0.5, 0.6, 0] }, { line = [0.6, 0, 1, 0] }, { line = [1, 0, 0.3, 0.5] }, { line = [0.3, 0.5, 1, 0.9] }]",
             "crosses itself",
         ),
-        // a line that folds back on the previous one, exactly or but for a billionth of a radian
+        // a line that folds back exactly on the previous line, or misses it by a billionth of a radian
         (
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 1, 0.5] }]",
             "crosses itself near (1.000000, 1.000000) m (segments 2 and 3)",

@@ -255,7 +255,8 @@ fn the_frequency_with_a_curved_meniscus_is_smooth_between_the_values_of_the_tabl
         let found = low_gravity::cylinder(mode, 0.0815, 0.2, angle, Fluid { g, ..fluid });
         let together = g * mode.lambda + found.spring / mode.m;
         assert!((found.omega2 / together - 1.0).abs() < 1e-12, "{angle} {g}");
-        // In deep liquid, rho R^3 omega^2/sigma is that of the table at this Bond number; here it is reduced by tanh(xi h/R).
+        // The table holds for deep liquid. At this depth rho R^3 omega^2/sigma is the table's value at this Bond
+        // number, reduced by tanh(xi h/R).
         let (r, bond) = (0.0815f64, 997.0 * g * 0.0815 * 0.0815 / 0.072);
         let deep = low_gravity::cylinder_omega2(bond, angle) * 0.072 / (997.0 * r.powi(3));
         assert!((found.omega2 / (deep * (xi * 0.2 / r).tanh()) - 1.0).abs() < 1e-12, "{angle} {g}");
@@ -519,7 +520,7 @@ fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
         assert_eq!(omega2(angle), omega2(f64::from(taken)));
     }
     assert_eq!(outside(0.2, 30.0, -0.1), ["the Bond number -1.000e1 is below 0; 0 is taken"]);
-    // For a negative specific force the meniscus is that of 0.
+    // A negative specific force has the same meniscus as no specific force.
     let added = |g: f64| {
         let found = [30.0, 90.0].map(|angle| {
             low_gravity::cylinder(mode, 0.1, 0.2, angle, Fluid { rho: 1000.0, sigma: 0.1, g })
@@ -607,8 +608,8 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
 }
 
 /// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere through bottom and
-/// contact line is up to a fifth of the difference between height and width. The sizes are those of a laboratory model
-/// and of a launcher.
+/// contact line is up to a fifth of the difference between height and width. The test uses the sizes of a laboratory
+/// model and of a launcher.
 #[test]
 fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

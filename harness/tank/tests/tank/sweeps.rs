@@ -303,7 +303,7 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         }
         assert!(!warned("stay those of the largest fill"), "{:?}", set.warnings);
     }
-    // the warning about the stiffness, which stays that of the largest fill
+    // the warning that the stiffness of the largest fill is used at all fills
     let wet = Liquid { sigma: Some(0.07), ..liquid };
     let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, wet).unwrap();
     assert!(set.warnings.iter().any(|why| why.contains("stiffnesses stay")), "{:?}", set.warnings);

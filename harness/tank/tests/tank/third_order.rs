@@ -7,8 +7,8 @@ use hubslosh_tank::third_order::Overlaps;
 /// modes leave an error of 1e-7.
 const COUNT: usize = 40;
 
-/// The tank is that of the bench, R = 81.5 mm. The expected values come from an independent derivation and have three
-/// digits; the tolerance is half a unit of the last digit.
+/// The tank is the bench's, R = 81.5 mm. The expected values come from an independent derivation and have three digits;
+/// the tolerance is half a unit of the last digit.
 #[test]
 fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     let all = Overlaps::new(COUNT);
