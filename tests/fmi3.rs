@@ -180,7 +180,7 @@ fn an_fmu_3_has_the_platform_tuple_the_icon_and_the_list_of_its_references() {
     ] {
         assert!(names.iter().any(|there| there == name), "{name}");
     }
-    // Every file in the list exists.
+    // Every file that fmi-ls-manifest.xml lists exists.
     let mut manifest = String::new();
     let folder = "extra/org.fmi-standard.fmi-ls-ref";
     archive

@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(Element::unpack(&mut rest).as_ref(), Some(&root));
         assert!(rest.is_empty());
         assert_eq!(Element::unpack(&mut short), None);
-        // a wrong length at each position, or another number of a line
+        // Four bytes at each position are overwritten, which gives a wrong length or a wrong line number.
         for at in 0..all.len() - 3 {
             let mut wrong = all.to_vec();
             wrong[at..at + 4].fill(0xff);
@@ -350,7 +350,7 @@ mod tests {
         let started = std::time::Instant::now();
         let root = Element::parse(format!("<a>\n{lines}</a>").as_bytes()).unwrap();
         assert_eq!(root.children.last().map(|b| b.line), Some(100_001));
-        // The test took minutes when each node searched for its own line from the beginning.
+        // Counting the lines from the beginning for each element would take minutes.
         assert!(started.elapsed().as_secs_f64() < 5.0);
     }
 

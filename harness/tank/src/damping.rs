@@ -191,44 +191,45 @@ impl Nearest {
     }
 
     /// Returns a sentence about the basis of the damping ratio of a wall that has this shape. `correlation` is the
-    /// damping ratio by the shape's correlation, `layers` the damping ratio by 1.45 laminar layers.
+    /// damping ratio by the shape's correlation, and `layers` is 1.45 times the damping ratio by the laminar layer.
     fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
         let (name, unmeasured) = (shape_name(self.shape), formula::UNMEASURED);
         let formula::Part { weight, .. } = self.part;
         let disagree = if self.part.disagrees() {
-            ", more than measured tanks scatter: two estimates disagree"
+            "; the two estimates disagree by more than the scatter of measured tanks"
         } else {
             ""
         };
         let by_correlation =
-            format!("its correlation makes {}{disagree}", significant(correlation));
+            format!("the correlation gives {}{disagree}", significant(correlation));
         if weight == 0.0 {
             return format!(
-                "{unmeasured} laminar layers, as in measured cylinders: the correlation of the {name} was not measured \
-                 there; {by_correlation}"
+                "{unmeasured} times the damping of the laminar layer, as in measured cylinders, because this tank is outside \
+                 the range in which the correlation of the {name} was measured; {by_correlation}"
             );
         }
         if weight < 1.0 {
             return format!(
-                "{factor:.2} laminar layers, between {unmeasured} of measured cylinders and the correlation of the {name}, \
-                 which was not measured there; {by_correlation}"
+                "{factor:.2} times the damping of the laminar layer, between the {unmeasured} times of measured cylinders and \
+                 the correlation of the {name}, because this tank is outside the range in which the correlation was \
+                 measured; {by_correlation}"
             );
         }
         if self.part.factor < 1.0 {
             return format!(
-                "{factor:.2} laminar layers, as in measured cylinders where the correlation of the {name} is far below the \
-                 laminar layer; {by_correlation}"
+                "{factor:.2} times the damping of the laminar layer, as in measured cylinders, because the correlation of \
+                 the {name} gives less than the laminar layer alone; {by_correlation}"
             );
         }
         if !self.at_depth {
             return format!(
-                "{factor:.2} laminar layers, as the {name} has at the nearest depth that was measured; {unmeasured} make \
-                 {}{disagree}",
+                "{factor:.2} times the damping of the laminar layer, as measured for the {name} at the nearest depth; \
+                 {unmeasured} times would give {}{disagree}",
                 significant(layers)
             );
         }
         format!(
-            "{}, measured there; {unmeasured} laminar layers make {}{disagree}",
+            "{}, within its measured range; {unmeasured} times the damping of the laminar layer would give {}{disagree}",
             shape_source(self.shape),
             significant(layers)
         )
@@ -239,11 +240,12 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
     let unmeasured = formula::UNMEASURED;
     if found.is_empty() {
         let mut text = format!(
-            "{unmeasured} laminar layers, as in measured cylinders: no measurements of this shape"
+            "{unmeasured} times the damping of the laminar layer, as in measured cylinders, because no measurements of this \
+             shape are known"
         );
         for nearest in near.iter().filter(|nearest| nearest.part.disagrees()) {
             text += &format!(
-                "; it is nearly a {}, whose correlation makes {:.2} layers, which the interval includes",
+                "; it is nearly a {}, whose correlation gives {:.2} times, which the interval includes",
                 shape_name(nearest.shape),
                 nearest.part.factor
             );
@@ -254,19 +256,20 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
         let formula::Part { share, factor, weight } = nearest.part;
         let range = if weight < 1.0 { ", beyond its measured range" } else { "" };
         format!(
-            "{:.0} % of the wetted wall is a {}, whose correlation makes {factor:.2} layers{range}",
+            "{:.0} % of the wetted wall is a {}, whose correlation gives {factor:.2} times{range}",
             100.0 * share,
             shape_name(nearest.shape)
         )
     };
     let shapes: Vec<String> = found.iter().map(of_shape).collect();
     let disagree = if found.iter().any(|nearest| nearest.part.disagrees()) {
-        "; the estimates disagree by more than measured tanks scatter"
+        "; the estimates disagree by more than the scatter of measured tanks"
     } else {
         ""
     };
     format!(
-        "{factor:.2} laminar layers: {}; the rest of the wall has {unmeasured}, as measured cylinders have{disagree}",
+        "{factor:.2} times the damping of the laminar layer: {}; the rest of the wall has {unmeasured} times, as measured \
+         cylinders have{disagree}",
         shapes.join("; ")
     )
 }

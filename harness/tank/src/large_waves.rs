@@ -481,7 +481,7 @@ impl<'a> Solver<'a> {
         let [u, u_r, u_z, u_h] = &at.values;
         let [phi, phi_r, phi_z, phi_h] = at.values.each_ref().map(|u| u * &c);
 
-        // derivatives along the lines
+        // derivatives with respect to z along lines of constant rho
         let mut along = DMatrix::zeros(rows, nc);
         let mut kinetic = DMatrix::zeros(rows, nc);
         // coefficients of the diagonal blocks

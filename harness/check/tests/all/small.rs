@@ -95,7 +95,7 @@ fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     for (name, definitions, rate, experiment) in cases {
         let small = Small { definitions, rate: *rate, experiment };
         let report = check_bytes(&small.packed(), &[]);
-        // A plain build is for this machine, and one case has a step that is too long on purpose.
+        // The small FMUs are built without the options for old systems, and one case has a step that is too long on purpose.
         let fine = ["bin.system", "xml.default_experiment"];
         let others: Vec<_> = report.all().filter(|(rule, _)| !fine.contains(&rule.id)).collect();
         if !others.is_empty() || report.count_findings(Severity::Error) > 0 {

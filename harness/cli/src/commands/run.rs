@@ -184,7 +184,8 @@ impl RunArgs {
             &columns,
             needs.chain(limits.required_columns()).chain(sensors.required_variables()),
         );
-        // memory for the table, for its copy with `--columns`, and for the output: 25 characters for a number
+        // This is the memory for the table, for its copy with `--columns`, and for the output, where a number has up to 25
+        // characters.
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());
         let bar = progress::steps_bar()?;

@@ -122,7 +122,7 @@ fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
         let mode = damping_at(&tank, fill, liquid).modes[0];
         mode.zeta / mode.laminar
     };
-    // 3.16 layers at the tangent point, without a fall to 1.45 layers there
+    // 3.16 times the damping of the laminar layer at the tangent point, without a fall to 1.45 times
     assert!((ratio(0.3001) / ratio(0.3) - 1.0).abs() < 2e-3);
     let full = damping_at(&tank, 0.7, liquid);
     let [part] = &full.parts[..] else { panic!("{full:?}") };
@@ -162,9 +162,9 @@ fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains
     }
 }
 
-/// Spheroids and capsules whose dimensions pass through those of a sphere. Near the sphere the ratio is a smooth
-/// function of the dimensions; far from the sphere the shape is quite different. At 0.8 of the height the sphere has
-/// ten laminar layers, and the interval of a spheroid that differs by a few per cent contains this value.
+/// The dimensions of spheroids and capsules change gradually until the shape is a sphere. Near the sphere the damping
+/// ratio is a smooth function of the dimensions. Filled to 0.8 of its height, the sphere has ten times the damping of
+/// the laminar layer, and the interval of a spheroid that differs from it by a few per cent contains this value.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
@@ -190,7 +190,7 @@ fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
             assert!((zeta / sphere - 1.0).abs() < 1e-5 + 10.0 * e, "{e:e}: {zeta} {sphere}");
         }
     }
-    // 0.5 % of the axis apart, from one end of the transition to the other
+    // The heights of neighbouring spheroids differ by 0.5 %, and all together cover the transition.
     let all: Vec<f64> = (-6..=6).map(|i| spheroid(5e-3 * f64::from(i))).collect();
     for pair in all.windows(2) {
         assert!((pair[1] / pair[0]).ln().abs() < 0.5, "{all:?}");

@@ -345,8 +345,8 @@ fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
     assert_eq!(damped(capsule, 0.4, 1e-6, 0.05, None).shape, "sphere");
 }
 
-/// At h/R = 0.2 and R = 0.5 m, 1.45 times the laminar layers of the first three modes are 2.98e-3, 1.06e-3 and 0.56e-3
-/// (computed by hand to three digits). The first mode has 1.493 layers, by Stephens.
+/// At h/R = 0.2 and R = 0.5 m, 1.45 times the damping ratios of the laminar layer of the first three modes are 2.98e-3,
+/// 1.06e-3 and 0.56e-3 (computed by hand to three digits). By Stephens the factor of the first mode is 1.493.
 #[test]
 fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     let found =
@@ -354,7 +354,8 @@ fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     for (mode, by_hand) in found.modes.iter().zip([2.98e-3, 1.06e-3, 0.56e-3]) {
         assert!((mode.zeta * 1.45 / 1.493 / by_hand - 1.0).abs() < 6e-3, "{}", mode.zeta);
     }
-    // For the first mode the correlation agrees with the layers, so that its interval is the scatter of measurements.
+    // For the first mode the correlation agrees with 1.45 times the laminar layer, so that its interval is the scatter of
+    // measurements.
     // Other modes were not measured.
     let [first, second] = [found.modes[0], found.modes[1]];
     assert!((first.interval[1] / first.interval[0] / (1.3 / 0.7) - 1.0).abs() < 1e-12);
@@ -416,7 +417,7 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
     assert!(inside.taken.contains("two estimates disagree") && inside.warnings.is_empty());
     let outside = damped(shape, 0.5, 1e-6, 9.81, None);
     assert!((outside.modes[0].zeta / outside.modes[0].laminar / 1.45 - 1.0).abs() < 1e-12);
-    assert!(outside.taken.contains("not measured there") && outside.warnings.len() == 1);
+    assert!(outside.taken.contains("outside the range in which") && outside.warnings.len() == 1);
     let correlation = outside.correlation.unwrap();
     assert!(outside.modes[0].zeta < correlation && correlation < outside.modes[0].interval[1]);
 }
@@ -427,7 +428,8 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
 fn damping_follows_from_capillarity_without_gravity() {
     let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
     let zeta = |g: f64| damped(shape, 0.6, 1e-6, g, Some(0.02)).modes[0].zeta;
-    // omega^2 = sigma xi^3/(rho R^3) of a deep cylinder; Mikishev and Dorozhkin's 1.39 to 1.54 layers.
+    // In a deep cylinder omega^2 = sigma xi^3/(rho R^3). The damping is 1.39 to 1.54 times that of the laminar layer, by
+    // Mikishev and Dorozhkin.
     let omega = (0.02 * 1.8412_f64.powi(3) / 1000.0 / 0.3_f64.powi(3)).sqrt();
     let layer = 1.8368 / 0.3 * (1e-6 / (8.0 * omega)).sqrt();
     assert!((1.35..1.55).contains(&(zeta(1e-9) / layer)), "{}", zeta(1e-9) / layer);
@@ -486,11 +488,14 @@ fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
         [("shape = { cylinder = { radius = 0.5, height = 9 } }", 1.0), (sphere, 0.5)]
     {
         let found = damped(shape, fill, 1e-6, 0.05, None);
-        let layers = number(&found.taken, "measured there; 1.45 laminar layers make ");
+        let layers = number(
+            &found.taken,
+            "measured range; 1.45 times the damping of the laminar layer would give ",
+        );
         assert!((layers / (1.45 * found.modes[0].laminar) - 1.0).abs() < 1e-3, "{}", found.taken);
     }
     let found = damped(sphere, 0.5, 1e-6, 9.81, None);
-    let correlation = number(&found.taken, "was not measured there; its correlation makes ");
+    let correlation = number(&found.taken, "was measured; the correlation gives ");
     assert!((correlation / found.correlation.unwrap() - 1.0).abs() < 1e-3, "{}", found.taken);
 }
 
