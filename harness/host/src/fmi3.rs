@@ -899,7 +899,9 @@ fn whole_step(instance: &Instance, done: Step) -> Called {
         let text = format!("it asks for the end of the simulation at t = {time} s");
         (Status::Discard, instance.take_messages(), text)
     } else if done.early_return == 1 {
-        let text = format!("it returns early, at t = {time} s, which it was not allowed to");
+        let text = format!(
+            "it returns early, at t = {time} s, although the host does not allow early returns"
+        );
         (Status::Error, Vec::new(), text)
     } else {
         return Ok(());

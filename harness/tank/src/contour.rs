@@ -486,7 +486,7 @@ fn defect(segment: &Segment) -> Option<String> {
     }
     if !matches!(segment.curve, Curve::Line { .. }) && (segment.to - segment.from).abs() > 6.3 {
         let degrees = (segment.to - segment.from).to_degrees().abs();
-        return Some(format!("an arc of {degrees:.1} degrees goes round more than once"));
+        return Some(format!("an arc of {degrees:.1} degrees is longer than a full circle"));
     }
     let outline: Vec<Point> = (0..=8).map(|k| segment.point_at(k as f64 / 8.0)).collect();
     let length: f64 = outline.windows(2).map(|p| norm(sub(p[1], p[0]))).sum();

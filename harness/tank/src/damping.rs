@@ -325,7 +325,8 @@ fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
         }
         formula::Shape::Torus { tube_radius, depth } => {
             let (y, scale) = (0.5 * depth / tube_radius, formula::torus_number(tube_radius, nu, g));
-            let measured = format!("Re is {scale:.3e} times that of the one tank measured");
+            let measured =
+                format!("Re is {scale:.3e} times the Reynolds number of the only measured tank");
             vec![
                 ((0.1..=0.9).contains(&y), format!("h/2a = {y:.3} is outside 0.1 to 0.9")),
                 ((0.1..=10.0).contains(&scale), measured),

@@ -55,7 +55,7 @@ const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
 /// both per squared slosh angle. At 10 degrees this difference changes the frequency by 0.03 %.
 const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
-const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
+const ASSUMED: &str = "without them the FMUs model a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
 
 /// Slosh angle, rad. If the third order is valid only up to a smaller angle, a warning says so, and files for the FMUs

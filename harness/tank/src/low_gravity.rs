@@ -53,15 +53,21 @@ pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let unknown = !mode.upright && added > LARGEST_SHARE * gravity;
     let mut outside = Vec::new();
     if !mode.vertical_wall {
-        outside.push("the wall is not vertical at the free surface; nothing is known for a free contact line there".to_string());
+        outside.push(
+            "the wall is not vertical at the free surface, and no formula is known for a free contact line at such a wall"
+                .to_string(),
+        );
     }
     if unknown && fluid.g > 0.0 {
         outside.push(format!(
-            "it adds {:.0} % to omega^2, too much for the first order",
+            "surface tension adds {:.0} % to omega^2, too much for a computation to first order",
             100.0 * added / gravity
         ));
     } else if unknown {
-        outside.push("without gravity it is all of omega^2, too much for the first order".into());
+        outside.push(
+            "without gravity all of omega^2 comes from surface tension, too much for a computation to first order"
+                .into(),
+        );
     }
     Capillary { omega2: gravity + added, spring: mode.m * added, outside, unknown }
 }
@@ -135,16 +141,17 @@ pub fn cylinder(
     let bond = fluid.bond(radius);
     let Capillary { omega2, spring, mut outside, unknown } = flat(mode, fluid);
     if !(0.0..=90.0).contains(&contact_angle) {
-        let taken = contact_angle.clamp(0.0, 90.0);
+        let nearest = contact_angle.clamp(0.0, 90.0);
         outside.push(format!(
-            "nothing is known at a contact angle of {contact_angle} degrees; {taken} is taken"
+            "no formula is known for a contact angle of {contact_angle} degrees; {nearest} degrees are used"
         ));
     }
     if bond < 0.0 {
-        outside.push(format!("the Bond number {bond:.3e} is below 0; 0 is taken"));
+        outside.push(format!("the Bond number {bond:.3e} is below 0; 0 is used"));
     }
     if fill < radius && contact_angle < 90.0 && bond < 100.0 {
-        outside.push("the meniscus was computed over deep liquid, h/R of 1 and more".to_string());
+        outside
+            .push("the meniscus was computed for deep liquid, with h/R of 1 or more".to_string());
     }
     let scale = fluid.sigma / (fluid.rho * radius.powi(3)) * (XI * fill / radius).tanh();
     let curved = scale * meniscus_shift(bond.max(0.0), contact_angle.clamp(0.0, 90.0));

@@ -100,7 +100,7 @@ pub fn spin(
         match omega_0 {
             Some(rate) => beyond(
                 limit.is_exceeded(omega, rate * rate),
-                "at this rate no mode is known to some per cent (Omega^2 R/g is above 0.3, or the wave's frequency is in the range of \
+                "at this rate no mode can be computed to a few per cent (Omega^2 R/g is above 0.3, or the wave's frequency is in the range of \
                  inertial waves)",
             ),
             None => beyond(

@@ -241,10 +241,13 @@ impl Tank {
             }
         };
         if file.spline.is_some() && file.points.is_none() {
-            problems.push("spline belongs to points, which is missing.".to_string());
+            problems.push(
+                "spline is given without points (allowed: only together with points).".to_string(),
+            );
         }
         if file.scale.is_some() && file.svg.is_none() {
-            problems.push("scale belongs to svg, which is missing.".to_string());
+            problems
+                .push("scale is given without svg (allowed: only together with svg).".to_string());
         }
         let scale = file.scale.unwrap_or(1.0);
         if !(scale > 0.0 && scale.is_finite()) {

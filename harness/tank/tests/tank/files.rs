@@ -78,7 +78,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
         ),
         (
             "profile = [{ arc = [0, 1, 1, -90, 400] }]",
-            "an arc of 490.0 degrees goes round more than once",
+            "an arc of 490.0 degrees is longer than a full circle",
         ),
         ("profile = [{ line = [0, 0, 1] }]", "expected an array of length 4"),
         ("profile = [{ circle = [0, 0, 1] }]", "unknown name `circle`, allowed are `line`"),

@@ -508,7 +508,7 @@ fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
         let fluid = Fluid { rho: 1000.0, sigma: 0.1, g };
         low_gravity::cylinder(mode, 0.1, fill, angle, fluid).outside
     };
-    let deep = "the meniscus was computed over deep liquid, h/R of 1 and more";
+    let deep = "the meniscus was computed for deep liquid, with h/R of 1 or more";
     assert_eq!(outside(0.09, 30.0, 0.99), [deep]);
     assert_eq!(outside(0.09, 0.0, 0.0), [deep]);
     for (fill, angle, g) in
@@ -516,15 +516,16 @@ fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
     {
         assert_eq!(outside(fill, angle, g), [""; 0], "{fill} {angle} {g}");
     }
-    for (angle, taken) in [(91.0, 90), (-1.0, 0)] {
-        let words =
-            format!("nothing is known at a contact angle of {angle} degrees; {taken} is taken");
+    for (angle, nearest) in [(91.0, 90), (-1.0, 0)] {
+        let words = format!(
+            "no formula is known for a contact angle of {angle} degrees; {nearest} degrees are used"
+        );
         assert_eq!(outside(0.2, angle, 0.5), [words]);
         let fluid = Fluid { rho: 1000.0, sigma: 0.1, g: 0.5 };
         let omega2 = |angle: f64| low_gravity::cylinder(mode, 0.1, 0.2, angle, fluid).omega2;
-        assert_eq!(omega2(angle), omega2(f64::from(taken)));
+        assert_eq!(omega2(angle), omega2(f64::from(nearest)));
     }
-    assert_eq!(outside(0.2, 30.0, -0.1), ["the Bond number -1.000e1 is below 0; 0 is taken"]);
+    assert_eq!(outside(0.2, 30.0, -0.1), ["the Bond number -1.000e1 is below 0; 0 is used"]);
     // A negative specific force has the same meniscus as no specific force.
     let added = |g: f64| {
         let found = [30.0, 90.0].map(|angle| {
@@ -547,10 +548,13 @@ fn a_frequency_is_unknown_if_capillarity_adds_more_than_a_tenth_of_gravity() {
     assert!(!flat(1.01 * limit).unknown && flat(1.01 * limit).outside.is_empty());
     let near = flat(0.99 * limit);
     assert!(near.unknown);
-    assert_eq!(near.outside, ["it adds 10 % to omega^2, too much for the first order"]);
+    assert_eq!(
+        near.outside,
+        ["surface tension adds 10 % to omega^2, too much for a computation to first order"]
+    );
     assert_eq!(
         flat(0.1 * limit).outside,
-        ["it adds 100 % to omega^2, too much for the first order"]
+        ["surface tension adds 100 % to omega^2, too much for a computation to first order"]
     );
 }
 

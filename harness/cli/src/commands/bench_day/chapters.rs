@@ -275,7 +275,7 @@ fn bearing(fitted: &Identification, is_used: bool) -> Chapter {
             illustration(
                 near,
                 "5.8",
-                "The same where the hub is slow: dry friction is largest when the hub begins to slip.",
+                "The friction torque of a slow hub: dry friction is largest when the hub begins to slip.",
             ),
         ],
     }
@@ -332,11 +332,11 @@ fn preferential_direction(
             let [lower, difference, upper] = [-1.0, 0.0, 1.0].map(edges);
             let beyond = lower.iter().zip(&upper).filter(|(l, u)| l.1 > 0.0 || u.1 < 0.0).count();
             let text = match beyond {
-                0 => "The difference of the directions is nowhere outside its 95 % interval (dashed): the curves of these \
-                      figures show scatter, not friction that depends on the angle or the direction."
+                0 => "The 95 % interval (dashed) of the difference of the directions contains 0 at every angle: the curves of \
+                      these figures show scatter, not friction that depends on the angle or the direction."
                     .to_string(),
                 _ => format!(
-                    "The difference of the directions is outside its 95 % interval (dashed) over {:.0} % of the revolution.",
+                    "The 95 % interval (dashed) of the difference of the directions does not contain 0 over {:.0} % of the revolution.",
                     100.0 * beyond as f64 / lower.len() as f64
                 ),
             };
@@ -421,8 +421,8 @@ fn preferential_direction(
         text: vec![
             verdict,
             format!(
-                "The figures show deceleration against the angle at {:.2} rad/s, the mean speed of the decays. A parabola takes its \
-                 dependence on the speed, which the thesis's fits leave in.",
+                "The figures show deceleration against the angle at {:.2} rad/s, the mean speed of the decays. Its dependence on the \
+                 speed is removed by a parabola; the fits of the thesis do not remove it.",
                 ahead.speed
             ),
             shown,
@@ -489,7 +489,7 @@ fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
                 "histogram.svg" => ("5.15", "Normal noise has the dashed density."),
                 "kolmogorov.svg" => (
                     "5.14 and 5.15",
-                    "Quantisation alone moves the readings off the normal distribution; between their levels it has no effect.",
+                    "Quantisation by itself gives the readings a distance from the normal distribution; between their levels it has no effect.",
                 ),
                 "autocorrelation.svg" => {
                     ("5.18", "White noise stays within the frame 95 % of the time.")
