@@ -320,7 +320,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         || !fmu.has_capability(Interface::ModelExchange, "providesDirectionalDerivative")
     {
         return skip(
-            "providesDirectionalDerivative is not declared for Model Exchange, which alone gives access to the states",
+            "providesDirectionalDerivative is not declared for Model Exchange, the only interface that gives access to the states",
         );
     }
     let unknowns: Vec<&Variable> = d

@@ -142,8 +142,8 @@ pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         if declared(state) && (given - written).abs() > ROUNDING * written {
             findings.at(state.place()).add(format!(
                 "nominal={written:?} in modelDescription.xml, but \
-                     fmi2GetNominalsOfContinuousStates gives {given:?} (allowed: the same: hosts \
-                     weigh errors by the one or the other)"
+                     fmi2GetNominalsOfContinuousStates gives {given:?} (required: equal values, \
+                     because hosts scale errors by one of the two)"
             ));
         }
     }

@@ -128,9 +128,9 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     .iter()
                     .any(|o| o.name != v.name && contains_name(&why.to_string(), &o.name))
             {
-                findings
-                    .at(v.place())
-                    .add(format!("{item} is an item of its type, but refused: {why}"));
+                findings.at(v.place()).add(format!(
+                    "{item} is an item of the variable's type, but the FMU refuses it: {why}"
+                ));
             }
         }
         // Types that accept further items are reported. Another rule reports a type that accepts any number.
@@ -139,7 +139,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         if takes_any {
             findings
                 .at(v.place())
-                .add(format!("{beyond} is accepted, and no item of its type (allowed: {list})"));
+                .add(format!("{beyond} is accepted, although it is no item of the variable's type (allowed: {list})"));
             continue;
         }
         for other in first.saturating_sub(1)..=last.saturating_add(3) {

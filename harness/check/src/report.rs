@@ -75,7 +75,7 @@ impl Report {
         let skipped = self.outcomes.iter().filter(|o| o.findings.skipped.is_some()).count();
         let _ = writeln!(
             text,
-            "{}: {} errors, {} warnings; {} rules looked at, {skipped} skipped",
+            "{}: {} errors, {} warnings; {} rules checked, {skipped} skipped",
             self.path.display(),
             self.count_findings(Severity::Error),
             self.count_findings(Severity::Warning),

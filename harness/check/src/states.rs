@@ -76,7 +76,7 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let mut session = fmu.running(interface)?;
         let mut state = session.instance.get_state()?;
         session.advance(3)?;
-        fmu.announce("fmi2GetFMUstate into a handle that is there already");
+        fmu.announce("fmi2GetFMUstate with the handle of an existing state");
         session.instance.get_state_into(&mut state)?;
         let here = session.mark();
         let first = continue_from(&mut session, &here)?;

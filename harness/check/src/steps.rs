@@ -34,7 +34,9 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let discarded =
             error.downcast_ref::<CallError>().is_some_and(|error| error.status == Status::Discard);
         let allowed = match discarded {
-            true => " (allowed: fmi2Discard only with fmi2Terminated; two hosts try for ever)",
+            true => {
+                " (allowed: fmi2Discard only with fmi2Terminated, because two hosts repeat the step for ever)"
+            }
             false => "",
         };
         findings.at(fmu.last_call()).add(format!("{error}{allowed}"));
@@ -84,7 +86,10 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let mut session = after_three_steps(fmu)?;
         session.advance(3)?;
         let wrong = session.time + off * session.step;
-        let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
+        let place = format!(
+            "fmi2DoStep from {wrong:?} s, although the FMU has reached {:?} s",
+            session.time
+        );
         let step = session.step;
         let answer =
             fmu.with_open_effect(&place, findings, || session.instance.do_step(wrong, step));
@@ -107,13 +112,15 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         };
         session.stimulate()?;
         fmu.announce(format!(
-            "fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"
+            "fmi2DoStep from {wobbled:?} s, which is {product:?} s with a rounding error, by {h:?} s"
         ));
         if let Err(error) = session.instance.do_step(wobbled, h) {
             if session.has_terminated(&error) {
                 break;
             }
-            findings.at(fmu.last_call()).add(format!("{error} (allowed: some ulps either way)"));
+            findings
+                .at(fmu.last_call())
+                .add(format!("{error} (allowed: fmi2OK for times within a few ulps)"));
             return Ok(());
         }
     }
@@ -145,9 +152,9 @@ pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     session.initialise_at(experiment.start, Some(stop), experiment.tolerance)?;
     // The sum of the steps differs from the stop time by rounding.
     if let Err(error) = session.advance(STEPS) {
-        findings
-            .at(fmu.last_call())
-            .add(format!("{error} (the stop time is {stop:?} s; rounding must be forgiven)"));
+        findings.at(fmu.last_call()).add(format!(
+            "{error} (the stop time is {stop:?} s; required: the FMU accepts rounding errors)"
+        ));
         return Ok(());
     }
     let place = format!("fmi2DoStep past the stop time {stop} s");
@@ -404,7 +411,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     }
     for (input, first) in ignored.into_iter().filter(|_| !acts) {
         findings.at(format!("fmi2SetRealInputDerivatives of {}", input.name)).add(format!(
-            "fmi2OK, but {} and what else follows this input within a step do not follow its \
+            "fmi2OK, but {} and the other variables that depend on this input within a step do not follow its \
                  slope (allowed: a derivative that acts, since canInterpolateInputs is declared)",
             first.name
         ));

@@ -259,6 +259,6 @@ fn documentation_has_the_groups_and_numbers_of_rules() {
     }
     let counts = format!("{} rules for FMI 2.0 and {} for FMI 3.0", RULES.len(), third.len());
     assert!(check.contains(&counts), "book/check.md does not contain: {counts}");
-    let first = format!("{} rules looked at, 2 skipped", RULES.len() - 2);
+    let first = format!("{} rules checked, 2 skipped", RULES.len() - 2);
     assert!(page("check_ci.md").contains(&first), "book/check_ci.md has not: {first}");
 }
