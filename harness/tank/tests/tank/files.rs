@@ -159,7 +159,7 @@ fn every_impossible_fill_has_a_clear_message() {
             0.3,
             "horizontal part",
         ),
-        // free surfaces a little below them
+        // the same tanks with the free surface a little below the horizontal part
         (
             "profile = [{ arc = [0.5, 0, 0.3, 90, 0] }, { line = [0.8, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
             0.295,
