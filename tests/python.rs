@@ -45,7 +45,7 @@ const BESIDE: [&str; 6] = [
 ];
 
 /// Returns the pytest command with the options that the tests of the package need: the FMU and the command `hubslosh`.
-fn of_the_package() -> Command {
+fn package_tests() -> Command {
     let mut command = Command::new(python());
     command
         .args(["-m", "pytest"])
@@ -65,7 +65,7 @@ fn fmus() -> Vec<&'static Path> {
 #[test]
 fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     let tests = pack::root().join("harness/python");
-    let mut command = of_the_package();
+    let mut command = package_tests();
     fmus();
     command.arg(&tests);
     for file in BESIDE {
@@ -80,7 +80,7 @@ fn the_python_tests_of_the_fmus_with_fmpy_pass() {
 #[ignore = "minutes: .ci/long-tests"]
 fn long_tests_of_the_package_pass() {
     pytest(
-        of_the_package()
+        package_tests()
             .args([Path::new("--wheel"), &pack::wheel::for_tests(&fmus())])
             .arg("--long")
             .arg(pack::root().join("harness/python")),
@@ -92,10 +92,7 @@ fn long_tests_of_the_package_pass() {
 #[test]
 fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     let tests = pack::root().join("harness/python/tests");
-    pytest(
-        of_the_package().args(BESIDE.map(|file| tests.join(file))),
-        "the tests in Python failed",
-    );
+    pytest(package_tests().args(BESIDE.map(|file| tests.join(file))), "the tests in Python failed");
 }
 
 /// Runs those tests of the studies that take only seconds: features computed from their definitions, and the benchmark.
@@ -106,7 +103,7 @@ fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
     }
     let studies = pack::root().join("harness/studies");
     let quick = ["test_analysis.py", "test_benchmark.py"].map(|file| studies.join(file));
-    pytest(of_the_package().args(quick), "a study failed");
+    pytest(package_tests().args(quick), "a study failed");
 }
 
 /// Runs pytest on harness/studies; each study compares its results with the numbers in the book.
@@ -117,7 +114,7 @@ fn the_studies_compute_the_numbers_of_the_book() {
         pack::packed_model_for_tests(model);
     }
     let studies = pack::root().join("harness/studies");
-    pytest(of_the_package().arg("--long").arg(studies), "a study failed");
+    pytest(package_tests().arg("--long").arg(studies), "a study failed");
 }
 
 /// Runs the examples in Python and the loop in Rust with the packed FMUs.

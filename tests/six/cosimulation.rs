@@ -358,7 +358,7 @@ fn coupling_two_fmus_with_a_delay_makes_the_slosh_mode_grow_as_predicted() {
     }
 }
 
-fn a_box() -> Tank {
+fn box_tank() -> Tank {
     let mut tank = Tank {
         zeta: [0.05; 3],
         damping_law: DampingLaw::Constant,
@@ -441,15 +441,15 @@ fn coupling_converges_with_its_order() {
 /// simulation diverges. Extrapolated values do not diverge.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
-    let lambda = ratio(a_box());
+    let lambda = ratio(box_tank());
     for target in [0.3, 1.3, 6.0] {
         for exchange in [Exchange::Split, Exchange::Lumped, Exchange::RigidBody] {
             for (order, allowed) in [(GaussSeidelHeld, 0.15), (GaussSeidelLinear, 0.01)] {
                 if order == GaussSeidelHeld && target == 6.0 {
                     continue;
                 }
-                let [coarse, fine] =
-                    [0.02, 0.005].map(|h| error_of(lambda / target, a_box(), exchange, order, h));
+                let [coarse, fine] = [0.02, 0.005]
+                    .map(|h| error_of(lambda / target, box_tank(), exchange, order, h));
                 let got = f64::log2(coarse / fine) / 2.0;
                 println!(
                     "lambda {target} {exchange:?} {order:?}: {coarse:.1e} {fine:.1e} order {got:.2}"

@@ -191,7 +191,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// Makes a call that the FMU must refuse, with the usual callbacks. Returns true if the FMU logs the reason. A crash
 /// is reported by `values.unknown`.
-fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
+fn logs_usual_refusal(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
     let mut session = fmu.running(interface)?;
     Ok(session.provoke_refusal().is_some_and(|error| !error.messages.is_empty()))
 }
@@ -199,7 +199,7 @@ fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first_interface()?;
     fmu.require(interface, "canNotUseMemoryManagementFunctions")?;
-    refuse_as_usual(fmu, interface)?;
+    logs_usual_refusal(fmu, interface)?;
     let place = "fmi2Instantiate with NULL for the memory functions";
     fmu.announce(place);
     let with = Instantiation { callbacks: Callbacks::Logger, ..fmu.arguments(interface)? };
@@ -241,7 +241,7 @@ fn initialise_and_refuse(fmu: &FmuUnderTest, mut instance: Instance) -> Result<(
 
 pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first_interface()?;
-    let logs = refuse_as_usual(fmu, interface)?;
+    let logs = logs_usual_refusal(fmu, interface)?;
     fmu.announce("fmi2Instantiate with callbacks that are wiped afterwards");
     let with = Instantiation { callbacks: Callbacks::Fleeting, ..fmu.arguments(interface)? };
     let mut instance = fmu.instantiate(interface, &with)??;
@@ -481,25 +481,25 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
     }
 }
 
-fn ordinary_lives(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
+fn run_ordinary_instances(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
     let mut session = fmu.running(interface)?;
     session.advance(STEPS)?;
     fmu.announce("fmi2Terminate");
     session.instance.terminate()?;
     drop(session);
-    refuse_as_usual(fmu, interface).map(|_| ())
+    logs_usual_refusal(fmu, interface).map(|_| ())
 }
 
 pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
-        ordinary_lives(fmu, interface)?;
+        run_ordinary_instances(fmu, interface)?;
     }
     Ok(())
 }
 
 pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
-        ordinary_lives(fmu, interface)?;
+        run_ordinary_instances(fmu, interface)?;
     }
     // The comparison is with the state before the binary was loaded, so that changes by its constructors count.
     for ((name, before), (_, after)) in fmu.before.iter().zip(surroundings()) {

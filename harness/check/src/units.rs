@@ -37,7 +37,7 @@ impl Unit {
     }
 
     /// Returns true if both units have the same dimension; radians are ignored.
-    fn measures_like(&self, other: &Unit) -> bool {
+    fn has_same_dimensions(&self, other: &Unit) -> bool {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
 
@@ -259,7 +259,7 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
         };
         let meant = read(name);
         let fits = |m: &&Unit| {
-            written.measures_like(m)
+            written.has_same_dimensions(m)
                 && written.has_radians_of(m)
                 // Some authors give % the factor 0.01, others do not.
                 && (m.exponents == [0; 8]
@@ -302,7 +302,7 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
             let expected: Vec<(f64, f64)> = from
                 .iter()
                 .flat_map(|f| to.iter().map(move |t| (f, t)))
-                .filter(|(f, t)| f.measures_like(t))
+                .filter(|(f, t)| f.has_same_dimensions(t))
                 .map(|(f, t)| (f.factor / t.factor, (f.offset - t.offset) / t.factor))
                 .collect();
             let Some((right, shift)) = expected.first().copied() else {
@@ -347,8 +347,9 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
             continue;
         }
         let expected: Vec<Unit> = all.iter().map(|u| u.times(second, -1)).collect();
-        let fits =
-            |w: &Unit| expected.iter().any(|e| e.measures_like(w) && is_equal(e.factor, w.factor));
+        let fits = |w: &Unit| {
+            expected.iter().any(|e| e.has_same_dimensions(w) && is_equal(e.factor, w.factor))
+        };
         if !written.iter().any(fits) {
             findings.at(v.place()).add(format!(
                 "the variable is the derivative of {} in \"{of_state}\", but its unit is \"{of_derivative}\" (required: \"{of_state}\" per second, which is {})",

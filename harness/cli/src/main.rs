@@ -186,8 +186,8 @@ fn main() -> ExitCode {
         }
         match (cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
             (false, true) => guarded(&cli),
-            (true, _) => guard::enter().map(|()| carry_out(cli)),
-            (false, false) => Ok(carry_out(cli)),
+            (true, _) => guard::enter().map(|()| run_command(cli)),
+            (false, false) => Ok(run_command(cli)),
         }
     };
     let code = match bug::catch_panic(work) {
@@ -262,7 +262,7 @@ fn guarded(cli: &Cli) -> Result<u8> {
     }
 }
 
-fn carry_out(cli: Cli) -> u8 {
+fn run_command(cli: Cli) -> u8 {
     macro_rules! run {
         ($($command:ident)*) => {
             match cli.command {

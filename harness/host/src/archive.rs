@@ -43,7 +43,7 @@ impl Entry {
 
     /// Returns the reason why this entry would be written outside the folder into which the archive is unpacked, or
     /// `None` if it stays inside.
-    fn way_out(&self) -> Option<&'static str> {
+    fn name_fault(&self) -> Option<&'static str> {
         let name = &self.name;
         if name.starts_with('/') || name.get(1..2) == Some(":") {
             Some("its name is absolute")
@@ -94,12 +94,13 @@ impl Archive {
         let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
         let about = file.metadata().with_context(|| format!("{name} cannot be opened"))?;
         let mut archive = Archive { file, entries: Vec::new(), fault: None };
-        archive.fault = archive.read_directory(about.len()).err().map(|why| archive.fault_of(&why));
+        archive.fault =
+            archive.read_directory(about.len()).err().map(|why| archive.explain_fault(&why));
         Ok(archive)
     }
 
     /// Explains, without terms of the zip format, why the list of files in an archive cannot be read.
-    fn fault_of(&self, why: &anyhow::Error) -> String {
+    fn explain_fault(&self, why: &anyhow::Error) -> String {
         let Some(ZipError::InvalidArchive(what)) = why.downcast_ref() else {
             return format!("{why:#}");
         };
@@ -156,7 +157,7 @@ impl Archive {
         let mut places: BTreeMap<String, &Entry> = BTreeMap::new();
         for entry in &self.entries {
             let name = entry.name.escape_debug();
-            if let Some(why) = entry.way_out() {
+            if let Some(why) = entry.name_fault() {
                 bail!("{name}: {why} (allowed: files and folders with relative names)");
             }
             let Some(other) = places.insert(place(&entry.name), entry) else { continue };

@@ -380,7 +380,7 @@ impl Version for Fmi3 {
 
     fn step(instance: &mut Instance, time: f64, step: f64) -> Called {
         let done = instance.do_step(time, step)?;
-        whole_step(instance, done)
+        require_whole_step(instance, done)
     }
 
     fn set_slopes(_: &mut Instance, _: &[u32], _: &[f64]) -> Called {
@@ -409,7 +409,7 @@ impl Version for Fmi3 {
         };
         let done = instance.do_step_with_updates(time, step, Some(&mut within))?;
         instance.kept.line.set(line);
-        whole_step(instance, done)?;
+        require_whole_step(instance, done)?;
         match refused {
             Status::Ok | Status::Warning => Ok(()),
             status => Err(CallError {
@@ -892,7 +892,7 @@ impl Line {
 }
 
 /// Returns an error for a step that did not reach its end although the FMU was not allowed an early return.
-fn whole_step(instance: &Instance, done: Step) -> Called {
+fn require_whole_step(instance: &Instance, done: Step) -> Called {
     let time = done.last_time;
     let (status, mut messages, text) = if done.terminate == 1 {
         // FMI 2.0 reports this by the status fmi2Discard.

@@ -244,7 +244,7 @@ fn disk_usage(folder: &Path) -> u64 {
             // the size of the link, not of its target
             match entry.metadata() {
                 Ok(found) if found.is_dir() => folders.push(entry.path()),
-                Ok(found) => bytes += on_disk(&found),
+                Ok(found) => bytes += size_on_disk(&found),
                 Err(_) => {} // it is gone already
             }
         }
@@ -253,12 +253,12 @@ fn disk_usage(folder: &Path) -> u64 {
 }
 
 #[cfg(unix)]
-fn on_disk(file: &std::fs::Metadata) -> u64 {
+fn size_on_disk(file: &std::fs::Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::blocks(file) * 512
 }
 
 #[cfg(not(unix))]
-fn on_disk(file: &std::fs::Metadata) -> u64 {
+fn size_on_disk(file: &std::fs::Metadata) -> u64 {
     file.len()
 }
 
@@ -277,7 +277,7 @@ fn shared_memory(id: u32) -> u64 {
     let hidden = open.filter_map(|entry| {
         let name = std::fs::read_link(entry.path()).ok()?;
         let found = is_hidden(name.to_str()?).then(|| std::fs::metadata(entry.path()))?.ok()?;
-        Some((identity(&found), on_disk(&found)))
+        Some((identity(&found), size_on_disk(&found)))
     });
     // A file that is open twice counts once.
     let hidden: std::collections::BTreeMap<_, u64> = hidden.collect();
@@ -655,11 +655,11 @@ pub(crate) fn before_loading() {
         {
             use rustix::process::Resource;
             let memory = guarded.limits.memory;
-            restrict(Resource::Data, in_use("VmData:").saturating_add(memory));
+            restrict(Resource::Data, memory_in_use("VmData:").saturating_add(memory));
             // Shared memory does not count as data. Each thread reserves more memory than it uses.
             let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
             let reserved = (1 << 30) + (threads << 27);
-            restrict(Resource::As, in_use("VmSize:").saturating_add(memory + reserved));
+            restrict(Resource::As, memory_in_use("VmSize:").saturating_add(memory + reserved));
         }
         #[cfg(unix)]
         {
@@ -713,7 +713,7 @@ fn extend(resource: rustix::process::Resource, bytes: u64) {
 }
 
 #[cfg(target_os = "linux")]
-fn in_use(kind: &str) -> u64 {
+fn memory_in_use(kind: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     kilobytes(&status, kind).unwrap_or(1 << 20) << 10
 }
@@ -732,7 +732,7 @@ mod tests {
     /// as the name of a test, which does not exist.
     const CHILD: &str = "guarded_process";
 
-    fn end_of(name: &str, work: fn()) -> Cause {
+    fn end_of_child(name: &str, work: fn()) -> Cause {
         if std::env::args().any(|argument| argument == CHILD) {
             bug::keep_panics();
             enter().unwrap();
@@ -749,7 +749,7 @@ mod tests {
     #[test]
     fn a_panic_in_a_guarded_process_is_reported_to_its_parent() {
         let name = "a_panic_in_a_guarded_process_is_reported_to_its_parent";
-        let cause = end_of(name, || panic!("row {} is odd", 7));
+        let cause = end_of_child(name, || panic!("row {} is odd", 7));
         let Cause::Panicked(report) = &cause else { panic!("{cause:?}") };
         assert!(report.starts_with("this is a bug of hubslosh"), "{report}");
         assert!(report.contains("row 7 is odd (harness/host/src/guard.rs:"), "{report}");
@@ -761,7 +761,7 @@ mod tests {
             panic!("row 7 is odd");
         }
         let name = "a_panic_that_aborts_a_guarded_process_is_reported_to_its_parent";
-        let cause = end_of(name, || called_by_an_fmu());
+        let cause = end_of_child(name, || called_by_an_fmu());
         let Cause::Panicked(report) = &cause else { panic!("{cause:?}") };
         assert!(report.contains("row 7 is odd (harness/host/src/guard.rs:"), "{report}");
     }
@@ -769,7 +769,7 @@ mod tests {
     /// A guarded process catches a panic and later aborts; the parent reports a crash, not the panic.
     #[test]
     fn a_panic_that_was_caught_does_not_explain_a_later_crash() {
-        let cause = end_of("a_panic_that_was_caught_does_not_explain_a_later_crash", || {
+        let cause = end_of_child("a_panic_that_was_caught_does_not_explain_a_later_crash", || {
             bug::catch_panic(|| -> i32 { panic!("a damaged file") }).unwrap_err();
             std::process::abort();
         });

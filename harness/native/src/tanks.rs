@@ -235,7 +235,7 @@ pub fn solve(py: Python, questions: Vec<Question>) -> PyResult<Vec<Py<PyAny>>> {
     }
     let questions = Arc::new(asked);
     let theirs = questions.clone();
-    let found = in_threads(py, questions.len(), move |i| {
+    let found = compute_in_threads(py, questions.len(), move |i| {
         let (tank, fill, modes, liquid, large_waves) = &theirs[i];
         let (of, fill) = (tank.get(), fill.as_ref().ok()?);
         let mut found = parameters::solve(&of.tank, *fill, *modes, liquid.0);
@@ -271,7 +271,7 @@ pub fn table<'py>(
 ) -> PyResult<Parameters<'py>> {
     let (low, high) = (between.0.fill()?, between.1.fill()?);
     let (of, liquid) = (tank.clone_ref(py), *liquid.get());
-    let found = in_threads(py, 1, move |_| {
+    let found = compute_in_threads(py, 1, move |_| {
         let tank = &of.get().tank;
         let (low, high) = (tank.fill_height(low)?, tank.fill_height(high)?);
         if low >= high {
@@ -292,7 +292,7 @@ pub fn table<'py>(
 /// Returns the results of `of(0)` to `of(count - 1)`, computed in parallel by one thread for each core.
 ///
 /// On Ctrl-C the function returns immediately, while the threads complete their computations.
-fn in_threads<T: Send + 'static>(
+fn compute_in_threads<T: Send + 'static>(
     py: Python,
     count: usize,
     of: impl Fn(usize) -> T + Send + Sync + 'static,

@@ -118,14 +118,14 @@ fn cross_build(platforms: &[&Platform]) -> Result<Vec<Binaries>> {
     for platform in platforms {
         for target in platform.targets {
             eprintln!("building for {}", target.triple);
-            all.push(cross_one(&toolchain, platform, target, &mut faults)?);
+            all.push(cross_build_binaries(&toolchain, platform, target, &mut faults)?);
         }
     }
     platforms::refuse(&faults)?;
     Ok(all)
 }
 
-fn cross_one(
+fn cross_build_binaries(
     toolchain: &Toolchain,
     platform: &Platform,
     target: &Target,

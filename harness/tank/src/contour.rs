@@ -162,7 +162,7 @@ impl Contour {
         let (bottom, top) = segments.iter().fold(coarse, |(low, high), s| {
             (low.min(extreme(s, 1.0).1), high.max(-extreme(s, -1.0).1))
         });
-        Ok(Contour { segments: from_the_top(segments, size), bottom, top, size })
+        Ok(Contour { segments: start_at_highest_point(segments, size), bottom, top, size })
     }
 
     pub fn segments(&self) -> &[Segment] {
@@ -498,7 +498,7 @@ fn defect(segment: &Segment) -> Option<String> {
 
 /// Rotates the list of segments of a closed contour away from the axis (a torus) so that it begins at the contour's
 /// highest point. Other contours are returned unchanged.
-fn from_the_top(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
+fn start_at_highest_point(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     let (start, end) = (segments[0].start(), segments[segments.len() - 1].end());
     if norm(sub(start, end)) > JOINED * size || start[0] <= JOINED * size {
         return segments;

@@ -417,7 +417,7 @@ fn coefficients_from_overlaps(
     let known = Coefficients::new([rough, fine].map(|x| Found::from_overlaps(x, depth)), wave);
     let excited = fine.secondary_resonance(depth);
     let detuned = |detuning| fine.detuned_equivalent(depth, detuning);
-    known.judged_near(excited, &detuned, warnings)
+    known.judge_near_resonance(excited, &detuned, warnings)
 }
 
 fn cylinder_coefficients(
@@ -451,7 +451,7 @@ fn cylinder_coefficients(
 impl Coefficients {
     /// If another mode has nearly twice the frequency of mode 1, adds this mode's contribution to the error. Returns `Err`
     /// if the contribution is too large. `detuned` returns s and kappa for a relative change of the second-order frequency.
-    fn judged_near(
+    fn judge_near_resonance(
         mut self,
         excited: Option<[usize; 2]>,
         detuned: &dyn Fn(f64) -> [f64; 2],
@@ -562,5 +562,5 @@ fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<
         let waves = contour_waves::waves(wall, DEGREES[1], 1, detuning);
         waves.map_or([f64::INFINITY; 2], |waves| equivalent(waves.shifts))
     };
-    known.judged_near(excited.map(|(mode, _)| *mode), &detuned, warnings)
+    known.judge_near_resonance(excited.map(|(mode, _)| *mode), &detuned, warnings)
 }

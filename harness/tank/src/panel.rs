@@ -125,7 +125,7 @@ impl Boundary {
             let near_end = x.to_end.min(y.to_end) < x.from_start.min(y.from_start);
             let dt = if near_end { x.to_end - y.to_end } else { y.from_start - x.from_start };
             segment.curve.chord(x.t, sign * dt)
-        } else if x.corner == y.corner && x.p[0].min(y.p[0]) >= 0.0 && !self.on_axis(x.corner) {
+        } else if x.corner == y.corner && x.p[0].min(y.p[0]) >= 0.0 && !self.is_on_axis(x.corner) {
             sub(y.offset, x.offset)
         } else {
             sub(y.p, x.p)
@@ -158,7 +158,7 @@ impl Boundary {
     }
 
     /// Returns true at the axis, where the two ends of the boundary are different points.
-    fn on_axis(&self, corner: Corner) -> bool {
+    fn is_on_axis(&self, corner: Corner) -> bool {
         corner == 0 && self.ends[0][0][0] == 0.0
     }
 

@@ -137,7 +137,7 @@ impl Discretisation {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
 
-    pub(crate) fn on_surface(&self) -> core::ops::Range<usize> {
+    pub(crate) fn surface_range(&self) -> core::ops::Range<usize> {
         self.surface..self.points.len()
     }
 
@@ -145,7 +145,7 @@ impl Discretisation {
     /// cannot be solved. For m = 1 the operator is regular, so that this happens only if the panels are unusable.
     pub(crate) fn solve(&self, modes: usize, pitch: &[f64]) -> Option<Solution> {
         let count = self.len();
-        let surface = self.on_surface();
+        let surface = self.surface_range();
         let (matrix, right) = self.assemble(pitch);
         let solved = matrix.lu().solve(&right)?;
         if !solved.iter().all(|x| x.is_finite()) {
@@ -548,9 +548,9 @@ mod tests {
                     let off = matrix * &u - right.column(right.ncols() - 1);
                     assert!(off.amax() < error, "{:e}", off.amax());
                     // the sources on the free surface are the last of all sources
-                    let on_surface = DVector::from_column_slice(&q[mesh.on_surface()]);
+                    let on_surface = DVector::from_column_slice(&q[mesh.surface_range()]);
                     let mut wall_alone = q.clone();
-                    wall_alone[mesh.on_surface()].fill(0.0);
+                    wall_alone[mesh.surface_range()].fill(0.0);
                     let alone = mesh.assemble(&wall_alone).1;
                     let parts = right.columns(0, right.ncols() - 1) * on_surface;
                     let all = parts + alone.column(alone.ncols() - 1);

@@ -204,7 +204,7 @@ const TERMS: [(&str, &str); 7] = [
     (", available keys: ", ", allowed are "),
 ];
 
-fn in_words(error: &toml::de::Error) -> String {
+fn explain_toml_error(error: &toml::de::Error) -> String {
     let text = error.to_string().trim_end().to_string();
     TERMS.iter().fold(text, |text, (term, words)| text.replace(term, words))
 }
@@ -226,7 +226,7 @@ impl Tank {
     /// # Errors
     /// Lists all problems of the file.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
-        let file: File = toml::from_str(text).map_err(|error| in_words(&error))?;
+        let file: File = toml::from_str(text).map_err(|error| explain_toml_error(&error))?;
         let mut problems = Vec::new();
         let density = match file.density {
             Some(density) if density > 0.0 && density.is_finite() => density,

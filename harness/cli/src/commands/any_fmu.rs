@@ -244,7 +244,7 @@ impl AnyFmuArgs {
         let mut found = out.search(|news| any_fmu::identify(&model, &question, &records, news))?;
         found.done.splice(0..0, notes);
         let is_trusted = found.fits == Some(true) && found.converged;
-        out.finish(&found.json()?, is_trusted, || print_found(&found), || any_fmu::page(&found))
+        out.finish(&found.json()?, is_trusted, || print_result(&found), || any_fmu::page(&found))
     }
 
     /// Predicts the standard deviations that a fit to recordings with these inputs would have (Cramér–Rao
@@ -294,7 +294,7 @@ impl AnyFmuArgs {
     }
 }
 
-fn print_found(found: &Identification) {
+fn print_result(found: &Identification) {
     print_estimates(&[&found.parameters, &found.measurement]);
     for line in any_fmu::lines(found).iter().chain(&found.verdict) {
         println!("{line}");

@@ -484,7 +484,7 @@ impl DataArgs {
         let mut found = out.search(|news| method.identify(task, news))?;
         found.done.splice(0..0, notes);
         let is_trusted = found.fits != Some(false) && found.converged;
-        out.finish(&found.json()?, is_trusted, || print_found::<M>(&found), || M::page(&found))
+        out.finish(&found.json()?, is_trusted, || print_result::<M>(&found), || M::page(&found))
     }
 
     fn outputs(&self) -> Out<'_> {
@@ -493,7 +493,7 @@ impl DataArgs {
     }
 }
 
-fn print_found<M: Method>(found: &Identified<M::Details>) {
+fn print_result<M: Method>(found: &Identified<M::Details>) {
     if !(found.parameters.is_empty() && found.measurement.is_empty()) {
         print_estimates(&[&found.parameters, &found.measurement]);
     }

@@ -85,7 +85,7 @@ fn setting(text: &str) -> Result<(String, String)> {
 /// # Errors
 ///
 /// If the name neither ends in .csv or .parquet nor is `-`.
-fn check_out(out: &Path) -> Result<()> {
+fn check_table_name(out: &Path) -> Result<()> {
     if out == Path::new("-") { Ok(()) } else { table::check_ending(out) }
 }
 

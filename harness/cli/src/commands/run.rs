@@ -14,7 +14,7 @@ use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL
 use names::limits::Limits;
 use report::view;
 
-use super::{DEFAULT_FMU, check_out, open_to_run, setting, write_out};
+use super::{DEFAULT_FMU, check_table_name, open_to_run, setting, write_out};
 use crate::{progress, set_file, terminal};
 
 /// Simulates an FMU under a torque profile or recorded inputs, and writes its signals.
@@ -93,7 +93,7 @@ pub struct RunArgs {
 
 impl RunArgs {
     pub fn run(self) -> Result<()> {
-        check_out(&self.out)?;
+        check_table_name(&self.out)?;
         let mut settings = match &self.parameters {
             Some(path) => {
                 set_file::read(path, &|| ModelDescription::from_fmu(&crate::fmu::find(&self.fmu)?))?

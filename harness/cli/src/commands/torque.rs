@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use experiments::profile::{self, SAMPLE, Written};
 use experiments::run::Run;
 
-use super::{check_out, write_out};
+use super::{check_table_name, write_out};
 use crate::terminal;
 
 /// Writes the torque of a profile as a table, for a bench or for another host than `hubslosh run`.
@@ -55,7 +55,7 @@ impl TorqueArgs {
             return Ok(());
         }
         let (profile, out) = self.profile.zip(self.out).context("nothing to write")?;
-        check_out(&out)?;
+        check_table_name(&out)?;
         let torque = profile.parse::<Written>()?.torque()?;
         let run = Run {
             settings: Vec::new(),

@@ -27,11 +27,11 @@ pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentat
         pages.push(Page::read(root, &path)?);
     }
     let mut all = Gathered::default();
-    let page = one_file(root, &pages, title, &mut all).into_string();
+    let page = single_page(root, &pages, title, &mut all).into_string();
     Ok(Documentation { page, figures: all.figures()? })
 }
 
-fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
+fn single_page(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {

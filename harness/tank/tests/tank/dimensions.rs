@@ -50,7 +50,7 @@ fn solved(c: f64, rho: f64) -> Vec<(Tank, ModalData)> {
 
 type Quantity = (String, f64, i32, i32);
 
-fn of_modes(axis: &str, modes: &[Mode], all: &mut Vec<Quantity>) {
+fn add_mode_quantities(axis: &str, modes: &[Mode], all: &mut Vec<Quantity>) {
     for mode in modes {
         let mut push = |what: &str, value: f64, length: i32, density: i32| {
             all.push((format!("{axis}{what} of mode {}", mode.n), value, length, density));
@@ -104,11 +104,11 @@ fn quantities(data: &ModalData) -> Vec<Quantity> {
         push("H_0", rest.height, 1, 0);
         push("I_0", rest.inertia, 5, 1);
     }
-    of_modes("", &data.modes, &mut all);
+    add_mode_quantities("", &data.modes, &mut all);
     for axis in axes {
         all.push(("I".into(), axis.i_frozen_cg, 5, 1));
         all.push(("I_eff".into(), axis.i_eff_cg, 5, 1));
-        of_modes("an axis's ", &axis.modes, &mut all);
+        add_mode_quantities("an axis's ", &axis.modes, &mut all);
     }
     all
 }

@@ -432,7 +432,7 @@ fn preferential_direction(
     }
 }
 
-fn at_rest(item: &Item) -> Result<Rest> {
+fn analyse_rest_recording(item: &Item) -> Result<Rest> {
     let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
     let wanted = Wanted { signals: &signals, columns: &item.recorded.columns };
     let table = recording::read(&item.recorded.path, &wanted, &mut |line| terminal::note(line))?;
@@ -455,7 +455,7 @@ fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
     let title = "Gyro at rest (thesis 5.5)";
     let mut found = Vec::new();
     for item in day.items_of_kind(Kind::Rest) {
-        match at_rest(item) {
+        match analyse_rest_recording(item) {
             Ok(rest) => found.push((item.recorded.path.display().to_string(), rest)),
             Err(error) => problems.push(format!("{error:#}")),
         }
