@@ -551,7 +551,7 @@ fn approximate(
     let pitch = mesh.pitch(volume.z_cg);
     let solution: Solution = mesh.solve(modes, &pitch)?;
     let (weights, radii) = (mesh.weights(), mesh.radii());
-    let surface = mesh.on_surface();
+    let surface = mesh.surface_range();
     let sum = |range: core::ops::Range<usize>, f: &dyn Fn(usize) -> f64| -> f64 {
         range.map(|i| weights[i] * f(i)).sum()
     };
