@@ -659,7 +659,7 @@ const STACK: [(&str, [u32; 2]); 3] =
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn the_stack_that_an_fmu_needs_is_at_most_that_in_the_book() {
+fn an_fmu_needs_at_most_the_stack_that_the_book_states() {
     if under_valgrind() {
         return; // valgrind uses another stack
     }

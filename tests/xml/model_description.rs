@@ -225,7 +225,7 @@ fn every_slosh_model_and_friction_law_is_in_the_documentation() {
 /// ModelStructure lists each output and each state derivative once. Its initial unknowns are all variables that
 /// are computed during initialisation.
 #[test]
-fn structure_lists_every_output_once_and_what_is_computed_at_the_start() {
+fn the_structure_lists_every_output_and_every_variable_computed_at_the_start_once() {
     let with = |causalities: &[&str]| -> Vec<usize> {
         let all = variables();
         let meant = all

@@ -446,7 +446,7 @@ mod tests {
     /// The foot of a point near an arc has the same polar angle as the point, and its distance is measured along the arc;
     /// near a line, along the line. Each of the four iterations reduces the error to the ratio of distance to radius, 1e-1.
     #[test]
-    fn the_foot_of_a_point_is_the_nearest_of_the_panel() {
+    fn the_nearest_place_on_a_panel_is_found_for_every_point() {
         for wall in [sphere(), ring(), step()] {
             let boundary = Boundary::new(&wall);
             for panel in boundary.panels(3, false) {

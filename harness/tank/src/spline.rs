@@ -149,7 +149,7 @@ mod tests {
         [[1.0, 0.0], [1.3, 0.2], [1.4, 0.5], [1.35, 0.9], [1.1, 1.2], [0.9, 1.3]];
 
     #[test]
-    fn a_spline_passes_its_points_twice_continuously_differentiable() {
+    fn a_spline_passes_through_its_points_and_is_twice_continuously_differentiable() {
         let all = derivatives(&POINTS);
         assert_eq!(all.len(), 5);
         for (piece, p) in all.iter().zip(POINTS.windows(2)) {

@@ -185,7 +185,7 @@ fn release_files_match_the_manifest() {
 }
 
 #[test]
-fn release_passed_the_check() {
+fn the_committed_release_has_a_check_report_without_errors() {
     for (.., fmu) in committed_fmus() {
         let report = std::fs::read_to_string(fmu.with_extension("check.txt")).unwrap();
         let sum = report.lines().last().unwrap();

@@ -81,7 +81,7 @@ fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f6
 /// potential flow. The test finds this angle from the frequencies. In rotary motion the model is valid up to larger
 /// angles, except where a secondary resonance folds its branch.
 #[test]
-fn angle_limits_are_where_the_model_s_frequency_leaves_nonlinear_potential_flow() {
+fn at_the_angle_limit_the_model_s_frequency_departs_from_nonlinear_potential_flow() {
     for (fill, rows) in backbones() {
         let (s, kappa) = coefficients(fill);
         let known = limits::cylinder(fill, shifts(s, kappa).map(Some));

@@ -207,7 +207,7 @@ fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
 /// The wall of these tanks has one of the measured shapes at every fill, so that the damping ratio equals the published
 /// formula, apart from rounding errors.
 #[test]
-fn a_wall_that_is_one_shape_has_its_published_correlation() {
+fn a_wall_with_a_measured_shape_has_the_damping_of_its_published_correlation() {
     let close = |found: f64, expected: f64| {
         assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}")
     };

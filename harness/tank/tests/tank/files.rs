@@ -708,10 +708,10 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
     assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
 }
 
-/// Writes a parameter file from a result with damping and from one without. Both files are equal, because the file
+/// Writes a parameter file from a result with damping and from a result without. Both files are equal, because the file
 /// computes the damping for its own liquid.
 #[test]
-fn parameters_belong_to_the_liquid_and_not_to_the_result() {
+fn parameter_files_use_the_damping_of_their_own_liquid_and_not_of_the_result() {
     let text = "density = 875.0\n\
         shape = { domed_cylinder = { radius = 0.45, height = 0.9, bottom = 0.45, top = 0.45 } }\n";
     let tank = tank(text);

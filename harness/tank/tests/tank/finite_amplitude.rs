@@ -210,7 +210,7 @@ fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
 }
 
 #[test]
-fn files_for_the_fmus_have_the_limits() {
+fn files_for_the_fmus_have_the_angle_limits() {
     let limit = |text: &str, fill: f64, target: Target, name: &str| {
         let tank = tank(&format!("density = 1000.0\n{text}"));
         let data = tank.solve(fill, 1).unwrap();

@@ -26,7 +26,7 @@ fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
 /// The depth h/R at which planar motion begins to harden. With one excited mode of each azimuthal number it is 0.5058,
 /// which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
 #[test]
-fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_with_all() {
+fn planar_hardening_begins_at_a_lower_depth_with_more_excited_modes() {
     let begins = |count: usize| {
         let all = Overlaps::new(count);
         let (mut low, mut high) = (0.4, 0.6);
