@@ -52,7 +52,6 @@ pub fn target() -> &'static Path {
 /// # Panics
 ///
 /// If the environment cannot be created.
-/// If that fails.
 pub fn python() -> &'static Path {
     static PYTHON: LazyLock<PathBuf> = LazyLock::new(|| {
         pack::build_native(true).expect("the compiled half of the Python package");

@@ -69,7 +69,7 @@ impl Unpacked {
         let program = self.directory.path().join(name);
         let sources = sources.iter().map(|source| root().join(source));
         let version = if self.fmi == Fmi::V2 { 2 } else { 3 };
-        // valgrind has another allocator
+        // valgrind replaces the allocator that counts
         let counts = (!under_valgrind()).then_some("-DCOUNT_ALLOCATIONS");
         if !program.exists() {
             run(

@@ -77,7 +77,6 @@ enum Controller {
     Linear(Box<Linear>),
     /// A Python function. It receives the number of the cycle, the time (s) and the measurements, and returns one
     /// number for each command.
-    /// command.
     Function(Py<PyAny>),
 }
 

@@ -295,7 +295,6 @@ impl ParameterSet {
     /// # Errors
     /// A tank that the FMU cannot represent (tank number above four, full tank), or a viscosity without gravity and
     /// surface tension.
-    /// specific force.
     pub fn new(
         tank: &Tank,
         data: &ModalData,

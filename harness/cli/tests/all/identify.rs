@@ -56,7 +56,6 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     let off: f64 = clean.iter().zip(&twin).map(|(a, b)| (a - b).powi(2)).sum();
     // The outputs of the run differ from the clean ones by far less than the noise of one row, 4e-4 rad/s, and by far
     // less than the 0.03 rad/s that another inertia would cause.
-    // another inertia would make
     assert!((off / clean.len() as f64).sqrt() < 1e-4, "{off}");
 }
 
