@@ -143,7 +143,7 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     let bridged =
         amplitude_dependence_at("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.8314);
     assert!(bridged.warnings[0].contains("interpolated between h/R 0.7 and 1.2"), "{bridged:?}");
-    assert!(bridged.warnings[1].contains("rotary motion folds at"), "{bridged:?}");
+    assert!(bridged.warnings[1].contains("folds the branch of rotary motion"), "{bridged:?}");
     let other = coefficients_at("shape = { sphere = { radius = 1.0 } }", 1.5);
     assert_eq!((other.angle_limit_from, other.frequency_limit), (LimitSource::Estimate, None));
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");

@@ -301,10 +301,10 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
             let name = format!("tank.fill.zeta[1,{}]", i + 1);
             assert!(set.values.contains(&(name, Value::Real(ratio))), "{:?}", set.values);
         }
-        assert!(!warned("stay those of the largest fill"), "{:?}", set.warnings);
+        assert!(!warned("keep their values of the largest fill"), "{:?}", set.warnings);
     }
     // the warning that the stiffness of the largest fill is used at all fills
     let wet = Liquid { sigma: Some(0.07), ..liquid };
     let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, wet).unwrap();
-    assert!(set.warnings.iter().any(|why| why.contains("stiffnesses stay")), "{:?}", set.warnings);
+    assert!(set.warnings.iter().any(|why| why.contains("stiffnesses keep their values")), "{:?}", set.warnings);
 }
