@@ -197,7 +197,8 @@ fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
         let spring = low_gravity::cylinder(mode, 0.1, 2.0, angle, fluid).spring;
         assert!((spring / limit - 1.0).abs() < 1e-9, "{angle}: {spring} {limit}");
         let set = deep(1e12, angle, sigma);
-        let told = set.warnings.iter().any(|warning| warning.contains("do not accept a negative k"));
+        let told =
+            set.warnings.iter().any(|warning| warning.contains("do not accept a negative k"));
         assert_eq!(told, angle < 23.0);
         assert_eq!(k(&set), if told { 0.0 } else { spring });
     }

@@ -306,5 +306,9 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
     // the warning that the stiffness of the largest fill is used at all fills
     let wet = Liquid { sigma: Some(0.07), ..liquid };
     let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, wet).unwrap();
-    assert!(set.warnings.iter().any(|why| why.contains("stiffnesses keep their values")), "{:?}", set.warnings);
+    assert!(
+        set.warnings.iter().any(|why| why.contains("stiffnesses keep their values")),
+        "{:?}",
+        set.warnings
+    );
 }
