@@ -10,7 +10,7 @@ use crate::input;
 static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
 
 /// Functions that are called when this process panics: `panics` receives the report before the panic unwinds, because a
-/// panic that cannot unwind ends the process; `catches` is called when [`caught`] has caught the panic.
+/// panic that cannot unwind ends the process; `catches` is called when [`catch_panic`] has caught the panic.
 pub struct Listener {
     pub panics: fn(&str),
     pub catches: fn(),
@@ -22,7 +22,7 @@ pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }
 
-/// Stores the messages of panics of this process for [`caught`] instead of printing them.
+/// Stores the messages of panics of this process for [`catch_panic`] instead of printing them.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));

@@ -177,8 +177,8 @@ impl Overlaps {
         self.detuned_shifts(depth, 0.0)
     }
 
-    /// Returns the shifts with a changed response of the excited modes, which are computed at the frequency 2 omega (1
-    /// + `detuning`). A large difference shows that a pole is close.
+    /// Returns the shifts with a changed response of the excited modes, which are computed at the frequency
+    /// 2 omega (1 + `detuning`). A large difference shows that a pole is close.
     pub(crate) fn detuned_shifts(&self, depth: f64, detuning: f64) -> [f64; 2] {
         let [t_1, _, b] = self.wave(depth);
         let k2 = self.k * self.k;
@@ -352,8 +352,8 @@ impl Radial {
     }
 }
 
-/// Returns orthonormal functions on the disc and their derivatives with respect to r. They are (r/R)^nu P_j^(0,nu)(2 x
-/// - 1) with x = (r/R)^2, by the recurrence DLMF 18.9.2.
+/// Returns orthonormal functions on the disc and their derivatives with respect to r. They are
+/// (r/R)^nu P_j^(0,nu)(2 x - 1) with x = (r/R)^2, by the recurrence DLMF 18.9.2.
 pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f64)> {
     let y = 2.0 * x - 1.0;
     let (mut p, mut slope) = ((1.0, 1.0 + 0.5 * (nu + 2.0) * (y - 1.0)), (0.0, 0.5 * (nu + 2.0)));
