@@ -64,7 +64,7 @@ use crate::parameters::{Limits, Mount, Parameters, Tank};
 use crate::pivot::{Pivot, Rubbing};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::spin::SpinSeries;
-use crate::state::{BallState, Inputs, STATES, State, index};
+use crate::state::{BallState, Inputs, Kept, STATES, State, index};
 
 /// Longest time, s, over which the change of rates is included in the scale of allowed errors. Only steps much longer than
 /// this could change the rates by more.
@@ -440,6 +440,25 @@ impl CraftMotion {
         }
         self.expand_rates::<1>();
         self.expansion.overwrite(2);
+    }
+
+    /// Returns an interval, m/s2, that contains the specific force along the axis of tank number `tank` at the hinge of its first
+    /// mode at the end of the last step; `None` if the power series of this step is not known. The series errs by a small share
+    /// of the allowed error of the bobs' accelerations, of which the interval contains a thousand times.
+    pub fn axial_interval(&self, tank: usize, inputs: &Inputs) -> Option<[f64; 2]> {
+        let Kept { clock, start, .. } = self.state.kept;
+        let orders = self.expansion.orders();
+        if orders == 0 || !inputs.are_held() || !self.state.kept.is_continued(inputs) {
+            return None;
+        }
+        let Some(bob) = self.bobs.iter().find(|bob| bob.tank == tank && bob.mode == 0) else {
+            return Some([0.0; 2]);
+        };
+        let t = (clock[0] - start[0]) - start[1];
+        let force = space::value(&bob.specific_force, orders - 1, t);
+        let axial = vector::dot(bob.along_axis()[0], force);
+        let error = 1e-6 * largest(force) + 1e4 * self.longest / self.inv_allowed[2];
+        Some([axial - error, axial + error])
     }
 
     /// Returns the rotation vector `turn` (rad, body axes) that corresponds to coefficient 1 of the attitude's power series:

@@ -16,6 +16,8 @@
 //! drained' is in `contents.rs`. On a pivot H refers to O, and E includes the potential energy a.S of all masses and the
 //! pivot's energy U (`pivot.rs`).
 
+use core::borrow::Borrow;
+
 use taylor::number::Number;
 use taylor::vector::{
     Mat3, Quaternion, Vec3, add, constant, cross, dot, part, rotation, scale, sub, times,
@@ -36,7 +38,7 @@ use crate::state::{BallState, Ranges, STATES, index};
 /// Directions `p` and angles, sin(angle_x) = p_x, are in tank axes. `axial` is the specific force along the tank at the
 /// first hinge, m/s2, and `turning` the rate at which the liquid rotates about the tank's axis, rad/s. While the liquid is
 /// settled, `ball_position` is the position that its centre has at rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
 pub struct TankOutputs {
     pub force: Vec3,
@@ -61,7 +63,7 @@ pub struct TankOutputs {
 /// (the angular momentum about the centre of mass, or on a pivot about O), the terms of the energy balance since the
 /// start, J, and the mass properties with the bobs as point masses at their current positions. The force of a tank that is
 /// not in use is 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
 pub struct Outputs {
     pub q: Quaternion,
@@ -94,50 +96,44 @@ impl TankOutputs {
             [x[at], x[at + 1], x[at + 2]]
         };
         TankOutputs {
-            force: [0.0; 3],
-            torque: [0.0; 3],
             p: core::array::from_fn(|n| part(n, 0)),
             p_dot: core::array::from_fn(|n| part(n, 3)),
-            angle_x: [0.0; MODES],
-            angle_y: [0.0; MODES],
-            wave_height: 0.0,
-            axial: 0.0,
-            turning: 0.0,
-            spin_ratio: 0.0,
-            spin_number: 0.0,
-            ranges: Ranges::default(),
-            ball_state: BallState::Settled,
-            ball_position: [0.0; 3],
-            ball_velocity: [0.0; 3],
+            ..TankOutputs::default()
         }
     }
 
     /// Sets the outputs that depend on the bobs. `liquid` is the rate of the liquid's spin; if it is `None`, the liquid is
     /// assumed to rotate with the tank.
-    pub(crate) fn set_angles<'a, T: Number + 'a>(
+    pub(crate) fn set_angles<T: Number>(
         &mut self,
         [a, w, w_d]: [Vec3<T>; 3],
-        bobs: impl Iterator<Item = &'a BobNow<T>>,
+        bobs: impl Iterator<Item: Borrow<BobNow<T>>> + Clone,
         liquid: Option<T>,
         scale_of_spin: Option<SpinScale>,
     ) {
-        let mut wave = [T::constant(0.0); 2];
-        for (n, bob) in bobs.enumerate() {
-            if n == 0 {
-                let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
-                let axial = dot(constant(bob.e), add(a, turning));
-                self.axial = axial.result();
-                let turning = liquid.unwrap_or_else(|| dot(constant(bob.e), w));
-                self.turning = turning.result();
-                if let Some(scale) = scale_of_spin {
-                    let numbers = scale.numbers(axial, turning);
-                    [self.spin_ratio, self.spin_number] = numbers.map(T::result);
-                }
+        if let Some(bob) = bobs.clone().next() {
+            let bob = bob.borrow();
+            let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
+            let axial = dot(constant(bob.e), add(a, turning));
+            self.axial = axial.result();
+            let turning = liquid.unwrap_or_else(|| dot(constant(bob.e), w));
+            self.turning = turning.result();
+            if let Some(scale) = scale_of_spin {
+                let numbers = scale.numbers(axial, turning);
+                [self.spin_ratio, self.spin_number] = numbers.map(T::result);
             }
-            let [x, y] = [bob.in_tank[0].asin(), bob.in_tank[1].asin()];
+        }
+        self.set_wave(bobs.map(|bob| (bob.borrow().in_tank, bob.borrow().wave)));
+    }
+
+    /// Sets the slosh angles and the height of the wave from p (tank axes) and the wave height per slosh angle, m, of each mode.
+    pub(crate) fn set_wave<T: Number>(&mut self, modes: impl Iterator<Item = (Vec3<T>, f64)>) {
+        let mut wave = [T::constant(0.0); 2];
+        for (n, ([x, y, _], height)) in modes.enumerate() {
+            let [x, y] = [x.asin(), y.asin()];
             self.angle_x[n] = x.result();
             self.angle_y[n] = y.result();
-            wave = [wave[0] + x * bob.wave, wave[1] + y * bob.wave];
+            wave = [wave[0] + x * height, wave[1] + y * height];
         }
         self.wave_height = wave[0].hypot(wave[1]).result();
     }

@@ -61,8 +61,8 @@ pub(crate) struct Bounds {
     spin: SpinLimit,
 }
 
-/// Limits of the slosh angle of a mode, rad: for any motion (`angle`), for rotary motion (`swirl`), and the angle at which
-/// waves begin to break. A limit that is not known is 0. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
+/// Sines of the limits of the slosh angle of a mode: for any motion (`angle`), for rotary motion (`swirl`), and of the angle
+/// at which waves begin to break. A limit that is not known is 0. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
 #[derive(Clone, Copy, Debug)]
 struct ModeBounds {
     angle: f64,
@@ -107,9 +107,9 @@ impl Bounds {
             }
             let [angle, swirl] = tank.limits(n);
             ModeBounds {
-                angle,
-                swirl,
-                breaking: tank.breaking_steepness[n] * (XI[n] * XI[n] - 1.0) / (2.0 * XI[n]),
+                angle: sine(angle),
+                swirl: sine(swirl),
+                breaking: sine(tank.breaking_steepness[n] * (XI[n] * XI[n] - 1.0) / (2.0 * XI[n])),
                 inv_l: 1.0 / tank.length[n],
                 k_m: tank.k[n] / tank.mass[n],
             }
@@ -150,6 +150,38 @@ impl Bounds {
         Ranges { regime, limited_by, is_physical: upright && self.is_held(out.axial) }
     }
 
+    /// Returns the same as [`Bounds::classify`] for every specific force along the tank in the interval `axial`, m/s2, and slosh
+    /// angles that differ from the angles in `out` by rounding; `None` if the result depends on them.
+    pub fn classify_within(
+        &self,
+        mut out: TankOutputs,
+        axial: [f64; 2],
+        liquid: f64,
+    ) -> Option<Ranges> {
+        /// Largest relative difference of angles that arises by rounding.
+        const ROUNDING: f64 = 1e-12;
+        // Whether motion is rotary may differ between both ends of the interval and its inner points.
+        if (0..self.modes).any(|n| exceeds(&out, n, self.angle_limits(n, liquid)[1])) {
+            return None;
+        }
+        let [low, high] =
+            [(axial[0], 1.0 - ROUNDING), (axial[1], 1.0 + ROUNDING)].map(|(axial, scale)| {
+                out.axial = axial;
+                out.wave_height *= scale;
+                (out.angle_x[0], out.angle_y[0]) = (out.angle_x[0] * scale, out.angle_y[0] * scale);
+                self.classify(&out, liquid)
+            });
+        (low == high).then_some(low)
+    }
+
+    /// Returns the sines of the slosh angles above which mode `n` and its rotary motion are out of range; 0 if they are not known.
+    fn angle_limits(&self, n: usize, liquid: f64) -> [f64; 2] {
+        let ModeBounds { angle, swirl, .. } = self.mode[n];
+        let Some(table) = &self.over_fill else { return [angle, swirl] };
+        let [a, s] = table.limits_at(n, liquid);
+        [if a > 0.0 { sine(a) } else { angle }, if s > 0.0 { sine(s) } else { swirl }]
+    }
+
     fn reason(&self, out: &TankOutputs, liquid: f64) -> LimitedBy {
         if !self.is_held(out.axial) {
             return LimitedBy::Contact;
@@ -171,25 +203,17 @@ impl Bounds {
         let mut reason = LimitedBy::None;
         for n in 0..self.modes {
             let mode = &self.mode[n];
-            let [mut angle, mut swirl] = [mode.angle, mode.swirl];
-            if let Some(table) = &self.over_fill {
-                let [a, s] = table.limits_at(n, liquid);
-                (angle, swirl) = (if a > 0.0 { a } else { angle }, if s > 0.0 { s } else { swirl });
-            }
+            let [angle, swirl] = self.angle_limits(n, liquid);
             let ([x, y, _], [x_d, y_d, _]) = (out.p[n], out.p_dot[n]);
-            let exceeds = |limit: f64| {
-                limit > 0.0
-                    && libm::hypot(x, y) > libm::sin(limit.min(core::f64::consts::FRAC_PI_2))
-            };
             let omega2 = omega2(n);
             let squares = (x * x + y * y) * omega2 + x_d * x_d + y_d * y_d;
             let area = 2.0 * (x * y_d - y * x_d).abs() * libm::sqrt(omega2);
-            if exceeds(swirl) && area > ROTARY * squares {
+            if exceeds(out, n, swirl) && area > ROTARY * squares {
                 return LimitedBy::SecondaryResonance;
             }
-            if exceeds(mode.breaking) {
+            if exceeds(out, n, mode.breaking) {
                 reason = LimitedBy::Breaking;
-            } else if reason == LimitedBy::None && exceeds(angle) {
+            } else if reason == LimitedBy::None && exceeds(out, n, angle) {
                 reason = LimitedBy::ThirdOrder;
             }
         }
@@ -230,6 +254,17 @@ impl Bounds {
     fn are_upright(&self, heights: [f64; MODES]) -> bool {
         heights[..self.modes].iter().all(|height| *height < -COS_45)
     }
+}
+
+/// Returns the sine of a slosh angle, rad, of at most 90 degrees.
+fn sine(angle: f64) -> f64 {
+    libm::sin(angle.min(core::f64::consts::FRAC_PI_2))
+}
+
+/// Returns true if the slosh angle of mode `n` is larger than a known limit, whose sine is `limit`.
+fn exceeds(out: &TankOutputs, n: usize, limit: f64) -> bool {
+    let [x, y, _] = out.p[n];
+    limit > 0.0 && libm::hypot(x, y) > limit
 }
 
 impl Tank {

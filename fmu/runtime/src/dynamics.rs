@@ -109,6 +109,13 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// Returns the outputs for the present states and the given inputs.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
+    /// Computes only the outputs that are integers, enumerations or Booleans, with the values of [`Model::outputs`], and
+    /// writes them to `outputs`. Returns false if this would not be faster than to compute all outputs; nothing is written then.
+    fn set_discrete_outputs(&mut self, inputs: &Self::Inputs, outputs: &mut Self::Outputs) -> bool {
+        let _ = (inputs, outputs);
+        false
+    }
+
     /// Sets the slopes, over a step of size `h` (s), of inputs that are determined by other inputs during the step, for
     /// example of a rate from its derivative. [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs)
     /// declares these inputs. Returns true if there are any.

@@ -52,12 +52,23 @@ pub struct Instance<M: Model, V: Version> {
     /// The model. It is created when it is first needed in initialization mode, and dropped if a parameter or input is set
     /// before the simulation starts.
     pub(crate) model: Option<M>,
+    /// Outputs as they were last computed; `known` says which of them are valid at the present instant.
     pub(crate) outputs: Option<M::Outputs>,
+    pub(crate) known: Known,
     /// Values of the discrete outputs, by slot, as the host saw them when it was last in event mode. They are needed if
     /// events are handled as [`Events::Reported`]. Empty until initialization has ended; before that, discrete outputs are
     /// computed like all other outputs.
     pub(crate) shown: Vec<i32>,
     scratch: [Vec<f64>; 2],
+}
+
+/// The part of an instance's outputs that is valid at the present instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Known {
+    Nothing,
+    /// Integers, enumerations and Booleans.
+    Discrete,
+    All,
 }
 
 /// Iterator over the numbers, in the model, of the continuous states, in the order in which the host reads them.
@@ -164,6 +175,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             past_slopes: false,
             model: None,
             outputs: None,
+            known: Known::Nothing,
             shown: Vec::new(),
             scratch: [vec![0.0; states], vec![0.0; states]],
         }
@@ -364,14 +376,11 @@ impl<M: Model, V: Version> Instance<M, V> {
     pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
         let scalar = scalar::<M, V>(call, reference)?;
         // A state is read directly from the model, which is faster than computing the outputs.
-        match (scalar.state, scalar.access, &self.model, &self.outputs) {
-            (Some(place), _, Some(model), _) => {
+        match (scalar.state, scalar.access, &self.model) {
+            (Some(place), _, Some(model)) => {
                 Ok(Value::Real(model.continuous_states()[place(scalar.element)]))
             }
-            (None, Access::Output(get), _, Some(outputs)) => {
-                finite(call, scalar, get(outputs, scalar.element))
-            }
-            (None, Access::Output(get), Some(_), None) => {
+            (None, Access::Output(get), Some(_)) => {
                 finite(call, scalar, get(self.outputs(call)?, scalar.element))
             }
             _ => self.compute_value(call, scalar),
@@ -422,8 +431,12 @@ impl<M: Model, V: Version> Instance<M, V> {
                     _ => Value::Integer(*shown),
                 }
             }
-            Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?, element)),
-            Access::OutputBoolean(get) => Value::Boolean(get(self.outputs(call)?, element)),
+            Access::OutputInteger(get) => {
+                Value::Integer(get(self.discrete_outputs(call)?, element))
+            }
+            Access::OutputBoolean(get) => {
+                Value::Boolean(get(self.discrete_outputs(call)?, element))
+            }
             _ => return Err(no_value(call, scalar)),
         })
     }
@@ -484,7 +497,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 
     fn show_discrete(&mut self, call: &Call) -> Result<(), Fault> {
-        let outputs = *self.outputs(call)?;
+        let outputs = *self.discrete_outputs(call)?;
         self.shown.clear();
         self.shown.extend(M::table().discrete().map(|scalar| discrete(scalar, &outputs)));
         Ok(())
@@ -493,7 +506,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Returns true if a discrete value in the model differs from the value that the host can read; the latter changes
     /// only in event mode.
     fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
-        let outputs = *self.outputs(call)?;
+        let outputs = *self.discrete_outputs(call)?;
         let mut all = M::table().discrete().zip(&self.shown);
         Ok(all.any(|(scalar, shown)| discrete(scalar, &outputs) != *shown))
     }
@@ -508,7 +521,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             }
             _ => self.store_parameter(scalar, value),
         }
-        self.outputs = None;
+        self.known = Known::Nothing;
         if !self.is_running() {
             self.model = None;
         }
@@ -645,7 +658,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             }
         }
         if M::OUTPUTS_USE_SLOPES {
-            self.outputs = None;
+            self.known = Known::Nothing;
         }
         Ok(())
     }
@@ -830,7 +843,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 }
             }
         }
-        self.outputs = None;
+        self.known = Known::Nothing;
     }
 
     /// Computes derivatives in initialization mode by central differences with Richardson extrapolation, between
@@ -981,7 +994,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.sloped = false;
         self.clock.time = at + length;
         model.set_time(self.clock.now());
-        self.outputs = None;
+        self.known = Known::Nothing;
         Ok(ended)
     }
 
@@ -1050,7 +1063,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 *ramp(&mut self.inputs, scalar.element)[0] = *ramp(&mut ends, scalar.element)[0];
             }
         }
-        self.outputs = None;
+        self.known = Known::Nothing;
     }
 
     pub(crate) fn drop_ramps(&mut self) {
@@ -1085,7 +1098,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let event = self.query(call, |model, inputs| model.handle_event(inputs))?;
         let states_changed = event.map_err(|why| call.error(why))?;
         self.state = InstanceState::Event;
-        self.outputs = None;
+        self.known = Known::Nothing;
         self.clock.last_event = self.clock.time;
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
@@ -1098,7 +1111,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let model = self.model(call)?;
         model.set_time(now);
         model.take_present_inputs(&inputs);
-        self.outputs = None;
+        self.known = Known::Nothing;
         self.show_discrete(call)?;
         // The next step handles an event that is still due, for example in a damaged saved state.
         let next_time = self.model(call)?.next_time_event().filter(|next| *next > now.time);
@@ -1146,7 +1159,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             )));
         }
         let accepted = self.query(call, |model, inputs| model.accept_step(inputs))?;
-        self.outputs = None;
+        self.known = Known::Nothing;
         accepted.map_err(|why| {
             self.state = InstanceState::Failed;
             call.error(why)
@@ -1163,7 +1176,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.clock.time = time;
         let now = self.clock.now();
         self.model(call)?.set_time(now);
-        self.outputs = None;
+        self.known = Known::Nothing;
         Ok(())
     }
 
@@ -1192,7 +1205,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if let Some(model) = &mut self.model {
             model.set_continuous_states(&self.scratch[0]);
         }
-        self.outputs = None;
+        self.known = Known::Nothing;
         Ok(())
     }
 
@@ -1371,7 +1384,7 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     #[inline(always)]
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
-        if self.outputs.is_none() {
+        if self.known != Known::All {
             self.evaluate(call)?;
         }
         self.outputs.as_ref().ok_or_else(|| call.error("the instance was never initialised"))
@@ -1379,10 +1392,29 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     fn evaluate(&mut self, call: &Call) -> Result<(), Fault> {
         self.model(call)?;
-        if let Instance { events, model: Some(model), inputs, outputs, .. } = self {
+        if let Instance { events, model: Some(model), inputs, outputs, known, .. } = self {
             *outputs = Some(query_model(*events, model, inputs, M::outputs));
+            *known = Known::All;
         }
         Ok(())
+    }
+
+    /// Returns outputs of which at least the integers, enumerations and Booleans are valid.
+    fn discrete_outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
+        let Instance { events, model, inputs, outputs, known, .. } = self;
+        if *known == Known::Nothing
+            && let (Some(model), Some(outputs)) = (model, outputs)
+            && query_model(*events, model, inputs, |m, u| m.set_discrete_outputs(u, outputs))
+        {
+            *known = Known::Discrete;
+        }
+        match self.known {
+            Known::Nothing => self.outputs(call),
+            _ => self
+                .outputs
+                .as_ref()
+                .ok_or_else(|| call.error("the instance was never initialised")),
+        }
     }
 
     fn query<T>(

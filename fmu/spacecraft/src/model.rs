@@ -201,6 +201,14 @@ impl Dynamics for Model {
         if self.present { self.craft.outputs(inputs) } else { self.craft.outputs_held(inputs) }
     }
 
+    fn set_discrete_outputs(&mut self, inputs: &Inputs, outputs: &mut Outputs) -> bool {
+        let known = if self.present { self.craft.discrete_outputs(inputs) } else { None };
+        for (tank, (ranges, ball_state)) in outputs.tank.iter_mut().zip(known.unwrap_or_default()) {
+            (tank.ranges, tank.ball_state) = (ranges, ball_state);
+        }
+        known.is_some()
+    }
+
     fn continuous_states(&self) -> &[f64] {
         self.craft.borrow_states()
     }

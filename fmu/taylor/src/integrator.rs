@@ -362,6 +362,11 @@ impl Default for Expansion {
 }
 
 impl Expansion {
+    /// Returns the number of orders whose coefficients are known, and 0 if any were overwritten.
+    pub fn orders(&self) -> usize {
+        if self.overwritten == 0 { self.orders } else { 0 }
+    }
+
     #[inline(always)]
     pub fn clear(&mut self) {
         (self.orders, self.overwritten, self.end, self.verified) = (0, 0, None, FULL_LENGTH);
