@@ -443,8 +443,8 @@ impl CraftMotion {
     }
 
     /// Returns an interval, m/s2, that contains the specific force along the axis of tank number `tank` at the hinge of its first
-    /// mode at the end of the last step; `None` if the power series of this step is not known. The series errs by a small share
-    /// of the allowed error of the bobs' accelerations, of which the interval contains a thousand times.
+    /// mode at the end of the last step; `None` if the power series of this step is not known. In random craft the series
+    /// err by at most a thousandth of the interval, which is nevertheless so narrow that the ranges of validity seldom depend on it.
     pub fn axial_interval(&self, tank: usize, inputs: &Inputs) -> Option<[f64; 2]> {
         let Kept { clock, start, .. } = self.state.kept;
         let orders = self.expansion.orders();

@@ -1,7 +1,9 @@
 //! While the inputs are constant, additional communication points change no bit of the motion, because they lie within power
 //! series that do not depend on them.
 
-use craft::{INPUTS, Inputs, Mount, Parameters, Ramp, STATES, Spacecraft, State, index};
+use std::collections::BTreeSet;
+
+use craft::{INPUTS, Inputs, MODES, Mount, Parameters, Ramp, STATES, Spacecraft, State, index};
 
 use super::random::Random;
 use super::seeds::every_or;
@@ -95,6 +97,32 @@ fn every_kind(mut test: impl FnMut((&Parameters, &[Inputs; 4], f64), usize, u64)
             test((&p, &inputs, TOLERANCES[seed as usize % 3]), kind, seed);
         }
     }
+}
+
+/// Tanks of random craft have limits within which half of the waves are.
+#[test]
+fn after_each_row_the_discrete_outputs_computed_alone_equal_those_computed_with_all_outputs() {
+    let (mut compared, mut reasons) = (0, BTreeSet::new());
+    every_kind(|(p, inputs, tolerance), kind, seed| {
+        let (mut p, mut random) = (*p, Random::new(seed));
+        for tank in &mut p.tank {
+            tank.g_bond = [0.0, random.between(0.0, 2.0)][random.below(2)];
+            tank.wave = [0.4; MODES];
+            tank.angle_limit = random.vector::<MODES>(0.5).map(f64::abs);
+            tank.swirl_limit =
+                [[0.0; MODES], random.vector(0.5).map(f64::abs)][seed as usize / 2 % 2];
+            tank.breaking_steepness = random.vector::<MODES>(0.8).map(f64::abs);
+        }
+        let rows = || random_rows(&mut random, 2.0);
+        run((&p, inputs, tolerance), rows, |craft, u| {
+            let Some(alone) = craft.discrete_outputs(u) else { return };
+            let all = craft.outputs(u).tank.map(|tank| (tank.ranges, tank.ball_state));
+            assert_eq!(alone, all, "kind {kind}, seed {seed}");
+            compared += 1;
+            reasons.extend(all.map(|(ranges, _)| ranges.limited_by as u8));
+        });
+    });
+    assert!(compared > 500 && reasons.len() > 5, "{compared} {reasons:?}");
 }
 
 #[test]
