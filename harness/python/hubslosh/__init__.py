@@ -5,28 +5,30 @@
     start = {"tank.h": (50, "mm"), "init.slosh_angle": (10, "deg")}
     run = hubslosh.simulate(parameters=start, stop=60)
 
-`simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
-`margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
-`linearize` a state-space model, `uncertain` one with uncertain parameters, `frequency_response` an
-estimate from a history, `fit` a transfer function through such an estimate. `analyse`, `campaign`,
-`check`, `identify` and `view` call the program ``hubslosh``. `tank` and `liquid_modes` find slosh
-modes, `mode_errors` says how many a model needs, `posterior` samples the result of `identify`.
-`read_recording` reads the files of loggers.
-`view` shows a run in 3-D, `plot` draws. `Plant` is for those who step an instance themselves.
+`simulate` returns a table of time histories; `closed_loop` does so for an FMU with a sampled
+controller, and `margins` returns the stability margins of that loop. `monte_carlo` repeats a
+simulation with parameters drawn at random. `linearize` returns a state-space model, `uncertain` a
+state-space model with uncertain parameters. `frequency_response` estimates a frequency response
+from a time history; `fit` fits a transfer function to the estimate. `tank` and `liquid_modes`
+compute slosh modes; `mode_errors` shows how many modes a model needs. `read_recording` reads
+recordings of data loggers, `identify` fits parameters to them, and `posterior` samples the
+parameters from their posterior distribution. `view` shows a run in 3-D, and the module `plot` draws
+diagrams. `Plant` is an FMU instance that you advance step by step yourself. `analyse`, `campaign`,
+`check`, `identify` and `view` call the program ``hubslosh``.
 """
 
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-# numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of one of
-# its names (PEP 562). The lines "from .MODULE import NAME as NAME" of __init__.pyi, which type
-# checkers read, say where the names are.
+# numpy, pandas and scipy take 0.3 to 1.2 s to import, so each module of this package is imported
+# when one of its names is first used (PEP 562). The lines "from .MODULE import NAME as NAME" of
+# __init__.pyi, which type checkers read, give the module of each name.
 _LINES = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8").splitlines()
 _WORDS = [line.split() for line in _LINES if line.startswith("from .")]
 _MODULE_OF = {name: module[1:] for _, module, _, name, *_ in _WORDS if module != "."}
 
-# Removed names, and what does the same.
+# Names that existed in earlier versions, each with its replacement.
 _REMOVED = {
     "COLUMNS": "the argument outputs of hubslosh.simulate",
     "drive": "hubslosh.simulate",
@@ -54,7 +56,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the names that there are, imported or not."""
+    """Return all names of the package, including names whose module is not imported yet."""
     return sorted({*globals(), *__all__, "__version__"})
 
 

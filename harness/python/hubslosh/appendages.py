@@ -1,4 +1,4 @@
-"""Flexible appendages of a craft: modes with the interface held, from a table or a file."""
+"""Flexible appendages of a craft, described by fixed-interface modes from a table or a file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ Vector = NDArray[np.float64]
 TURN = 2 * np.pi
 
 COLUMNS = ("x", "y", "z", "rx", "ry", "rz")
-"""Columns of a table of modes: participation in translation, kg^0.5, and rotation, kg^0.5·m."""
+"""Columns of participation factors in a table of modes: translation, kg^0.5, rotation, kg^0.5·m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Appendage:
-    """A flexible appendage of a `Craft`, such as a solar array, by its modes.
+    """A flexible appendage of a `Craft`, such as a solar array, described by its modes.
 
     The modes are computed with the interface to the craft fixed, and normalised to unit modal mass
     (fixed-interface modes of Craig and Bampton). ``mass``, ``inertia`` and ``center_of_mass`` of
@@ -214,7 +214,7 @@ class Appendage:
         Returns
         -------
         list of str
-            Sentences; none if all is right.
+            One sentence for each problem; empty if there is none.
 
         Examples
         --------
@@ -270,7 +270,7 @@ class Appendage:
         ]
 
     def __repr__(self) -> str:
-        """Return the appendage in a line."""
+        """Return a one-line description of the appendage."""
         return f"Appendage({self.describe()})"
 
     def describe(self) -> str:
@@ -294,7 +294,7 @@ class Appendage:
 
 
 def _unmasked(given: Any) -> Vector:
-    """Return an array; an empty one if values are masked or not numbers."""
+    """Return an array of numbers, or an empty array if a value is masked or is not a number."""
     try:
         return array(given)
     except FmuError:

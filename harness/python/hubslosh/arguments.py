@@ -12,27 +12,29 @@ from numpy.typing import NDArray
 
 from .fmu import FmuError, did_you_mean
 
-# Allowed times, s.
+# Allowed range of each argument that is a time, s.
 SECONDS: dict[str, tuple[float, float]] = {
     "period": (1e-6, 1e6), "delay": (0.0, 1e6), "stop": (1e-9, 1e12),
 }  # fmt: skip
 
-# Allowed whole numbers.
+# Allowed range of each argument that is a whole number.
 WHOLE: Mapping[str, tuple[int, int]] = {
     "latency": (0, 1_000_000), "substeps": (1, 1_000_000), "draws": (0, 100_000),
     "runs": (1, 100_000_000), "run": (0, 100_000_000), "workers": (1, 4096),
     "seed": (0, 2**63 - 1), "most": (1, 1_000_000),
 }  # fmt: skip
 
-# Allowed numbers without unit.
+# Allowed range of each argument that is a number without unit.
 PLAIN: dict[str, tuple[float, float]] = {"largest": (1e-3, 1e3), "sigmas": (1e-3, 1e2)}
 
-MOST_FILLS = 1000  # Most fills of a review
+MOST_FILLS = 1000  # Largest number of fills in a design review
 
-# Most states of a sampled loop gain, commands on the way included: its poles take seconds.
+# Largest number of states of a sampled loop gain, including delayed commands. The poles of a loop
+# gain of this size take seconds.
 MOST_STATES = 1000
 
-# Most points of a review times the square of its loop gain's states: minutes on two cores.
+# Largest product of the number of points of a design review and the squared number of states of its
+# loop gain. A review of this size takes minutes on two cores.
 MOST_WORK = 1e8
 
 
@@ -62,7 +64,7 @@ def refuse(problems: Sequence[str]) -> None:
 
 
 def is_number(value: Any) -> bool:
-    """Return True for a real number of Python or NumPy; a Boolean is none."""
+    """Return True for a real number of Python or NumPy, and False for a Boolean."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
@@ -163,13 +165,13 @@ def check_numbers(**values: Any) -> None:
 def wrong_parts(
     kind: str, given: Any, of: Any, reserved: re.Pattern[str] | None = None, example: str = ""
 ) -> list[str]:
-    """Return everything that is wrong with the parts of a craft by name, such as its engines.
+    """Return one sentence for each problem of a craft's named parts, such as its engines.
 
-    ``of`` is the class of the parts, ``reserved`` matches names that they may not have, and
-    ``example`` follows the class in the message about a value that is not a mapping.
+    ``given`` should map names to objects of the class ``of``. ``reserved`` matches names that a
+    part must not have. ``example`` is shown in the message about a value that is not a mapping.
     """
     if not isinstance(given, Mapping):
-        return [f"{kind}s must be {of.__name__} by name{example}, not {given!r}"]
+        return [f"{kind}s must be a dict of {of.__name__} by name{example}, not {given!r}"]
     found = []
     for name, part in given.items():
         if not isinstance(name, str) or not name:
@@ -258,7 +260,8 @@ RANGES = '(low, high) with low < high, or a share of the nominal value such as "
 def range_ends(given: Any, nominal: float) -> tuple[float, float]:
     """Return the ends of a range: (low, high), or a share such as "5%" of the nominal value.
 
-    Raises ValueError with the rest of a sentence about the quantity if the range is neither.
+    Raises ValueError if the range is neither. The message completes a sentence that begins with the
+    name of the quantity.
     """
     if isinstance(given, str):
         if (part := parse_share(given)) is None:

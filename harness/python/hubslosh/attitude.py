@@ -1,4 +1,4 @@
-"""Attitude: quaternions, angles, and the slew from one to another.
+"""Attitude: quaternions, Euler angles, and the reference of a slew.
 
 A quaternion q has its scalar first and maps body to inertial axes, as Spacecraft's ``q[1]`` …
 ``q[4]``. Angles are in rad.
@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 
 
 def _unit_quaternions(q: Any) -> Real:
-    """Return quaternions as rows, of length 1; of a table its columns q[1], …, q[4]."""
+    """Return unit quaternions, one in each row, from an array or a table with q[1] to q[4]."""
     if hasattr(q, "columns"):
         check_columns(q, NAMES, "the table")
         q = q[list(NAMES)].to_numpy(float)
@@ -36,7 +36,7 @@ def _unit_quaternions(q: Any) -> Real:
 
 
 def _as_given(q: Any, names: tuple[str, ...], values: Real) -> Any:
-    """Return values as a table if ``q`` is one."""
+    """Return ``values`` as a table with columns ``names`` if ``q`` is a table, else as an array."""
     if not hasattr(q, "columns"):
         return values
     import pandas as pd
@@ -47,7 +47,7 @@ def _as_given(q: Any, names: tuple[str, ...], values: Real) -> Any:
 
 
 def angles(q: "ArrayLike | pd.DataFrame") -> Any:
-    """Return roll, pitch and yaw of a quaternion, of rows of quaternions, or of a run's table.
+    """Return roll, pitch and yaw of a quaternion, of each row of an array, or of a run's table.
 
     The craft is turned by yaw about z, then by pitch about its new y, then by roll about its new x
     (3-2-1, Tait–Bryan). At a pitch of ±90° roll and yaw turn about the same axis; roll is then 0.
@@ -192,7 +192,7 @@ def axis_angle(axis: ArrayLike, angle: ArrayLike) -> Real:
 
 
 def error(q: "ArrayLike | pd.DataFrame", wanted: "ArrayLike | pd.DataFrame") -> Any:
-    """Return the rotation from the present attitude to a wanted attitude, the shorter way.
+    """Return the shortest rotation from the present attitude to a wanted attitude.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def slew(
     stop = end if stop is None else max(stop, end)
     time = np.append(np.arange(0.0, stop - 1e-9 * step, step), stop)
     t, w = np.clip(time - start, 0.0, duration), 2 * np.pi / duration
-    axis_angle(axis, 0.0)  # checks it
+    axis_angle(axis, 0.0)  # raises an error if the axis is wrong
     unit = floats(axis) / np.linalg.norm(axis)
     turned = angle * (t - np.sin(w * t) / w) / duration
     rate = angle * (1 - np.cos(w * t)) / duration

@@ -1,12 +1,16 @@
 r"""Certificates of robust stability, over intervals of frequency and boxes of parameters.
 
-A loop that is stable at Δ = 0 stays stable in a box of Δ if no pole reaches the unit circle, that
-is if I - N(f) Δ is regular for each frequency f up to half the sampling rate and each Δ in the box.
-Scalings D and G show it (`scalings`) if X(f) < 0. One pair is tried on a whole interval of
-frequency. N is analytic in f, delay included, so X is a polynomial of degree `DEGREE` to rounding
-on a short interval. The values of a polynomial are convex combinations of its Bernstein
-coefficients. If these are below 0, X is on the whole interval. Otherwise the interval is halved;
-where no scalings exist at a single frequency, the box is.
+N(f) is the closed loop's frequency response from the outputs to the inputs of Δ, which holds the
+uncertain parameters. A loop that is stable at Δ = 0 stays stable in a box of Δ if no pole reaches
+the unit circle, that is if I - N(f) Δ is regular for each frequency f up to half the sampling rate
+and each Δ in the box. This is proved if there are scalings D and G with which the matrix X(f) of
+the module `scalings` is negative definite.
+
+The proof uses scalings that vary linearly over an interval of frequency. N is analytic in f, even
+with a delay, so that on a short interval X equals a polynomial of degree `DEGREE` up to rounding.
+The values of a polynomial are convex combinations of its Bernstein coefficients. If these
+coefficients are negative definite, X is negative definite on the whole interval; otherwise the
+interval is halved. If no scalings exist at one end of the interval, the box is halved instead.
 """
 
 import io
@@ -26,26 +30,27 @@ from .quantities import short_name
 from .scalings import Complex, Scalings, Vector, form, recentred
 from .short import MOST
 
-DEGREE = 8  # Degree of the polynomials that stand for X on an interval
+DEGREE = 8  # Degree of the polynomials that approximate X on an interval
 
-# Least sum of semi-axes of the ellipses around intervals, of half length 1, without a pole.
+# Sum of the semi-axes of the Bernstein ellipse around an interval (scaled to the half length 1) in
+# which no pole may lie, so that the Chebyshev series of X converges fast.
 REACH = 2.0
 
-LOWEST = 1e-6  # Frequency over half the sampling rate that stands for 0
+LOWEST = 1e-6  # Frequency that replaces f = 0, as a fraction of half the sampling rate
 
-REMAINDER = 0.01  # Largest remainder of a polynomial over the margin of X
+REMAINDER = 0.01  # Largest truncation error of a polynomial, as a fraction of the margin of X
 
-ROUNDING = 1e-9  # Least margin of X, whose D is scaled to a diagonal of 1
+ROUNDING = 1e-9  # Smallest margin that proves X < 0; X is scaled so that the diagonal of D is 1
 
-# Number of times at which an interval is halved for the polynomials of one pair of scalings.
+# Largest number of times that an interval is halved with the same scalings.
 HALVINGS = 8
 
-# Factors by which the size is divided one after the other if it cannot be certified.
+# Factors by which the size is divided, one after the other, until a size can be certified.
 SIZES = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
-SMALLEST_BOX = 1e-3  # Least width of a box over that of the whole
+SMALLEST_BOX = 1e-3  # Smallest width of a box, as a fraction of the whole range
 
-# Chebyshev's nodes between 0 and 1.
+# Chebyshev nodes between 0 and 1.
 NODES = (1 - np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))) / 2
 _TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * NODES - 1, DEGREE))
 _TO_BERNSTEIN = np.linalg.inv([
@@ -71,7 +76,7 @@ class WorstCase:
     parameters : dict of str to float
         Uncertain parameters at this Δ, by name, SI units.
     tanks : tuple of str
-        Names of the craft's tanks, with which parameters are printed.
+        Names of the craft's tanks; they replace ``tank[1]``, … in printed names of parameters.
 
     Examples
     --------
@@ -95,7 +100,7 @@ class WorstCase:
     def __repr__(self) -> str:
         """Return size and frequency, then the parameters."""
         if not np.isfinite(self.size):
-            return "WorstCase: none was found, the lower bound of µ is 0"
+            return "WorstCase: no unstable Δ was found, so the lower bound of µ is 0"
         values = [
             f"\n  {short_name(name, self.tanks)} = {x:.6g}" for name, x in self.parameters.items()
         ]
@@ -149,12 +154,12 @@ class Certificate:
 
     @property
     def mu(self) -> float:
-        """Upper bound of µ over all frequencies: 1 over the certified size."""
+        """Upper bound of µ over all frequencies: 1 divided by the certified size."""
         return 1 / self.size if self.size else np.inf
 
     @property
     def gap(self) -> float:
-        """Ratio of the worst case's size to the certified size; inf if a size is missing.
+        """Ratio of the worst case's size to the certified size; inf if either was not found.
 
         A ratio near 1 means that the proof reaches almost as far as possible.
         """
@@ -165,9 +170,9 @@ class Certificate:
         if not self.size:
             return f"Certificate: none was found with {self.solved} convex problems\n{self.worst!r}"
         found = (
-            f"the worst case found has {self.worst.size:.4g}, {self.gap:.3f} times as much"
+            f"unstable at {self.worst.size:.4g} times the ranges, {self.gap:.3f} times as much"
             if np.isfinite(self.worst.size)
-            else "no worse case was found"
+            else "no unstable Δ was found"
         )
         return (
             f"Certificate: stable up to {self.size:.4g} times the ranges, µ ≤ {self.mu:.4g}; "
@@ -181,7 +186,7 @@ class Certificate:
         Parameters
         ----------
         path : str or Path
-            File to write. Example 15 of the book checks it.
+            File to write. Example 15 of the book shows how to check such a file.
 
         Raises
         ------
@@ -212,7 +217,7 @@ def corners(count: int) -> Vector:
 
 
 class UnstableError(Exception):
-    """Raised if a proof meets a Δ within its box at which the loop is unstable."""
+    """Raised if the loop is unstable at a Δ for which stability should be proved."""
 
     def __init__(self, delta: Vector) -> None:
         """Create the exception for ``delta``, the Δ at which the loop is unstable."""
@@ -226,7 +231,8 @@ class ExhaustedError(Exception):
 
 Pair = tuple[Complex, Complex]  # D and G
 
-Region = tuple[float, float, Vector, Vector]  # Ends of an interval of frequency, Hz, and of a box
+# Lower and upper end of an interval of frequency, Hz; lower and upper bounds of a box of Δ.
+Region = tuple[float, float, Vector, Vector]
 
 
 class Search:
@@ -273,7 +279,7 @@ class Search:
             z = self.poles(middle[None])[0]
             if np.abs(z).max() > 1 + 1e-9:
                 raise UnstableError(middle)
-            # those that no input moves have no damping, and N does not have them
+            # uncontrollable modes have undamped poles, which N does not contain
             z = z[(np.abs(z) > 1e-12) & (np.abs(z) < 1 - 1e-9)]
             self.own[key] = np.log(z) / (2j * np.pi * self.period)
         return self.own[key]
@@ -294,7 +300,8 @@ class Search:
         D, G = ((1 - share)[:, None, None] * first + share[:, None, None] * last
                 for first, last in zip(*ends, strict=True))  # fmt: skip
         X = form(recentred(self.response(a, b), self.scalings.copies, low, high), D, G)
-        # D and G of physical units differ by many powers of ten; the signs of X stay
+        # D and G in physical units differ by many powers of ten; scaling keeps the signs of the
+        # eigenvalues of X
         scale = 1 / np.sqrt(np.diag(D[DEGREE // 2]).real)
         X = X * scale * scale[:, None]
         margin = -np.linalg.eigvalsh(X)[:, -1].max()
@@ -332,7 +339,7 @@ class Search:
         if sizes.max() > 1 + 1e-9:
             raise UnstableError(at[sizes.argmax()])
         share = (high - low) / self.width
-        # without a margin on either side no quantity is better than another: the widest
+        # if no cut gives a margin, cut along the quantity with the widest remaining range
         best: tuple[float, list[Region]] = (-np.inf, [])
         for k in np.argsort(-share):
             if share[k] < 0.2 * share.max():
@@ -352,7 +359,7 @@ class Search:
         """
         key = f, low.tobytes(), high.tobytes()
         if key not in self.found:
-            # 0 is a pole of the craft, though not of N
+            # f = 0 is a pole of the craft (not of N), at which N cannot be computed
             N = self.closed([max(f, LOWEST * self.nyquist)])[0]
             margin, *pair = self.scalings.best(recentred(N, self.scalings.copies, low, high))
             self.pairs.append((pair[0], pair[1]))

@@ -23,7 +23,7 @@ class Finding:
         "error": the standard forbids the fault, or hosts fail. "warning": some importers fail
         because of the fault.
     place : str
-        Location: a file, a line, a variable, a call.
+        Location of the fault: a file, a line, a variable or a call.
     text : str
         The fault, and what is allowed.
 
@@ -40,7 +40,7 @@ class Finding:
     text: str
 
     def __repr__(self) -> str:
-        """Return the line of the command's report, shortened."""
+        """Return the line that ``hubslosh check`` prints for the finding, shortened."""
         line = f"{self.severity} {self.rule}: {self.place}: {self.text}"
         return textwrap.shorten(line, 200, placeholder=" …")
 
@@ -62,7 +62,7 @@ class CheckedRule:
     skipped : str or None
         Reason why the rule was not checked; None if it was.
     seconds : float
-        Elapsed time, s.
+        Time that the check of this rule took, s.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class CheckedRule:
     seconds: float
 
     def __repr__(self) -> str:
-        """Return the demand and the number of findings."""
+        """Return the requirement and the number of findings."""
         count = f"{len(self.findings)} findings" if self.skipped is None else "skipped"
         return f"{self.rule}: {self.title} [{self.source}]: {count}"
 
@@ -147,7 +147,7 @@ def check(
     Parameters
     ----------
     fmu : str or Path
-        File of an FMU 2.0 or 3.0, of other makers too, or the name of one of this package.
+        File of any FMU 2.0 or 3.0, from any tool, or the name of an FMU of this package.
     *arguments : str
         Further flags of ``hubslosh check``, such as ``"--junit", "check.xml"``.
     only : sequence of str

@@ -1,6 +1,6 @@
 """Calls of the program ``hubslosh``, which comes with the wheel or from a build of the source.
 
-The program guards itself: an FMU that crashes or hangs ends a process of the program, not Python.
+The program runs each FMU in a process of its own, so that an FMU that crashes does not end Python.
 It sends progress and results over its standard output as JSON text sequences (RFC 7464).
 """
 
@@ -50,7 +50,10 @@ def find_program(path: str | Path | None = None) -> Path:
 
 
 def _scripts(exe: str) -> Iterator[Path]:
-    """Yield where pip puts a wheel's programs: in an environment, for a user, with --target."""
+    """Yield paths at which pip may have installed the program.
+
+    These are the scripts of the environment, those of the user, and those of ``pip --target``.
+    """
     yield Path(sysconfig.get_path("scripts")) / exe
     yield Path(sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user"))) / exe
     yield Path(__file__).resolve().parents[1] / "bin" / exe
@@ -104,7 +107,7 @@ def call(
             line.close()
     reader.join()
     if child.returncode not in codes or (child.returncode and result is None):
-        # notes and warnings come before
+        # the program prints notes and warnings before its error
         text = re.split(r"^error: ", "".join(printed), maxsplit=1, flags=re.MULTILINE)[-1].strip()
         for temporary, name in (names or {}).items():
             text = text.replace(temporary, name)

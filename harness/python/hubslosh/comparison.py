@@ -1,4 +1,4 @@
-"""Designs compared: the margins of several reviews in a table, and on one page."""
+"""Comparison of designs: the margins of several design reviews in one table and on one page."""
 
 import html
 from collections.abc import Mapping
@@ -21,9 +21,10 @@ from .temporary import write_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = len(COLORS)  # Most designs on a page: each has a colour
+MOST = len(COLORS)  # Largest number of designs on a page, because each needs its own colour
 
-# Margins that are compared, with their labels. The gain margin is the smaller of up and down.
+# Margins that are compared, with their labels. The gain margin is the smaller of the margins for an
+# increase and for a decrease of the gain.
 MARGINS = {
     "modulus_margin": "modulus (1)", "phase_margin": "phase (deg)", "gain_margin": "gain (dB)",
     "delay_margin": "delay (s)",
@@ -105,7 +106,8 @@ def _page(reviews: Mapping[str, Review], table: pd.DataFrame) -> str:
     figures = [
         figure_of(
             "Which design has more margin at each fill?",
-            "Line: nominal. Dashed: least of all points; it ends where a point is unstable.",
+            "Line: nominal case. Dashed: smallest margin of all points, drawn only while all are "
+            "stable.",
             5.6, lambda figure: _over_fills(figure, reviews),
         ),
         figure_of(

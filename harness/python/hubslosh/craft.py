@@ -1,4 +1,4 @@
-"""A spacecraft with its tanks at any fill: mass properties, parameters of the FMU, loops."""
+"""A spacecraft with tanks: mass properties, parameters of the FMU and control loops at any fill."""
 
 import re
 import warnings
@@ -67,25 +67,25 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 Fill = Any
-"""Fill of all tanks, or of each: by name or in their order. Of a tank: height, m; ``"60%"`` of its
-volume; ``(120, "kg")``; 0 if it is empty."""
+"""One fill for all tanks, or a fill for each tank, by name or in the order of the tanks. A fill is
+a height, m; a share of the volume, such as ``"60%"``; a mass, ``(120, "kg")``; or 0 for empty."""
 
 BEYOND_THIRD_ORDER = re.compile(r"\.(nonlinear_(inertia|stiffness)_2|rotary_inertia(_2)?)\[")
-"""Parameters of a tank's modes that tanks which drain or whose liquid detaches do not have."""
+"""Parameters of slosh modes that have no effect in tanks that drain or whose liquid detaches."""
 
 MOST_TANKS = 4
-"""Number of tanks that Spacecraft has."""
+"""Largest number of tanks in the FMU Spacecraft."""
 
 SAME_SPIN = 1e-6
-"""Relative difference up to which two rates of spin count as the same."""
+"""Relative difference up to which two spin rates count as equal."""
 
 MOST_MODES = 6
-"""Number of modes of appendages that Spacecraft has."""
+"""Largest number of appendage modes in the FMU Spacecraft."""
 
 
 @dataclass(frozen=True, eq=False)
 class MountedTank:
-    """A tank of a `Craft`: its drawing, its place and its liquid.
+    """A tank of a `Craft`: its drawing, its position and its liquid.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class MountedTank:
     nu : float, optional
         Kinematic viscosity, m²/s, for damping ratios; without a viscosity the modes are undamped.
     sigma : float, optional
-        Surface tension, N/m, for centring stiffnesses.
+        Surface tension, N/m, from which the centring stiffnesses of weightless liquid follow.
     contact_angle : float, optional
         Contact angle between surface and wall, deg.
     spin : float, optional
@@ -145,12 +145,12 @@ class MountedTank:
         return np.asarray(Rotation.from_quat(self.q, scalar_first=True).as_matrix())
 
     def problems(self) -> list[str]:
-        """Return everything that is wrong with the tank, except with its drawing.
+        """Return everything that is wrong with the tank, except errors in its drawing.
 
         Returns
         -------
         list of str
-            Sentences; none if all is right.
+            One sentence for each problem; empty if there is none.
 
         Examples
         --------
@@ -179,7 +179,7 @@ class MountedTank:
         return found
 
     def __repr__(self) -> str:
-        """Return the tank in a line."""
+        """Return a one-line description of the tank."""
         return f"MountedTank({self.describe()})"
 
     def describe(self) -> str:
@@ -246,7 +246,7 @@ class MassProperties:
 
 
 Liquid = Literal["effective", "rigid"]
-"""Model of the liquid's inertia: under a lid without friction, or solid."""
+"""Model of the liquid's inertia: "effective" as under a rigid lid without friction, or "rigid"."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -374,7 +374,8 @@ class Craft:
             return [str(error)]
         return [
             f"tank {name}: spin = {of.spin:g} rad/s, but the craft turns at {rates[name]:.6g} "
-            "rad/s about this tank's axis, by its spin or by those of other tanks: give one of them"
+            "rad/s about this tank's axis, because of the spin of the craft or of other tanks: "
+            "give the spin only once"
             for name, of in self.tanks.items()
             if of.spin is not None and abs(rates[name] - of.spin) > SAME_SPIN * of.spin
         ]
@@ -393,14 +394,14 @@ class Craft:
         count = sum(of.count for of in every if not of.problems())
         if count > MOST_MODES:
             problems.append(
-                f"appendages have {count} modes in all (allowed: up to {MOST_MODES}): keep those "
-                "with the largest participation"
+                f"appendages have {count} modes in all (allowed: up to {MOST_MODES}): keep the "
+                "modes with the largest participation factors"
             )
         return problems
 
     @property
     def _names(self) -> Names:
-        """Names of tanks, and of appendages mode by mode, in the FMU's order."""
+        """Names of the tanks, and the appendage's name for each mode, in the FMU's order."""
         modes = [name for name, of in self.appendages.items() for _ in range(of.count)]
         return Names.collect(self.tanks, modes)
 
@@ -419,7 +420,7 @@ class Craft:
         return J
 
     def _resultant(self) -> tuple[Vector, Vector, Vector]:
-        """Return the thrust's force, a point on its line of action from O, and the torque there."""
+        """Return the resultant force, a point on its line of action, and the remaining torque."""
         return resultant(_along_z(self.thrust, "thrust"), self.engines)
 
     def _force(self) -> Vector:
@@ -474,7 +475,7 @@ class Craft:
         return dict(zip(names, values, strict=True))
 
     def _drawing(self, name: str) -> Any:
-        """Return the drawing of a tank, which is read once."""
+        """Return the drawing of a tank; its file is read only once."""
         key = ("drawing", name)
         if key not in self._known:
             try:
@@ -490,7 +491,7 @@ class Craft:
                         of.contact_angle, spin)  # fmt: skip
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
-        """Return the solved tanks by name, fill and gravity; None for an empty tank.
+        """Return a solved tank for each (name, fill, gravity), or None if the tank is empty.
 
         Each tank is solved once. All tanks that were not solved before are solved in one call, on
         all cores.
@@ -565,7 +566,7 @@ class Craft:
     def solve(self, fills: Sequence[Fill]) -> None:
         """Solve the tanks at several fills at once, on all cores.
 
-        Later calls at these fills need no more time.
+        Later calls at these fills reuse the slosh modes and return at once.
 
         Parameters
         ----------
@@ -634,8 +635,7 @@ class Craft:
         Returns
         -------
         MassProperties
-            Mass properties of dry craft and liquid together, body axes; ``print`` shows the mass
-            properties.
+            Mass properties of dry craft and liquid together, body axes; ``print`` shows them.
 
         Raises
         ------
@@ -693,12 +693,12 @@ class Craft:
             allowed, too. A mode of an appendage has the appendage's name: ``array.frequency[1]``
             and ``array.zeta[1]``.
         trimmed : bool
-            Trim the craft, see `trim`. False leaves the thrust at O, with a warning if this thrust
-            turns the craft.
+            Trim the craft, see `trim`. False leaves the thrust at O, and warns if this thrust turns
+            the craft.
         rigid : bool
-            Liquid without slosh, with its effective inertia.
+            Replace the slosh modes by liquid that does not slosh, with its effective inertia.
         detach : bool
-            Liquid may leave the bottom, see `travel`. The liquid then sloshes as a pendulum,
+            The liquid can leave the tank's bottom, see `travel`. It then sloshes as a pendulum
             without the coefficients of finite amplitude.
         mass_flow : float, mapping or sequence of float, optional
             Outflow of the tanks, kg/s, see `drain`.
@@ -779,14 +779,17 @@ class Craft:
         trimmed: bool = True,
         **options: Any,
     ) -> tuple[OperatingPoint, float | None]:
-        """Return the operating point at a fill, and the delay if ``parameters`` have one."""
+        """Return the operating point at a fill, and the loop's delay if it is in ``parameters``."""
         every, modes, late = self._resolve(fill, parameters, **options)
         return self._realised(every, modes, trimmed=trimmed), late
 
     def _resolve(
         self, fill: Fill, parameters: Parameters | None, **options: Any
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
-        """Return untrimmed parameters, given quantities of slosh modes, and the delay or None."""
+        """Return untrimmed parameters, the slosh-mode quantities among the given, and the delay.
+
+        The delay is None if ``parameters`` has none.
+        """
         every = self._untrimmed(fill, **options)
         given = full_names(parameters_of(parameters), Fmu.open(self.model), self._names)
         late = given.pop(DELAY, None)
@@ -803,7 +806,7 @@ class Craft:
         if abs(along - spin) > SAME_SPIN * spin:
             raise FmuError(
                 f"init.omega is {along:.6g} rad/s about the axis about which craft and liquid spin "
-                f"at {spin:.6g} rad/s: leave out spin, of the craft and of its tanks, or init.omega"
+                f"at {spin:.6g} rad/s: leave out init.omega, or the spin of the craft and its tanks"
             )
 
     def _realised(
@@ -814,16 +817,16 @@ class Craft:
         *,
         trimmed: bool = True,
     ) -> OperatingPoint:
-        """Return the operating point of parameters, and then change quantities of its slosh modes.
+        """Return the operating point of ``every``, with the slosh-mode quantities in ``modes``.
 
-        ``factors`` multiply the frequencies of modes.
+        ``factors`` are multipliers of the frequencies of slosh modes, by name.
         """
         model = self.model
         if trimmed:
             point = trim(model, every, list(self.tanks))
         else:
             point = OperatingPoint(model, dict(every), np.zeros(3), None, tuple(self.tanks))
-        # they leave the centre of mass where it is
+        # quantities of slosh modes do not move the centre of mass, so trimming comes before them
         if modes or factors:
             every = apply_changes(model, point.parameters, modes, factors, self._names)
             point = replace(point, parameters=every)
@@ -883,13 +886,13 @@ class Craft:
                 if tanks[name].all["modes"]:
                     prefix = f"tank[{numbers[name]}]"
                     found[f"{prefix}.ball.travel"] = travel
-                    # liquid detaches from pendulums only
+                    # the FMU has these coefficients only for liquid that cannot detach
                     third = re.compile(rf"{re.escape(prefix)}\.nonlinear_(inertia|stiffness)\[")
                     found |= {key: 1.0 for key in found if third.match(key)}
                     found = {n: x for n, x in found.items() if not BEYOND_THIRD_ORDER.search(n)}
         if mass_flow is not None:
             tables = self._draining(mass_flow, tanks, between)
-            # the FMU warns of values that the table replaces
+            # leave out parameters that the fill table replaces, because the FMU would warn of them
             replaced = {_without_point(name) for name in tables if ".fill." in name}
             draining = {name.partition(".")[0] for name in tables if ".fill." in name}
 
@@ -1030,7 +1033,7 @@ class Craft:
         parameters : mapping, optional
             Further parameters, see `parameters`.
         rigid : bool
-            Liquid without slosh.
+            Replace the slosh modes by liquid that does not slosh.
 
         Returns
         -------
@@ -1089,14 +1092,14 @@ class Craft:
         command : str or sequence of str
             Commanded inputs, as for `Loop`; ``"wheels"`` is the torque of each wheel in order.
         latency : int
-            Delay from measurement to command in whole cycles.
+            Delay from measurement to command, whole cycles.
         delay : float
-            Further delay, s.
+            Delay in addition to ``latency``, s.
         parameters : mapping, optional
             Further parameters, see `parameters`; the parameter ``"delay"`` replaces the argument
             ``delay``.
         rigid : bool
-            Liquid without slosh.
+            Replace the slosh modes by liquid that does not slosh.
         mass_flow : float, mapping or sequence of float, optional
             Outflow of the tanks during a simulation, kg/s, see `drain`.
         between : sequence of two fills
@@ -1212,9 +1215,9 @@ class Craft:
         command : str or sequence of str
             Commanded inputs, as for `Loop`; ``"wheels"`` is the torque of each wheel in order.
         latency : int
-            Delay from measurement to command in whole cycles.
+            Delay from measurement to command, whole cycles.
         delay : float
-            Further delay, s.
+            Delay in addition to ``latency``, s.
         parameters : mapping, optional
             Further parameters, see `parameters`.
 
@@ -1458,7 +1461,7 @@ class Craft:
         Returns
         -------
         Run
-            Time histories, SI units.
+            Time histories of the outputs, SI units.
 
         Raises
         ------
@@ -1529,7 +1532,7 @@ class Craft:
         """
         shift = self.trim(fill).shift
         F, action, torque = self._resultant()
-        # trimming moves the engines that burn together with O
+        # trimming moves O, and with it the engines that burn
         wrenches = {
             name: engine.wrench(action if engine.burns else action + shift)
             for name, engine in self.engines.items()
@@ -1542,16 +1545,17 @@ class Craft:
     ) -> dict[str, Path]:
         """Write the trimmed craft at a fill, at rest, as files for other tools.
 
-        ``craft.fmu`` has the binary of the craft's model and variables for its tanks and modes
-        only; the FMU starts with the craft's values, so that a host needs to set nothing.
-        ``craft.ssv`` has these values, ``craft.ssp`` both as a system (SSP 1.0), ``craft.mat`` the
-        linear model from ``torque`` to ``q`` and ``omega`` with parameters and inputs, and
-        ``craft_simulink.m`` builds a model in Simulink from them.
+        ``craft.fmu`` has the binary of the craft's model, and only the variables of the craft's
+        tanks and modes; its start values are the craft's values, so that a host needs to set
+        nothing. ``craft.ssv`` holds these values, and ``craft.ssp`` holds FMU and values as a
+        system (SSP 1.0). ``craft.mat`` has the linear model from ``torque`` to ``q`` and ``omega``,
+        the parameters and the inputs. ``craft_simulink.m`` builds a Simulink model from the FMU and
+        ``craft.mat``.
 
         Parameters
         ----------
         folder : str or Path
-            Folder for the files, which is made; files with these names are replaced.
+            Folder for the files, created if missing; existing files of these names are replaced.
         fill : fill, mapping, or sequence of fills
             Fill of the tanks, as for `fills`.
         parameters : mapping, optional
@@ -1654,16 +1658,16 @@ class Craft:
         return view(run, out, tanks=sources, **options)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a copy; results that can be computed again are left out."""
+        """Return the fields for pickling, without results that can be computed again."""
         return {**self.__dict__, "_known": {}, "_said": []}
 
     def __repr__(self) -> str:
-        """Return the craft in a line."""
+        """Return a one-line description of the craft."""
         modes = f", appendages: {', '.join(self.appendages)}" if self.appendages else ""
         return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'}{modes})"
 
     def __str__(self) -> str:
-        """Return the craft in three or four lines, and one for each tank, wheel and appendage."""
+        """Return a description of the craft, with a line for each tank, wheel and appendage."""
         J, F = self._inertia(), self._force()
         burning = [name for name, engine in self.engines.items() if engine.burns]
         products = f"Jxy, Jxz, Jyz {_row((J[0, 1], J[0, 2], J[1, 2]))}"
@@ -1692,7 +1696,7 @@ def _along_z(given: Any, name: str) -> Vector:
 
 
 def _without_point(name: str) -> str:
-    """Return the name of the parameter that a parameter of the fill table replaces."""
+    """Return the name of the constant parameter that a parameter of the fill table replaces."""
     prefix, key = name.split(".fill.")
     if key.startswith("liquid["):
         return f"{prefix}.m_0"
@@ -1709,7 +1713,7 @@ def _is_empty(fill: Any) -> bool:
 
 
 def _own_inertia(tank: Tank, liquid: Liquid) -> Vector:
-    """Return the moments of inertia of a liquid about its centre, tank axes."""
+    """Return the moments of inertia of a liquid about its centre of mass, tank axes, kg·m²."""
     kind = "eff" if liquid == "effective" else "frozen"
     axes = tank.all.get("axes")  # of a box: motion along y turns about x
     across = [float((axes[of] if axes else tank.all)[f"I_{kind}_cg"]) for of in "yx"]

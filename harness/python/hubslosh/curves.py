@@ -15,22 +15,23 @@ if TYPE_CHECKING:
 
     from .linearization import LinearModel
 
-DEEPEST, HIGHEST = -80.0, 60.0  # Range beyond which no diagram shows a loop gain, dB
+DEEPEST, HIGHEST = -80.0, 60.0  # Widest range of loop gain that a diagram shows, dB
 
-AROUND = 1.3  # Factor by which a diagram reaches beyond the largest gain margin that it shows
+AROUND = 1.3  # Ratio of a diagram's range in dB to the largest gain margin that it shows
 
-# Change of the loop gain's logarithm from point to point that is refined: 0.12 rad or 1 dB.
+# Largest change of the loop gain's logarithm between neighbouring points, 0.12 rad or 1 dB; where
+# the loop gain changes more, frequencies are inserted.
 TURN = 0.12
 
 ODD = (-900, -540, -180, 180)  # Phases at which the loop gain is negative, deg
 
-# Loop gains with a distance of 0.5 to -1, the usual requirement of a modulus margin.
+# Circle of the loop gains at the distance 0.5 from -1, the usual requirement of a modulus margin.
 CIRCLE = -1 + 0.5 * np.exp(1j * np.linspace(0, 2 * np.pi, 200))
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Curve of the loop gain at one command, while the loops of the other commands are closed."""
+    """Curve of the loop gain of one command, with the loops of the other commands closed."""
 
     name: str
     color: str
@@ -63,17 +64,18 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Curves of several loop gains over the frequencies that one diagram shows."""
+    """Curves of several loop gains in one diagram."""
 
     every: tuple[Curve, ...]
     range: tuple[float, float]
-    """Range of the diagrams, dB."""
+    """Range of loop gain that the diagrams show, dB."""
 
     @property
     def phases(self) -> tuple[float, float]:
         """Range of phase that the diagrams show, deg.
 
-        It contains the phase of each curve wherever its gain lies within ``range``.
+        The range contains the phase of every curve at all frequencies at which the gain of that
+        curve lies within ``range``.
         """
         ends = [-180.0]
         for curve in self.every:
@@ -121,14 +123,14 @@ def curves_of(
 def _smooth(
     gain: "LinearModel", f: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return frequencies that resolve the loop gain, and the loop gain."""
+    """Return ``f`` refined where the loop gain changes fast, and the loop gain there."""
     model, values = _compiled(gain), np.zeros(0, complex)
     new, old = f, np.zeros(0)
     for _ in range(6):
         more = np.array(model.response(2 * np.pi * new)).view(complex)
         every, order = np.concatenate([old, new]), np.argsort(np.concatenate([old, new]))
         old, values = every[order], np.concatenate([values, more])[order]
-        finite = np.isfinite(values)  # it is infinite at an undamped pole
+        finite = np.isfinite(values)  # the loop gain is infinite at an undamped pole
         old, values = old[finite], values[finite]
         with np.errstate(divide="ignore", invalid="ignore"):
             wide = np.flatnonzero(np.abs(np.log(values[1:] / values[:-1])) > TURN)
@@ -137,7 +139,7 @@ def _smooth(
 
 
 def _edge() -> Any:
-    """Return the colour of lines that belong to no curve."""
+    """Return the colour of reference lines, such as the line at 0 dB."""
     import matplotlib
 
     return matplotlib.rcParams["axes.edgecolor"]

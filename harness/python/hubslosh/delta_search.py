@@ -20,17 +20,21 @@ if TYPE_CHECKING:
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-DRAWS = 500  # Random Δ of the search
+DRAWS = 500  # Number of random Δ in each box
 
-UNSTABLE = 1 + 1e-9  # Magnitude of a pole; modes that no input moves have no damping there
+# Magnitude of a pole above which the loop counts as unstable. It is a little above 1, because the
+# undamped poles of uncontrollable modes are computed with rounding errors.
+UNSTABLE = 1 + 1e-9
 
-FIRST_STEP, LAST_STEP = 0.2, 2e-3  # Steps of δ in a pattern search
+FIRST_STEP, LAST_STEP = 0.2, 2e-3  # Largest and smallest step of δ in a pattern search
 
-SHRINK = (0.9, 1 - 3e-3)  # Sizes of the next box over the present one, one after the other
+SHRINK = (0.9, 1 - 3e-3)  # Ratios of the next box to the present box, tried one after the other
 
 TOGETHER = 64  # Number of Δ whose poles are computed together, so that the matrices fit the cache
 
-CORNER_STEPS, LINE_STEPS = 8, 24  # Number of points on a line from 0 at which stability is judged
+# Number of points on the line from Δ = 0 to a corner, and on other lines, at which stability is
+# tested.
+CORNER_STEPS, LINE_STEPS = 8, 24
 
 
 class DeltaSearch:
@@ -45,7 +49,7 @@ class DeltaSearch:
         """Prepare the search for a loop whose linear controller is ``K``."""
         self.model, self.loop, self.K = model, loop, K
         self.least = model._least
-        """Least value of each δ."""
+        """Lower bound of each δ."""
         self.damping = model._of_kind("zeta")
         self.frequencies = model._of_kind("frequency")
         self.centers = np.array([model.center.get(name, 0.0) for name in model.deltas])
@@ -57,7 +61,7 @@ class DeltaSearch:
         self.line = Line(progress)
 
     def matrices(self, deltas: Matrix) -> Matrix:
-        """Return the matrix of the closed loop for each Δ; NaN where there is no such craft."""
+        """Return the closed loop's state matrix for each Δ; NaN if no craft has this Δ."""
         model, loop, K = self.model, self.loop, self.K
         width, (A, B, C, D) = model.order, model.M
         n, m = len(A), B.shape[1] - width
@@ -74,7 +78,7 @@ class DeltaSearch:
         cycles, rest = loop.whole_delay
         full = exponential(plant * loop.period)
         late = exponential(plant * (loop.period - rest))[:, :n, n:] if rest else full[:, :n, n:]
-        # states: those of the craft, commands on the way with the oldest first, the controller
+        # states: states of the craft; delayed commands, oldest first; states of the controller
         k, way = len(K.A), m * (cycles + 1)
         found = np.zeros((len(deltas), n + way + k, n + way + k))
         found[:, :n, :n] = full[:, :n, :n]
@@ -86,7 +90,7 @@ class DeltaSearch:
         new = np.concatenate(
             [-K.D @ seen, np.broadcast_to(-K.C, (len(deltas), *K.C.shape))], axis=2
         )
-        # the new command follows the ones on the way; without one in between it acts at once
+        # the new command is appended to the delayed commands; without delay it acts at once
         if cycles:
             found[:, :n, n + m : n + 2 * m] += late
             found[:, n : n + way - m, n + m : n + way] = np.eye(way - m)
@@ -98,7 +102,7 @@ class DeltaSearch:
     def poles(self, deltas: Matrix) -> Complex:
         """Return the poles of the closed loop for each Δ; a neutral pole is replaced by 0.
 
-        The poles of a Δ for which there is no craft are NaN.
+        The poles are NaN if no craft has this Δ, for example because a mass would be negative.
         """
         parts = [deltas[k : k + TOGETHER] for k in range(0, len(deltas), TOGETHER)]
         return np.concatenate([self._poles(part) for part in parts])
@@ -121,24 +125,30 @@ class DeltaSearch:
         return found
 
     def radius(self, deltas: Matrix) -> Matrix:
-        """Return the largest magnitude of a pole for each Δ; -inf where there is no craft."""
+        """Return the largest magnitude of a pole for each Δ; -inf if no craft has this Δ."""
         if not len(deltas):
             return np.zeros(0)
         sizes = np.abs(self.poles(deltas)).max(axis=1, initial=0.0)
         return np.where(np.isnan(sizes), -np.inf, sizes)
 
     def say(self, best: WorstCase, share: float) -> None:
-        """Show the smallest size so far, and the time that is left after a share of the work."""
+        """Show the smallest unstable size so far, and an estimate of the remaining time.
+
+        ``share`` is the finished share of the work.
+        """
         so_far = f"{best.size:.4g} times the ranges so far" if best.delta else "none so far"
         left = f", about {self.line.left(share):.0f} s left" if share > 0.05 else ""
         self.line.show(f"worst case: {so_far}{left}")
 
     def limits(self, ways: Matrix, largest: float, steps: int) -> list[WorstCase]:
-        """Return the Δ along each way (with largest component 1) at the limit of stability."""
+        """Return the Δ at the limit of stability on lines from Δ = 0.
+
+        Each row of ``ways`` is the direction of a line; its largest component is 1.
+        """
         sizes = np.linspace(0, largest, steps + 1)
         at = np.maximum(sizes[1:, None, None] * ways, self.least)
         radii = self.radius(at.reshape(-1, ways.shape[1])).reshape(steps, len(ways))
-        # a way ends where there is no craft any more
+        # a line ends where no craft has the Δ
         ends = (radii > UNSTABLE) | (radii < 0)
         first = ends.argmax(axis=0)
         hit = radii[first, np.arange(len(ways))] > UNSTABLE
@@ -148,7 +158,7 @@ class DeltaSearch:
             middle = (low + high)[kept] / 2
             beyond = self.radius(np.maximum(middle[:, None] * ways[kept], self.least)) > UNSTABLE
             high[kept[beyond]], low[kept[~beyond]] = middle[beyond], middle[~beyond]
-            # a way whose limit is beyond that of another needs no more digits
+            # drop lines whose limit is certainly larger than the limit on another line
             kept = kept[low[kept] <= high[kept].min()]
             if ((high - low)[kept] <= np.spacing(high[kept])).all():
                 break
@@ -163,12 +173,12 @@ class DeltaSearch:
         return WorstCase(named, size, frequency, self.model.values(at), self.model.tanks)
 
     def is_limit(self, delta: Matrix) -> bool:
-        """Return True if the loop is unstable at Δ, and stable a little nearer to 0."""
+        """Return True if the loop is unstable at Δ, but stable at a slightly smaller Δ."""
         inside, outside = self.radius(np.array([delta * (1 - 1e-6), delta * (1 + 1e-6)]))
         return bool(inside <= UNSTABLE < outside)
 
     def limit(self, delta: Matrix) -> WorstCase | None:
-        """Return the limit of stability on the line to an unstable Δ."""
+        """Return the limit of stability on the line from 0 to an unstable Δ."""
         size = float(np.abs(delta).max())
         return min(self.limits(delta[None] / size, size, LINE_STEPS), key=_size, default=None)
 
@@ -178,7 +188,7 @@ class DeltaSearch:
         start = self.poles(np.zeros((1, count)))[0]
         if np.abs(start).max(initial=0.0) >= 1:
             raise FmuError(
-                "the loop is unstable at Δ = 0, which is the craft without changes: "
+                "the loop is unstable at Δ = 0, that is with nominal parameters: "
                 "hubslosh.margins(loop) shows its margins"
             )
         best = min(self._followed(start, largest), key=_size, default=NOTHING)
@@ -188,7 +198,7 @@ class DeltaSearch:
         return self.smallest([self._drawn(min(best.size, largest))], best, largest)
 
     def _followed(self, start: Complex, largest: float) -> Iterator[WorstCase]:
-        """Return limits of stability found by following each lightly damped pole.
+        """Yield limits of stability that are found by following each lightly damped pole.
 
         The direction in Δ is the sign of the derivative of the pole's magnitude by each δ.
         """
@@ -238,7 +248,7 @@ class DeltaSearch:
         return best
 
     def _in_box(self, starts: Sequence[Matrix], best: WorstCase, box: float) -> WorstCase:
-        """Search a box for an unstable Δ; return the limit of stability between 0 and it."""
+        """Search a box for an unstable Δ; return the limit of stability on the line to this Δ."""
         known = [self.model.delta(best.delta)] if best.delta else []
         near = [at * min(1.0, box / np.abs(at).max(initial=box)) for at in (*known, *starts)]
         for group in (near, self._meetings(box)):
@@ -250,7 +260,7 @@ class DeltaSearch:
     def _drawn(self, size: float) -> Matrix:
         """Return the least stable of random Δ; half of them have the smallest damping ratios.
 
-        They find a loop that is unstable only between the corners.
+        These draws can find a loop that is unstable only between the corners of the box.
         """
         rng = np.random.default_rng(1)
         at = rng.uniform(-size, size, (DRAWS, len(self.least)))
@@ -263,9 +273,9 @@ class DeltaSearch:
         """Return Δ at which two uncertain frequencies are equal, if their ranges overlap.
 
         ``size`` bounds the ranges. Two modes of the same frequency and little damping can be
-        unstable in a part of the ranges that is a thousandth of the whole, so that random Δ miss
-        it. There are three Δ for each pair, over the frequencies that both can have; other
-        parameters are nominal, and damping ratios least.
+        unstable in only a thousandth of the ranges, which random Δ would miss. Each pair gives
+        three Δ, at frequencies that both modes can have. The damping ratios have their smallest
+        values, and other parameters their nominal values.
         """
         at = np.zeros(len(self.least))
         at[self.damping] = -size
@@ -283,8 +293,8 @@ class DeltaSearch:
         """Return an unstable Δ in a box that pattern searches find from ``starts``, or None.
 
         A search changes one δ at a time, or two frequencies by the same amount. It tries all these
-        changes, then the sums of those that make the loop less stable. All searches end at the
-        first unstable Δ.
+        changes, then sums of the changes that make the loop less stable. All searches end as soon
+        as one finds an unstable Δ.
         """
         if not len(starts):
             return None

@@ -1,4 +1,4 @@
-"""Engines of a craft: their resultant at the operating point, and histories of their pulses."""
+"""Engines of a craft: their resultant force, and time histories of engines that fire in pulses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from .fmu import FmuError, did_you_mean
 
 Vector = NDArray[np.float64]
 
-MOST_PULSES = 1_000_000  # Most pulses of a history
+MOST_PULSES = 1_000_000  # Largest number of pulses of one engine in a time history
 
 
 @dataclass(frozen=True, eq=False)
 class Engine:
-    """An engine of a `Craft`: its place, its direction and its thrust.
+    """An engine of a `Craft`: its position, its direction and its thrust.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Engine:
         Returns
         -------
         list of str
-            Sentences; none if all is right.
+            One sentence for each problem; empty if there is none.
 
         Examples
         --------
@@ -131,13 +131,13 @@ def pulse_history(
         except (TypeError, ValueError):
             raise FmuError(f"{name}: pulses must be (start, end) in s, {example}") from None
         if len(pulses) > MOST_PULSES or not np.isfinite(pulses).all():
-            raise FmuError(f"{name}: pulses must be at most {MOST_PULSES} finite times")
+            raise FmuError(f"{name}: pulses must be at most {MOST_PULSES} pairs of finite times, s")
         flat = np.sort(pulses, axis=0)
         order = (pulses[:, 0] < pulses[:, 1]).all() and (flat[1:, 0] >= flat[:-1, 1]).all()
         if not order or (pulses < 0).any() or (pulses > stop).any():
             raise FmuError(
-                f"{name}: each pulse must end after it starts, without overlap, from 0 to stop = "
-                f"{stop:g} s"
+                f"{name}: each pulse must end after it starts, pulses must not overlap, and all "
+                f"must lie between 0 and stop = {stop:g} s"
             )
         steps.append((pulses, wrenches[name]))
         edges += pulses.ravel().tolist()

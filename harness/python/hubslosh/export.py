@@ -1,7 +1,7 @@
-"""A craft as files for other tools: an FMU that starts as the craft, SSP, .ssv and .mat.
+"""Export of a craft as files for other tools: FMU, SSP system, .ssv parameters and .mat.
 
-The FMU has the binary of Spacecraft, and a description with the tanks and modes of the craft, whose
-start values are those of the craft.
+The FMU has the binary of Spacecraft. Its model description has only the variables of the craft's
+tanks and modes, and the craft's values as start values.
 """
 
 import zipfile
@@ -14,10 +14,10 @@ from .fmu import Fmu, FmuError, Parameters, Value, text_of
 from .linearization import LinearModel
 from .temporary import output, write_file
 
-# Beginnings of the names of outputs that the system and the script show.
+# Prefixes of the names of the outputs that the SSP system and the Simulink script connect.
 SHOWN = ("q[", "omega[", "position[", "velocity[")
 
-# Templates of the script and of the SSP description.
+# Templates of the Simulink script and of the SSP description.
 SCRIPT, SYSTEM = (
     Path(__file__).with_name(name).read_text(encoding="utf-8")
     for name in ("craft_simulink.m", "craft.ssd")
@@ -39,7 +39,7 @@ def export(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FmuError(f"the folder {folder} cannot be made: {error}") from None
+        raise FmuError(f"the folder {folder} cannot be created: {error}") from None
     paths = {
         kind: folder / name
         for kind, name in {
@@ -76,7 +76,7 @@ def export(
 
 
 def _copy(path: Path, archive: zipfile.ZipFile, changed: Mapping[str, str]) -> None:
-    """Copy an archive with other texts for some of its files."""
+    """Copy a ZIP archive to ``path``, with the texts in ``changed`` for some of its files."""
     left = dict(changed)
     with zipfile.ZipFile(path) as whole:
         for entry in whole.infolist():
@@ -87,14 +87,14 @@ def _copy(path: Path, archive: zipfile.ZipFile, changed: Mapping[str, str]) -> N
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
-    """Return an entry without a date, so that the same craft gives the same bytes."""
+    """Return an archive entry without a date, so that the same craft gives the same bytes."""
     entry = zipfile.ZipInfo(name)
     entry.compress_type = zipfile.ZIP_DEFLATED
     return entry
 
 
 def _ssv(fmu: Fmu, values: Mapping[str, Value]) -> str:
-    """Return the parameter set of SSP 1.0."""
+    """Return the values as a parameter set of SSP 1.0 (.ssv)."""
     rows = []
     for name, value in values.items():
         items = dict(map(reversed, fmu.variable(name).items))  # type: ignore[arg-type]
@@ -116,7 +116,7 @@ def _shown(fmu: Fmu) -> list[str]:
 
 
 def _ssd(fmu: Fmu) -> str:
-    """Return the SSP description of a system: the FMU, its inputs and its visible outputs."""
+    """Return the SSP description of a system with the FMU, its inputs and outputs of `SHOWN`."""
     connectors, units = [], {}
     for kind, names in (("input", fmu.names("input")), ("output", _shown(fmu))):
         for name in names:

@@ -19,12 +19,12 @@ class Linear:
     C: Matrix
     D: Matrix
     reference: Matrix
-    """r, a row per cycle."""
+    """Reference r, one row per cycle."""
     feedforward: Matrix
-    """f, a row per cycle."""
+    """Feedforward f, one row per cycle."""
     quaternion: list[int] | None = None
-    """Indices of a quaternion in y, scalar first. The error of its vector part is that of
-    q⁻¹ ⊗ r, half the remaining rotation about each body axis, the short way."""
+    """Indices of a quaternion q in y, scalar first. The error of its vector part is the vector part
+    of q⁻¹ ⊗ r, which is about half the remaining rotation about each body axis."""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Feedback:
     """
 
     controller: Linear | Callable[[int, float, list[float]], Any]
-    """Type of a controller function: cycle, time (s) and measurements to one number per command."""
+    """A function gets the cycle, the time (s) and the measurements; it returns the commands."""
     measured: list[str]
     command: list[str]
     cycles: int
@@ -45,16 +45,16 @@ class Feedback:
     switch: int
     latency: int
     wheels: list[tuple[int, list[float], float, float, float, float]] = field(default_factory=list)
-    """Column of the torque in ``command``, axis, inertia, largest torque and speed, and speed of
-    each wheel."""
+    """For each wheel: the column of its torque in ``command``, its axis, inertia (kg·m²), largest
+    torque (N·m), largest speed (rad/s) and speed at the start (rad/s)."""
     momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Momentum of the wheels at the start, N·m·s. A wheel that reaches its largest speed between
-    two rows gives its torque until then, and none from then on."""
+    """Angular momentum of the wheels at the start, N·m·s. If a wheel reaches its largest speed
+    between two rows, its torque is 0 from that moment on."""
 
     def __post_init__(self) -> None:
         """Allocate the arrays of commands and of wheel speeds."""
         rows = self.cycles * self.parts + 1
         self.commands: Matrix = np.zeros((rows, len(self.command)))
-        """The commands in force from each row on; the last row is not set."""
+        """Commands that act from each row to the next; the last row is not set."""
         self.speeds: Matrix = np.zeros((rows, len(self.wheels)))
         """Speed of each wheel at each row, rad/s."""

@@ -1,4 +1,4 @@
-"""Tables and models as files for other programs: the table first, then the file."""
+"""Writing of tables and models to files for other programs."""
 
 import os
 import re
@@ -41,14 +41,14 @@ def _columns(table: "pd.DataFrame") -> dict[str, Any]:
 
 
 def to_csv(table: "pd.DataFrame", path: str | Path) -> None:
-    """Write a table as .csv, with every digit.
+    """Write a table as .csv, with all digits of each number.
 
-    The file appears complete or not at all.
+    The file is complete or, if writing fails, does not exist.
 
     Parameters
     ----------
     table : DataFrame
-        The table, for example of `simulate`.
+        The table, for example the result of `simulate`.
     path : str or Path
         File whose name ends in .csv.
 
@@ -75,12 +75,13 @@ def to_csv(table: "pd.DataFrame", path: str | Path) -> None:
 def to_parquet(table: "pd.DataFrame", path: str | Path) -> None:
     """Write a table as .parquet; needs pyarrow.
 
-    Units are in the file's metadata as ``unit:NAME``. The file appears complete or not at all.
+    Units are in the file's metadata as ``unit:NAME``. The file is complete or, if writing fails,
+    does not exist.
 
     Parameters
     ----------
     table : DataFrame
-        The table, for example of `simulate`.
+        The table, for example the result of `simulate`.
     path : str or Path
         File whose name ends in .parquet.
 
@@ -172,7 +173,7 @@ def to_mat(
 
 
 def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
-    """Return values and units under MATLAB's names."""
+    """Return values, and their units as ``units``, under names that MATLAB allows."""
     names = {name: re.sub(r"\W+", "_", name).strip("_") for name in values}
     twice = [name for name in names if list(names.values()).count(names[name]) > 1]
     if twice or any(not re.fullmatch(r"[A-Za-z]\w{0,62}", name) for name in names.values()):
@@ -184,7 +185,7 @@ def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict
 
 
 def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
-    """Return models of one size as a dictionary of arrays for a .mat file, one page a model."""
+    """Return models of one size as three-dimensional arrays for a .mat file, one page per model."""
     import numpy as np
 
     first = models[0]
@@ -201,7 +202,7 @@ def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
 
 
 def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return lists of texts as cell arrays."""
+    """Return the values with lists of strings as arrays of objects, MATLAB's cell arrays."""
     import numpy as np
 
     return {

@@ -21,9 +21,9 @@ class TransferFunction:
     Attributes
     ----------
     numerator : ndarray, shape (m + 1,)
-        Coefficients of B for m zeros, from the highest power of s down.
+        Coefficients of B, which has m zeros, from the highest power of s down.
     denominator : ndarray, shape (n + 1,)
-        Coefficients of A for n poles, from the highest power of s down; the first is 1.
+        Coefficients of A, which has n poles, from the highest power of s down; the first is 1.
     fit : float
         Fit to the data, %: ``100 (1 − |H_data − H| / |H_data − mean(H_data)|)`` with norms over
         all frequencies. 100 is perfect.
@@ -43,12 +43,12 @@ class TransferFunction:
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """Roots of A by magnitude, rad/s."""
+        """Roots of A in order of magnitude, rad/s."""
         return _sorted(np.roots(self.denominator))
 
     @property
     def zeros(self) -> NDArray[np.complex128]:
-        """Roots of B by magnitude, rad/s."""
+        """Roots of B in order of magnitude, rad/s."""
         return _sorted(np.roots(self.numerator))
 
     def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
@@ -154,7 +154,7 @@ def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunct
     refuse(problems)
     frequency, real, imag = numbers_in(response, names, "response")
     data = real + 1j * imag
-    # s in units of the band's middle, for the equations' condition
+    # s is divided by the middle of the band, so that the equations are well conditioned
     unit = 2 * np.pi * float(np.exp(np.mean(np.log(frequency))))
     s = 2j * np.pi * frequency / unit
     powers_b = s[:, None] ** np.arange(zeros, -1, -1)

@@ -1,4 +1,7 @@
-"""A packed FMU, 2.0 or 3.0: where it is, what it says of itself, values in its variables' types."""
+"""An FMU file of FMI 2.0 or 3.0: its path, its variables, and conversion of values to their types.
+
+A value is in SI units, or has a unit, such as ``"50 mm"``.
+"""
 
 import atexit
 import difflib
@@ -27,35 +30,36 @@ __all__ = [
     "text_of",
 ]
 
-# A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name.
+# Value of a variable: in SI units, or a string with a unit, such as ``"50 mm"``. The value of an
+# enumeration may also be the name of an item.
 Value = float | int | bool | str
 
-_INDICES = re.compile(r"\[\d+(,\d+)*\]$")  # End of the name of a vector's or matrix's element
+_INDICES = re.compile(r"\[\d+(,\d+)*\]$")  # Indices at the end of an element's name: "[1]", "[1,2]"
 
-INTEGERS = range(-(2**31), 2**31)  # Numbers that fmi2Integer has
+INTEGERS = range(-(2**31), 2**31)  # Range of fmi2Integer
 
 Quantity = Value | tuple[float, str]  # A value, or a number with its unit, such as ``(50, "mm")``
 
-# Values of variables by name, each a `Quantity`. The type says Any because mypy takes a dict of
-# numbers and texts for ``dict[str, object]``.
+# Values of variables by name, each a `Quantity`. The type is Any, because mypy infers
+# ``dict[str, object]`` for a dict that mixes numbers and strings.
 Parameters = Mapping[str, Any]
 
 
 class DefinedUnit(str):
-    """Unit that a file of parameters uses: its name, and its definition in SI base units."""
+    """Unit that a parameter file defines: its name, and its conversion to SI base units."""
 
     base: tuple[Sequence[int], float, float]
-    """Exponents of kg, m, s, A, K, mol, cd and rad, factor and offset: a number in this unit is
-    factor · number + offset in SI base units."""
+    """Exponents of kg, m, s, A, K, mol, cd and rad; factor; offset. The value in SI base units is
+    factor · (value in this unit) + offset."""
 
     def __new__(cls, name: str, base: tuple[Sequence[int], float, float]) -> "DefinedUnit":
-        """Take the name and the definition of a unit."""
+        """Create a unit from its name and its conversion to SI base units."""
         unit = super().__new__(cls, name)
         unit.base = base
         return unit
 
     def __getnewargs__(self) -> tuple[str, Any]:  # type: ignore[override]
-        """Return the arguments from which a copy is made."""
+        """Return the arguments of ``__new__`` for pickling and copying."""
         return str(self), self.base
 
 
@@ -94,7 +98,7 @@ def fmu_path(model: str | Path) -> Path:
     if isinstance(model, Path) or model.endswith(".fmu"):
         path = Path(model)
         if not path.is_file():
-            raise FmuError(f"there is no FMU at {path}; cargo run --release -- pack makes it")
+            raise FmuError(f"there is no FMU at {path}; cargo run --release -- pack builds it")
         return path.resolve()
     folders = [Path(__file__).with_name("fmus")]
     if root := source_tree():
@@ -115,14 +119,14 @@ def fmu_path(model: str | Path) -> Path:
 
 
 def text_of(value: object) -> str:
-    """Return a value as text for the program and for files, with its unit if it has one."""
+    """Return a value as a string, with its unit if it has one, for command lines and files."""
     if isinstance(value, tuple):
         return "".join(map(str, value))
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
-    """Return "; did you mean …?" with the name that is most similar, or an empty text.
+    """Return "; did you mean …?" with the name most similar to ``wrong``, or an empty string.
 
     A name without its group, such as ``rho`` for ``fluid.rho``, counts as the most similar.
     """
@@ -135,9 +139,8 @@ def did_you_mean(wrong: str, names: Iterable[str]) -> str:
 class Fmu:
     """An FMU: its file and its variables.
 
-    The archive is unpacked for the first instance, and the unpacked files are removed when the
-    program ends. Create an Fmu by `open`, which reads a file only once as long as the file does not
-    change.
+    Create an Fmu by `open`, which reads a file again only if it has changed. The archive is
+    unpacked when the first instance is created; the unpacked files are removed when Python ends.
 
     Parameters
     ----------
@@ -192,7 +195,7 @@ class Fmu:
 
     @classmethod
     def open(cls, model: str | Path) -> "Fmu":
-        """Return the FMU of a model; a file that has not changed is read once per program.
+        """Return an FMU by its name or file; the file is read again only if it has changed.
 
         Parameters
         ----------
@@ -279,7 +282,7 @@ class Fmu:
 
     @cached_property
     def by_reference(self) -> dict[int, Variable]:
-        """Variables by value reference; of several variables with one reference the first."""
+        """First variable of each value reference."""
         return {v.reference: v for v in reversed(self.variables.values())}
 
     @cached_property
@@ -302,8 +305,8 @@ class Fmu:
         Returns
         -------
         Variable
-            Its ``name``, ``reference``, ``kind``, ``causality``, ``variability``, ``unit``,
-            ``start`` and others.
+            An object with ``name``, ``reference``, ``kind``, ``causality``, ``variability``,
+            ``unit``, ``start`` and other attributes.
 
         Raises
         ------
@@ -358,7 +361,7 @@ class Fmu:
         Returns
         -------
         str
-            The unit by its name in the FMU, such as "N.m"; empty if the variable has none.
+            The unit's name in the FMU, such as "N.m"; empty if the variable has no unit.
 
         Raises
         ------
@@ -423,7 +426,7 @@ class Fmu:
         name : str
             Name of the variable.
         unit : str
-            Its own unit, or one of its display units.
+            The variable's own unit, or one of its display units.
 
         Returns
         -------
@@ -465,7 +468,7 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     Parameters
     ----------
     path : str or Path
-        The file; the ending of the file's name states the format.
+        The file. The format follows from the extension of its name.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Inertia of a hub from its parts (thesis 5.3): a sum of own inertias and m r^2."""
+"""Inertia of a hub from its parts by the parallel-axis theorem (Rubaga's thesis, section 5.3)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,7 +9,7 @@ import pandas as pd
 from .arguments import floats
 from .fmu import FmuError
 
-# Kinds of parts, and the names of their dimensions.
+# Shapes of parts, and the dimensions by which they are given.
 SHAPES = {
     "point": "nothing of its own",
     "box": "(a, b): a block, its sides across the bearing axis, m",
@@ -33,7 +33,7 @@ def _own(shape: str, mass: float, size: Any) -> float:
     a, b = numbers
     if shape == "tube":
         if a > b:
-            raise FmuError(f"tube={size!r}: the inner radius is above the outer one")
+            raise FmuError(f"tube={size!r}: the inner radius is larger than the outer radius")
         return float(mass * (a**2 + b**2) / 2)
     return float(mass * ((a**2 + b**2) if shape == "box" else (3 * a**2 + b**2)) / 12)
 

@@ -1,4 +1,4 @@
-"""The linear model of an FMU at a point, from its own directional derivatives."""
+"""Linear models of FMUs at an operating point, from the FMUs' directional derivatives."""
 
 import warnings
 from collections.abc import Iterator, Sequence
@@ -28,7 +28,7 @@ def _check_states(states: int, cycles: int, period: float) -> None:
     if states > MOST_STATES:
         raise FmuError(
             f"a delay of {cycles * period:g} s is {cycles} cycles of {period:g} s, and the "
-            f"commands on the way make {states} states (allowed: {MOST_STATES}): give a shorter "
+            f"delayed commands make {states} states (allowed: {MOST_STATES}): give a shorter "
             "delay or latency, or a longer period"
         )
 
@@ -49,7 +49,7 @@ class LinearModel:
     """A linear model x' = A x + B u, y = C x + D u of deviations from an operating point.
 
     If ``period`` is given, the model is in discrete time, x_{k+1} = A x_k + B u_k; see `sampled`.
-    All values are in SI units. ``A, B, C, D = model`` works as well.
+    All values are in SI units. ``A, B, C, D = model`` unpacks the matrices.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class LinearModel:
         return iter((self.A, self.B, self.C, self.D))
 
     def __repr__(self) -> str:
-        """Return sizes and names."""
+        """Return numbers and names of states, inputs and outputs."""
         from .short import names
 
         time = "continuous" if self.period is None else f"sampled with {self.period:g} s"
@@ -110,7 +110,7 @@ class LinearModel:
         return f"LinearModel, {time}: {sizes}"
 
     def __str__(self) -> str:
-        """Return sizes, names and the first modes."""
+        """Return numbers and names of states, inputs and outputs, and the first modes."""
         from .short import rows
 
         modes = self.modes().assign(states=lambda table: table["states"].map(", ".join))
@@ -118,7 +118,7 @@ class LinearModel:
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """Eigenvalues of A by magnitude: rad/s in continuous time, otherwise in the z plane."""
+        """Eigenvalues of A in order of magnitude, rad/s; of a sampled model, in the z plane."""
         poles = np.linalg.eigvals(self.A).astype(complex)
         return poles[np.argsort(np.abs(poles))]
 
@@ -164,7 +164,7 @@ class LinearModel:
         return np.asarray(self.C @ states + self.D, np.complex128)
 
     def _then(self, other: "LinearModel", prefix: str) -> "LinearModel":
-        """Return the series of this model and another one, whose states get a prefix."""
+        """Return this model in series with ``other``, whose states get ``prefix`` in their names."""
         n, m = len(self.A), len(other.A)
         return LinearModel(
             np.block([[self.A, np.zeros((n, m))], [other.B @ self.C, other.A]]),
@@ -178,11 +178,11 @@ class LinearModel:
         )
 
     def sampled(self, period: float, latency: int = 0, delay: float = 0.0) -> "LinearModel":
-        """Return the model in discrete time, as a controller sees it that works in cycles.
+        """Return the model in discrete time, as a sampled controller sees it.
 
         Each input is held for one cycle and acts after the delay; inputs that do not act yet are
-        further states. The result is exact at the sampling instants. If an output depends directly
-        on an input, it has the value just after the new input acts.
+        further states. The result is exact at the sampling instants. An output that depends
+        directly on an input has the value just after the new input acts.
 
         Parameters
         ----------
@@ -201,8 +201,8 @@ class LinearModel:
         Raises
         ------
         FmuError
-            If the model is sampled already, a number is out of range, or the delay makes more
-            states than a computer should hold.
+            If the model is sampled already, a number is out of range, or the delay would make more
+            than 1000 states.
 
         Examples
         --------
@@ -225,7 +225,7 @@ class LinearModel:
             return self._delayed(period, cycles, rest)
         A, B, C, D, _ = cont2discrete((*self,), period, "zoh")
         states = list(self.states)
-        for cycle in range(cycles):  # the oldest command first: it reaches the plant next
+        for cycle in range(cycles):  # oldest command first, because it reaches the plant next
             n, m = B.shape
             A = np.block([[A, B], [np.zeros((m, n + m))]])
             B = np.vstack([np.zeros((n, m)), np.eye(m)])
@@ -234,11 +234,13 @@ class LinearModel:
         return LinearModel(A, B, C, D, tuple(states), self.inputs, self.outputs, period)
 
     def _delayed(self, period: float, cycles: int, rest: float) -> "LinearModel":
-        """Return it sampled with a delay of ``cycles`` and ``rest`` seconds, 0 ≤ rest < period.
+        """Return the model in discrete time with a delay of its inputs.
 
-        In cycle k the command of cycle k - cycles - 1 acts for ``rest`` seconds, then the next one
-        (Åström and Wittenmark, Computer-Controlled Systems, section 2.4). An output that follows an
-        input at once is that just before a new command, which a controller measures.
+        The delay is ``cycles`` cycles and ``rest`` seconds, 0 ≤ rest < period. In cycle k the
+        command of cycle k - cycles - 1 acts for ``rest`` seconds, then the command of cycle
+        k - cycles (Åström and Wittenmark, Computer-Controlled Systems, section 2.4). An output that
+        depends directly on an input has the value just before a new command acts, because this is
+        what the controller measures.
         """
         n, m = self.B.shape
         _check_states(n + m * (cycles + 1), cycles, period)
@@ -249,10 +251,10 @@ class LinearModel:
                 f"the model cannot be sampled with a period of {period:g} s: a mode grows by "
                 f"{fastest:.3g} 1/s"
             )
-        on_the_way = m * (cycles + 1)  # the oldest command first: it acts as the cycle begins
+        on_the_way = m * (cycles + 1)  # delayed commands, oldest first: it acts in this cycle
         A, B = np.zeros((n + on_the_way, n + on_the_way)), np.zeros((n + on_the_way, m))
         A[:n, :n], A[:n, n : n + m] = step, full - later
-        effect = np.hstack([A, B])  # the input is the last command of all
+        effect = np.hstack([A, B])  # the new input comes after the delayed commands
         effect[:n, n + m : n + 2 * m] = later
         effect[n:, n + m :] = np.eye(on_the_way)
         C = np.hstack([self.C, self.D, np.zeros((len(self.C), m * cycles))])
@@ -269,7 +271,7 @@ class LinearModel:
         )
 
     def modes(self, below: float = 1.0) -> "pd.DataFrame":
-        """Return the oscillatory modes by frequency.
+        """Return the oscillatory modes in order of frequency.
 
         Parameters
         ----------
@@ -279,9 +281,10 @@ class LinearModel:
         Returns
         -------
         DataFrame
-            Columns ``frequency`` (Hz, undamped: the pole's magnitude), ``zeta`` (damping ratio)
-            and ``states``: the names of the states with participation factors (Pérez-Arriaga,
-            Verghese and Schweppe 1982) of at least a fifth of the largest, largest first.
+            Columns: ``frequency``, the undamped frequency, Hz; ``zeta``, the damping ratio; and
+            ``states``, the names of the states that take part most. Their participation factors
+            (Pérez-Arriaga, Verghese and Schweppe 1982) are at least a fifth of the largest, and the
+            largest comes first.
 
         Examples
         --------
@@ -294,7 +297,7 @@ class LinearModel:
         return mode_table(self._modes(below))
 
     def _modes(self, below: float) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Return the rows of the table of modes: frequency, damping ratio and states of each."""
+        """Return frequency (Hz), damping ratio and most active states of each oscillatory mode."""
         poles, left, right = eigenvectors(self)
         rows = []
         for k, pole in enumerate(poles):
@@ -303,7 +306,7 @@ class LinearModel:
             if not pole.imag > 0 or -pole.real >= below * abs(pole):
                 continue
             if self.period is not None and pole.imag * self.period > np.pi * (1 - 1e-9):
-                continue  # a negative real pole of a sampled model
+                continue  # a negative real pole of a sampled model is no oscillatory mode
             share = np.abs(left[:, k] * right[:, k])
             most = [i for i in np.argsort(-share, kind="stable") if share[i] > 0.2 * share.max()]
             names = tuple(self.states[i] for i in most)
@@ -372,17 +375,17 @@ def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
 
 @lru_cache(maxsize=32)
 def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
-    """Return exp(A t), and the change of the states by a unit input held for the time t."""
+    """Return exp(A t), and the change of the states if each input is 1 for the time t."""
     n, m = model.B.shape
     whole = exponential(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
     return whole[:n, :n], whole[:n, n:]
 
 
 def exponential(A: Matrix) -> Matrix:
-    """Return the exponential of a matrix, or of each of a stack of matrices.
+    """Return the exponential of a matrix, or of each matrix of a stack.
 
-    SciPy's function takes 30 times the CPU time for 25 states on two cores, because its threads
-    wait for each other.
+    SciPy's function is not used: for 25 states on two cores it takes 30 times as much CPU time,
+    because its threads wait for each other.
     """
     found = native.exponential(np.ascontiguousarray(A, float), A.shape[-1])
     return np.frombuffer(found).reshape(A.shape).copy()
@@ -408,15 +411,16 @@ def linearize(
         Name or file of the FMU, as for `simulate`. It must offer Model Exchange and directional
         derivatives.
     parameters : mapping, str or Path, optional
-        As for `simulate`. Start values among the parameters (``init.omega``) and values of
-        inputs (``g_axial``) are the point of linearisation.
+        Parameters, as for `simulate`. Start values (``init.omega``) and values of inputs
+        (``g_axial``) among them define the point of linearisation.
     inputs : str or sequence of str, optional
-        Real inputs by name, a vector by its name; by default all Real inputs.
+        Names of Real inputs or of vectors of inputs; by default all Real inputs.
     outputs : str or sequence of str, optional
-        Real variables by name, a vector by its name (``"omega"``); by default all Real outputs.
+        Names of Real variables or of vectors (``"omega"``); by default all Real outputs.
     all_states : bool
-        Keep states that no output depends on, directly or through other states, such as unused
-        modes and the work done. By default they are left out, which is exact.
+        Keep states on which no output depends, directly or through other states, such as unused
+        modes and the work done. By default these states are left out, which does not change the
+        outputs.
 
     Returns
     -------
@@ -474,7 +478,7 @@ def linearize(
     )
     if not (kept.B.any() or kept.D.any()):
         warnings.warn(
-            f"no input of {fmu.name} has an effect at this point; is the hub held by dry friction? "
+            f"no input of {fmu.name} has an effect at this point; does dry friction hold the hub? "
             "Linearise with friction.model none or viscous, or in motion (init.omega)",
             stacklevel=2,
         )
@@ -492,7 +496,7 @@ def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
 
 
 def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[str]:
-    """Return the names of the given Real variables, or of all that have this causality."""
+    """Return ``names`` as a list of Real variables; by default all that have ``causality``."""
     if names is None:
         return [name for name in fmu.names(causality) if fmu.kind(name) == "Real"]
     problems: list[str] = []

@@ -1,21 +1,22 @@
 """Slosh modes of a tank of any shape, at any tilt, by linear potential flow in three dimensions.
 
-For tanks that are not bodies of revolution or boxes, which ``hubslosh tank`` covers: lying
-cylinders, sectors, tanks under a lateral component of gravity, CAD solids. Needs the extra ``fem``
-(gmsh for the mesh, scikit-fem for the finite elements).
+This module is for tanks that ``hubslosh tank`` does not cover, because they are neither bodies of
+revolution nor boxes: horizontal cylinders, sectors, tanks under a lateral component of gravity, and
+CAD solids. It needs the extra ``fem`` (gmsh for the mesh, scikit-fem for the finite elements).
 
 The liquid Q has the wetted wall W and the free surface F at z = z_F, normal to the specific force.
-n is the normal out of the liquid, λ = ω²/g:
+n is the normal out of the liquid, and λ = ω²/g:
 
     Δφ = 0 in Q,   ∂φ/∂n = 0 on W,   ∂φ/∂z = λ φ on F
     weak:          ∫_Q ∇φ·∇v = λ ∫_F φ v
 
 The tank has six motions j: three displacements and three rotations about O. N_j = n·e_j or n·(e_j ×
-r) is the wall's velocity along n, with the surface as a rigid lid. Ψ_j is the potential with
-∂Ψ_j/∂n = N_j. By Green's identity
+r) is the velocity of the wall along n, where the surface is replaced by a rigid lid. Ψ_j is the
+potential with ∂Ψ_j/∂n = N_j. By Green's identity
 
     B_nj = ∫_F φ_n Ψ_j = (1/λ_n) ∫_(W+F) φ_n N_j,        N_n = ∫_F φ_n²
-    mass matrix of mode n:   ρ λ_n B_nj B_nk/N_n          of the liquid under a lid: ρ ∫ Ψ_j N_k
+    mass matrix of mode n:                     ρ λ_n B_nj B_nk/N_n
+  mass matrix of liquid under a rigid lid:   ρ ∫ Ψ_j N_k
 
 A mode with a displacement, A = (B_n1, B_n2), is a mass m = ρ λ |A|²/N on a pendulum of length 1/λ
 that swings along A/|A|. Its height and its arm about the vertical through O follow from the
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
     from .fmu import Value
 
-# Shapes and their dimensions, m; ``angle`` in degrees.
+# Shapes and the names of their dimensions; ``angle`` is in degrees, all others are in m.
 SHAPES: dict[str, tuple[str, ...]] = {
     "cylinder": ("radius", "height"),
     "horizontal_cylinder": ("radius", "length"),
@@ -51,18 +52,18 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "step": (),
 }
 
-OF_A_MODE = ("mass", "length", "hinge", "wave")  # Columns that are parameters of the FMUs
+OF_A_MODE = ("mass", "length", "hinge", "wave")  # Columns of `modes` that are parameters of FMUs
 
-_MASSLESS = 1e-6  # Part of the liquid's mass below which a mode is one without displacement
-_EQUAL = 3e-4  # Difference of two λ, of their size, that the mesh makes of one
+_MASSLESS = 1e-6  # Slosh mass, as a fraction of the liquid, below which a mode only twists
+_EQUAL = 3e-4  # Relative difference up to which two λ count as equal, because of the mesh's errors
 
 
 @dataclass(frozen=True, eq=False)
 class LiquidModes:
     """Slosh modes of a tank at one fill, as `liquid_modes` returns them.
 
-    All axes have their origin at O of the tank's shape (see `liquid_modes`) and z along the
-    specific force. If the specific force is along the tank's z, these axes are the tank's own axes.
+    The axes have their origin at O of the tank's shape (see `liquid_modes`), and their z axis along
+    the specific force. If the specific force is along the tank's z axis, these are the tank's axes.
 
     Attributes
     ----------
@@ -100,27 +101,27 @@ class LiquidModes:
     error: "pd.DataFrame" = field(repr=False)
 
     def __repr__(self) -> str:
-        """Return the liquid and its first modes."""
+        """Return mass of the liquid, specific force, and the first modes."""
         from .short import rows
 
         return f"LiquidModes of {self.mass:.6g} kg, {self.gravity:.4g} m/s²\n{rows(self.modes)}"
 
     @property
     def modes(self) -> "pd.DataFrame":
-        """Slosh modes as pendulums, a row for each, by frequency.
+        """Slosh modes as pendulums, one in each row, in order of frequency.
 
         Columns: ``frequency`` (Hz); slosh ``mass`` (kg); ``direction`` of the motion of the slosh
-        mass, deg from x towards y, -90 to 90; ``length`` of the pendulum (m); heights of ``bob``
-        and ``hinge`` (m); ``arm``, distance of the line on which the slosh mass moves from the
-        vertical through O (m); ``twist``, inertia about this vertical that the mode moves (kg·m²).
-        A mode that only twists has a mass of about 0; its direction, arm and the heights of slosh
-        mass and hinge are NaN.
+        mass, deg from x towards y, -90 to 90; ``length`` of the pendulum (m); heights ``bob`` of
+        the slosh mass and ``hinge`` of the hinge (m); ``arm``, the distance from the vertical
+        through O to the line on which the slosh mass moves (m); ``twist``, the inertia about this
+        vertical that the mode moves (kg·m²). A mode that only twists has a mass of about 0; its
+        direction, arm and heights are NaN.
         """
         return self.all
 
     @cached_property
     def rest(self) -> dict[str, float]:
-        """Fixed mass, which no mode moves, kg, and its height, m, for motions along x and y.
+        """Fixed mass (kg) and its height (m) for motions of the tank along x and along y.
 
         Keys: ``m_0_x``, ``H_0_x``, ``m_0_y``, ``H_0_y``. The values for x and y differ, because a
         slosh mass that swings only along y belongs to the fixed mass for motions along x.
@@ -135,10 +136,10 @@ class LiquidModes:
         return found
 
     def table(self, direction: str = "y", modes: int = 1) -> "dict[str, Value]":
-        """Return the modes along x or y as ``slosh.table`` of HubSlosh.
+        """Return the modes along x or y as parameters ``slosh.table`` of HubSlosh.
 
-        The tank stands on the hub with this direction tangential and O at the distance ``tank.r``
-        from the axis of the hub.
+        On the hub, this direction of the tank is tangential, and the tank's O is at the distance
+        ``tank.r`` from the axis of the hub.
 
         Parameters
         ----------
@@ -166,18 +167,19 @@ class LiquidModes:
         0.19
         """
         if direction not in ("x", "y"):
-            raise FmuError(f"direction is x or y, not {direction!r}")
+            raise FmuError(f'direction must be "x" or "y", not {direction!r}')
         along = np.abs(_cos(self.all) if direction == "x" else _sin(self.all))
         moving = self.all["mass"].to_numpy() > _MASSLESS * self.mass
         mixed = moving & (along > 1e-3) & (along < 1 - 1e-3)
         if mixed.any():
             which = ", ".join(str(n + 1) for n in np.flatnonzero(mixed))
             raise FmuError(
-                f"modes {which} move along x and y at once; HubSlosh's table has one axis"
+                f"modes {which} move along x and y at once, but the table of HubSlosh has only one "
+                "axis"
             )
         chosen = self.all[moving & (along > 0.5)]
         if not 1 <= modes <= min(len(chosen), 10):
-            raise FmuError(f"modes is 1 to {min(len(chosen), 10)} here, not {modes!r}")
+            raise FmuError(f"modes must be 1 to {min(len(chosen), 10)} here, not {modes!r}")
         values: dict[str, Value] = {
             "slosh.source": "table",
             "slosh.modes": modes,
@@ -200,12 +202,13 @@ class LiquidModes:
         modes: int | None = None,
         position: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> "dict[str, Value]":
-        """Return the liquid as a tank of an FMU, for `simulate`, `Loop` and others.
+        """Return the parameters of an FMU's tank with this liquid, for example for `simulate`.
 
         Each mode is planar with its own direction, and its damping ratio is 0. The tank's axis
-        passes through the centre of mass of the liquid; the slosh masses are at r_n from this
-        centre. A rigid body completes mass m, centre and inertia J of the liquid under a rigid
-        lid::
+        passes through the centre of mass of the liquid; r_n is the position of slosh mass m_n from
+        this centre. The fixed mass m_0 is a rigid body at r_0 with the inertia J_0. It is chosen so
+        that fixed mass and slosh masses together have the mass m, the centre of mass and the
+        inertia J of the liquid under a rigid lid::
 
             m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
             J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)
@@ -242,13 +245,13 @@ class LiquidModes:
         (2, 142)
         """
         if model not in SIX_AXES:
-            raise FmuError(f"parameters are for {' and '.join(SIX_AXES)}, not for {model!r}")
+            raise FmuError(f"model must be {' or '.join(SIX_AXES)}, not {model!r}")
         name, place = prefix_of(model, number), vector(position, 3, "position")
         moving = self.all[self.all["mass"] > _MASSLESS * self.mass]
         most = min(3, len(moving))
         count = most if modes is None else modes
         if not (isinstance(count, int) and 1 <= count <= most):
-            raise FmuError(f"modes is 1 to {most} here, not {modes!r}")
+            raise FmuError(f"modes must be 1 to {most} here, not {modes!r}")
         kept = moving.sort_values("mass", ascending=False, kind="stable").head(count)
         center = np.array(self.center)
         turn = np.radians(kept["direction"].to_numpy())
@@ -295,7 +298,7 @@ def liquid_modes(
     specific_force: float | Sequence[float] = 9.80665,
     resolution: int = 16,
 ) -> LiquidModes:
-    """Find the slosh modes of a tank of any shape by finite elements in three dimensions.
+    """Compute the slosh modes of a tank of any shape by finite elements in three dimensions.
 
     A call takes 5 to 60 s. `tank` is faster for bodies of revolution and boxes along their axis.
     Needs ``pip install hubslosh[fem]``.
@@ -349,11 +352,11 @@ def liquid_modes(
     force = np.atleast_1d(array(specific_force))
     force = np.array([0.0, 0.0, force[0]]) if force.shape == (1,) else force
     if force.shape != (3,) or not np.isfinite(force).all() or not np.linalg.norm(force) > 0:
-        raise FmuError("specific_force is a number or three, m/s², and not 0")
+        raise FmuError("specific_force must be one number or three numbers, m/s², and not 0")
     if not (isinstance(resolution, int) and 4 <= resolution <= 40):
-        raise FmuError(f"resolution is 4 to 40 elements, not {resolution!r}")
+        raise FmuError(f"resolution must be 4 to 40 elements, not {resolution!r}")
     if not (isinstance(modes, int) and 1 <= modes <= 40):
-        raise FmuError(f"modes is 1 to 40, not {modes!r}")
+        raise FmuError(f"modes must be 1 to 40, not {modes!r}")
     refuse(not_positive("density", density, "kg/m³"))
     gravity = float(np.linalg.norm(force))
     tank = _Tank(name, size, _level(force))
@@ -375,7 +378,9 @@ def liquid_modes(
 
 def _check_shape(shape: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     if not (isinstance(shape, Mapping) and len(shape) == 1 and next(iter(shape)) in SHAPES):
-        raise FmuError(f"shape is one of {', '.join(SHAPES)} with its dimensions, not {shape!r}")
+        raise FmuError(
+            f"shape must be one of {', '.join(SHAPES)} with its dimensions, not {shape!r}"
+        )
     [(name, given)] = shape.items()
     if name == "step":
         if not Path(given).is_file():
@@ -398,23 +403,23 @@ def _check_shape(shape: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
 
 
 def _level(force: np.ndarray) -> np.ndarray:
-    """Return the rotation that takes the specific force to z, by the shortest way."""
+    """Return the matrix of the shortest rotation that brings the specific force to the z axis."""
     a = force / np.linalg.norm(force)
     axis = np.cross(a, [0.0, 0.0, 1.0])
     s, c = np.linalg.norm(axis), a[2]
     if s < 1e-15:
         return np.diag([1.0, np.sign(c), np.sign(c)])
-    k = np.cross(np.eye(3), axis / s)  # k v = v × axis; minus it turns about the axis
+    k = np.cross(np.eye(3), axis / s)  # k v = v × axis, so that -k turns about the axis
     return np.eye(3) - s * k + (1 - c) * k @ k
 
 
 def _heights(
     occ: Any, solid: int, name: str, size: Mapping[str, Any], level: np.ndarray
 ) -> tuple[float, float]:
-    """Return the heights of the lowest and the highest point of the turned tank.
+    """Return the heights of the lowest and the highest point of the rotated tank, m.
 
-    They follow from corners and rims, because the bounding boxes of the geometry's kernel are
-    larger than curved surfaces. Of a file they are what there is.
+    They are computed from corners and rims, because OpenCASCADE's bounding boxes of curved surfaces
+    are too large. For a CAD file, its bounding box is used all the same.
     """
     if name == "sphere":
         center = level @ [0, 0, size["radius"]]
@@ -427,7 +432,8 @@ def _heights(
         rim = np.array([[a, a, -a, -a], [b, -b, b, -b]])
     else:
         half = np.radians(size.get("angle", 360)) / 2
-        turn = np.linspace(-half, half, 20001)  # a chord is 1e-8 of the radius off the arc
+        # with so many points, chords deviate from the arc by at most 1e-8 of the radius
+        turn = np.linspace(-half, half, 20001)
         circle = np.array([np.cos(turn), np.sin(turn)])
         rim = np.hstack([size["radius"] * circle, size.get("inner_radius", 0) * circle])
     if name == "horizontal_cylinder":
@@ -446,7 +452,8 @@ def _solid(occ: Any, name: str, size: Mapping[str, Any]) -> int:
     if name == "horizontal_cylinder":
         radius, length = size["radius"], size["length"]
         tag = occ.addCylinder(-length / 2, 0, radius, length, 0, 0, radius)
-        # its seam out of the surface of a half full tank, where Boolean operations fail
+        # turn the seam of the cylinder away from the surface of a half-full tank, because Boolean
+        # operations fail if the seam lies in the surface
         occ.rotate([(3, tag)], 0, 0, radius, 1, 0, 0, 0.7)
         return int(tag)
     if name == "sphere":
@@ -477,18 +484,18 @@ class _Tank(NamedTuple):
 
     @contextmanager
     def solid(self) -> "Iterator[tuple[Any, int, Sequence[float], float]]":
-        """Return gmsh, the rotated inside of the tank as a solid, its bounding box and its volume.
+        """Yield gmsh, the rotated interior of the tank as a solid, its bounding box and its volume.
 
-        The volume is that before the rotation, which takes the exact volume of round shapes from
-        the geometry's kernel.
+        The volume is computed before the rotation, because OpenCASCADE computes the volume of round
+        shapes exactly only if they are not rotated.
         """
         try:
             import gmsh
-            import skfem  # noqa: F401, of the same extra
+            import skfem  # noqa: F401, part of the same extra
         except (ImportError, OSError) as error:
             raise FmuError(
-                f"{error}: modes in three dimensions need two packages: pip install gmsh "
-                "scikit-fem (gmsh also needs the system's libGLU: Debian's libglu1-mesa)"
+                f"{error}: slosh modes in three dimensions need two packages: pip install gmsh "
+                "scikit-fem (gmsh also needs the system library libGLU, in Debian libglu1-mesa)"
             ) from None
 
         gmsh.initialize(interruptible=False)
@@ -505,8 +512,8 @@ class _Tank(NamedTuple):
             yield gmsh, solid, occ.getBoundingBox(3, solid), volume
         except FmuError:
             raise
-        except Exception as error:  # gmsh raises what it is
-            raise FmuError(f"no mesh of the liquid: {error}") from None
+        except Exception as error:  # gmsh raises plain exceptions
+            raise FmuError(f"the liquid cannot be meshed: {error}") from None
         finally:
             gmsh.finalize()
 
@@ -514,20 +521,21 @@ class _Tank(NamedTuple):
 def _on_a_mesh(
     tank: _Tank, surface: float | None, elements: float, do: "Callable[[Any], Any]"
 ) -> Any:
-    """Call ``do`` with a mesh, and with finer meshes if elements are too distorted."""
+    """Call ``do`` with a mesh; repeat with finer meshes while elements are too distorted."""
     for again in range(4):
         mesh = _mesh(tank, surface, elements * 1.05**again)
         try:
             return do(mesh)
-        except Exception as error:  # scikit-fem's, of an element that is bent too much
+        except Exception as error:  # scikit-fem raises it for an element that is too distorted
             reason = error
     raise FmuError(f"no usable mesh ({reason}); try another resolution")
 
 
 def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
-    """Return a mesh of the liquid of curved tetrahedra, elements across its surface.
+    """Return a mesh of curved tetrahedra of the liquid below the height ``surface``.
 
-    surface: its height; None: of the whole tank.
+    ``elements`` is the number of elements across the surface. If ``surface`` is None, the whole
+    tank is meshed.
     """
     from skfem import MeshTet2
 
@@ -541,7 +549,7 @@ def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
             faces = gmsh.model.getEntities(2)
             flat = [tag for _, tag in faces if _is_at(gmsh, tag, surface, box)]
             if not flat:
-                raise FmuError("no free surface: the tank is empty or full")
+                raise FmuError("there is no free surface: the tank is empty or full")
             extent = np.array([gmsh.model.occ.getBoundingBox(2, tag) for tag in flat])
         across = float(min(extent[:, 3].max() - extent[:, 0].min(),
                            extent[:, 4].max() - extent[:, 1].min()))  # fmt: skip
@@ -552,8 +560,8 @@ def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
         index = np.zeros(int(tags.max()) + 1, int)
         index[tags] = np.arange(len(tags))
         kinds, _, nodes = gmsh.model.mesh.getElements(3, liquid)
-        cells = index[nodes[list(kinds).index(11)].reshape(-1, 10)]  # 11: ten nodes
-    # gmsh's order of the middle nodes, as scikit-fem has it: 01, 12, 02, 03, 13, 23
+        cells = index[nodes[list(kinds).index(11)].reshape(-1, 10)]  # 11: tetrahedra of 10 nodes
+    # put gmsh's nodes on the edges in the order of scikit-fem: 01, 12, 02, 03, 13, 23
     cells = cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
     used, cells = np.unique(cells, return_inverse=True)
     locations = np.ascontiguousarray(points.reshape(-1, 3)[used].T)
@@ -561,22 +569,22 @@ def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
 
 
 def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
-    """Return the height of the free surface.
+    """Return the height of the free surface, m.
 
-    Volumes are those of meshes and of upright tanks: the geometry's kernel has those of cut or
-    rotated round tanks up to a hundredth wrong, and is good for a first guess.
+    OpenCASCADE's volumes of cut or rotated round tanks are wrong by up to a hundredth, so they only
+    give a first guess. Then the volume of the mesh is compared with the volume of the upright tank.
     """
     part = parse_share(fill)
     if isinstance(fill, str) and fill.strip().endswith("%") and not (part and part < 1):
-        raise FmuError(f"fill is between 0% and 100% of the volume, not {fill!r}")
+        raise FmuError(f"fill must be between 0% and 100% of the volume, not {fill!r}")
     with tank.solid() as (gmsh, solid, box, whole):
         occ = gmsh.model.occ
         low, high = _heights(occ, solid, tank.name, tank.size, tank.level)
         if part is None:
             if isinstance(fill, bool | str) or not 0 < float(fill) < high - low:
                 raise FmuError(
-                    f"fill is a height between 0 and {high - low:.6g} m, or a text like "
-                    f'"60%", not {fill!r}'
+                    f"fill must be a height between 0 and {high - low:.6g} m, or a share of the "
+                    f'volume, such as "60%", not {fill!r}'
                 )
             return low + float(fill)
 
@@ -599,7 +607,7 @@ def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
         step = (part * whole - volume) / area
         surface += step
         if abs(step) < 1e-4 * (high - low):
-            break  # what is left is a hundredth of this step, or less
+            break  # the remaining error is at most a hundredth of this step
     return surface
 
 
@@ -611,7 +619,7 @@ def _volume(mesh: Any) -> float:
 
 
 def _on_surface(mesh: Any, surface: float) -> np.ndarray:
-    """Return the facets at a height."""
+    """Return the boundary facets of a mesh that lie in the free surface."""
     outside = mesh.boundary_facets()
     heights = mesh.p[2, mesh.facets[:, outside]]
     tall = mesh.p[2].max() - mesh.p[2].min()
@@ -619,7 +627,10 @@ def _on_surface(mesh: Any, surface: float) -> np.ndarray:
 
 
 def _volume_and_area(surface: float, mesh: Any) -> tuple[float, float]:
-    """Return a liquid's volume and its free surface's area without a strip at the rim."""
+    """Return a mesh's volume, m³, and the area of its free surface, m².
+
+    The facets count as plane triangles, so that the area lacks a narrow strip at the rim.
+    """
     a, b, c = (mesh.p[:2, corner] for corner in mesh.facets[:, _on_surface(mesh, surface)])
     (x, y), (u, v) = b - a, c - a
     return _volume(mesh), float(np.abs(x * v - y * u).sum() / 2)
@@ -633,7 +644,10 @@ def _cut(occ: Any, solid: int, box: Sequence[float], surface: float) -> int:
     )
     left, _ = occ.cut([(3, solid)], [(3, lid)])
     if len(left) != 1:
-        raise FmuError(f"the liquid is in {len(left)} parts that do not touch; give each as a tank")
+        raise FmuError(
+            f"the liquid is in {len(left)} parts that do not touch; give each part as a tank of "
+            "its own"
+        )
     return int(left[0][1])
 
 
@@ -647,10 +661,10 @@ def _is_at(gmsh: Any, tag: int, surface: float, box: Sequence[float]) -> bool:
 
 
 def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
-    """Set the element sizes: finest at the edge of the free surface, and growing away from it.
+    """Set the element sizes: smallest at the edge of the free surface, and growing away from it.
 
-    The modes decay with the distance from the free surface. Without a free surface all elements
-    have one size.
+    Larger elements suffice there, because the modes decay with the distance from the free surface.
+    Without a free surface all elements have the same size.
     """
     fields = gmsh.model.mesh.field
     if flat:
@@ -702,14 +716,14 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
         """
         if j < 3:
             return lambda w: w.n[j]
-        a, b = (j - 2) % 3, (j - 1) % 3  # e_j × r has the components r_b, −r_a along b, a
+        a, b = (j - 2) % 3, (j - 1) % 3  # e_j × r has the component r_a along b and −r_b along a
         return lambda w: w.n[b] * w.x[a] - w.n[a] * w.x[b]
 
     normal = [along(j) for j in range(6)]
     flux = [LinearForm(lambda v, w, f=f: v * f(w)).assemble(wet) for f in normal]
     s, m = laplace.assemble(volume).tocsc(), mass.assemble(lid).tocsc()
 
-    # M x = μ (S + M) x, μ = 1/(1 + λ): the constant, μ = 1, comes first
+    # solve M x = μ (S + M) x, μ = 1/(1 + λ); the first solution, μ = 1, is a constant potential
     both = splu((s + m).tocsc())
     size = s.shape[0]
     inverse = LinearOperator((size, size), matvec=both.solve)
@@ -727,7 +741,7 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
         for lam, bn, nn in zip(lambdas, b, norm, strict=True)
     ]
     table = pd.DataFrame(rows)
-    # elevation at the surface's highest place per angle of the pendulum, a_n = A φ(wall)/N
+    # wave height at the highest place of the surface per angle of the pendulum, A φ(wall)/N
     on_lid = np.unique(volume.get_dofs(facets[1]).flatten())
     crest = np.abs(phi[on_lid]).max(axis=0)
     table["wave"] = np.hypot(b[:, 0], b[:, 1]) * crest / norm
@@ -735,7 +749,7 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
     table.attrs["units"] = {"frequency": "Hz", "mass": "kg", "twist": "kg.m2", "direction": "deg",
                             "wave": "m/rad", **units}  # fmt: skip
 
-    # Ψ of the rotations: S Ψ = ∫ v N, known up to a constant; one value is taken as 0
+    # Ψ of the rotations solves S Ψ = ∫ v N up to a constant, so the first value is set to 0
     psi = np.zeros((3, size))
     held = splu(s[1:, 1:].tocsc())
     for k in range(3):
@@ -769,7 +783,7 @@ def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.nd
 def _mode(
     density: float, gravity: float, lam: float, b: np.ndarray, norm: float, liquid: float
 ) -> dict[str, float]:
-    """Return the equivalent pendulum of a mode; ``b``: its coupling with the tank's six motions."""
+    """Return the equivalent pendulum of a mode; ``b`` couples it with the tank's six motions."""
     a = np.hypot(b[0], b[1])
     mass = density * lam * a**2 / norm
     twist = density * lam * b[5] ** 2 / norm
@@ -778,10 +792,11 @@ def _mode(
         nothing = dict.fromkeys(("direction", "bob", "hinge", "arm"), np.nan)
         return {**row, **nothing, "twist": twist}
     e = b[:2] / a
-    # one of two opposite directions; along y the first component is the mesh's chance
+    # choose one of two opposite directions by the sign of the x component; of a motion along y by
+    # the sign of the y component, because the x component is an error of the mesh
     if e[1] < 0 if abs(e[0]) < 1e-3 else e[0] < 0:
         e, a = -e, -a
-    # angular momentum about O of a momentum along e at (p, H): (−H e_y, H e_x, p_x e_y − p_y e_x)
+    # a momentum e at (p, H) has the angular momentum (−H e_y, H e_x, p_x e_y − p_y e_x) about O
     bob = (b[4] * e[0] - b[3] * e[1]) / a
     return {
         **row, "direction": float(np.degrees(np.arctan2(e[1], e[0]))), "bob": bob,

@@ -44,8 +44,8 @@ from .wheels import (
 )
 from .wheels import TORQUE as BODY_TORQUE
 
-# Result of a controller in a cycle: the command, or one for each of several, from time (s) and
-# measurements.
+# Controller function: from time (s) and measurements to the command, or to a sequence with one
+# number for each command.
 Law = Callable[[float, NDArray[np.float64]], Any]
 
 QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))  # Attitude of Spacecraft, scalar first
@@ -76,18 +76,18 @@ class Loop:
         Inputs of the FMU that the controller commands. A command is added to the value that the
         parameters give its input, for example to the thrust of a craft.
     latency : int
-        Delay from measurement to command in whole cycles.
+        Delay from measurement to command, whole cycles.
     delay : float
         Delay in addition to ``latency``, s; it need not be a whole number of cycles. Each command
-        is held until the next command acts, which a controller designed in continuous time sees as
-        half a cycle of delay more.
+        is held until the next command acts; for a controller designed in continuous time, this has
+        the effect of half a cycle of additional delay.
     wheels : mapping of Wheel
         Reaction wheels by name, for Spacecraft; `Craft.loop` passes the wheels of the craft. The
         torques of the wheels can be commanded: ``"z.torque"`` is the torque of wheel z on the
         craft, N·m, and ``"wheels"`` stands for the torques of all wheels in order.
     tanks : tuple of str
-        Names of the craft's tanks, with which `margins` names slosh modes; `Craft.loop` passes
-        them.
+        Names of the craft's tanks, which `margins` uses in the names of slosh modes; `Craft.loop`
+        passes these names.
 
     Examples
     --------
@@ -109,7 +109,7 @@ class Loop:
     tanks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        """Return the loop in four lines."""
+        """Return a description of the loop in four lines."""
         measured, command = (names_of(of, "", []) for of in (self.measured, self.command))
         given = self.parameters
         known = (
@@ -121,7 +121,7 @@ class Loop:
         late = f"{self.delay:g} s" + (f" and {self.latency} cycles" if self.latency else "")
         return (
             f"Loop around {Path(self.model).stem} with {known}\n"
-            f"  controller: {law}, every {self.period} s, {late} late\n"
+            f"  controller: {law}, every {self.period} s, delay {late}\n"
             f"  measured: {names(measured)}\n"
             f"  command: {names(command)}"
         )
@@ -132,7 +132,7 @@ class Loop:
         Returns
         -------
         list of str
-            Sentences; none if all is right.
+            One sentence for each problem; empty if there is none.
 
         Examples
         --------
@@ -159,7 +159,7 @@ class Loop:
             if name in turned:
                 continue
             if turned and name in MOMENTUM:
-                found.append(f"the command {name} is what the wheels set: leave it out")
+                found.append(f"the command {name} is set by the reaction wheels: leave it out")
             elif name not in allowed:
                 hint = did_you_mean(name, allowed)
                 found.append(
@@ -218,7 +218,7 @@ class Loop:
         return units_of(torque_names(self.wheels))
 
     def _without_wheels(self) -> "Loop":
-        """Return the loop whose wheels' torques act as torque on the craft.
+        """Return an equivalent loop without wheels, whose controller commands the craft's torque.
 
         It has the same margins if the craft does not turn at the operating point.
         """
@@ -284,7 +284,7 @@ class Loop:
         ----------
         parameters : mapping, optional
             Further parameters, such as ``{"friction.model": "viscous"}``, which override the
-            loop's.
+            parameters of the loop.
 
         Returns
         -------
@@ -315,7 +315,8 @@ class Loop:
         inputs = list(dict.fromkeys([*plain, *BODY_TORQUE, *MOMENTUM]))
         model = linearize(self.model, every, inputs, measured, all_states=all_states)
         torque, h = ([inputs.index(name) for name in names] for names in (BODY_TORQUE, MOMENTUM))
-        # the momentum of a wheel acts in a craft that turns; its speed is then a further state
+        # in a craft that turns, the momentum of a wheel causes a gyroscopic torque, so that the
+        # speed of the wheel is a further state
         speeds, by_speed = [], []
         for name, wheel in turned.items():
             column = np.vstack([model.B, model.D])[:, h] @ wheel.direction * wheel.inertia
@@ -348,9 +349,9 @@ class Loop:
         Parameters
         ----------
         parameters : mapping, optional
-            Further parameters, which override the loop's.
+            Further parameters, which override the parameters of the loop.
         more_delay : float
-            Delay in addition to the loop's, s.
+            Delay in addition to the delay of the loop, s.
 
         Returns
         -------
@@ -374,7 +375,7 @@ class Loop:
 
     def _gain(self, plant: LinearModel, K: LinearModel, more_delay: float = 0.0) -> LinearModel:
         cycles, rest = split_delay(self.delay + more_delay, self.period)
-        # measured as in the simulation: before the command changes
+        # the simulation, too, measures outputs just before the command changes
         P = plant._delayed(self.period, cycles + int(self.latency), rest)
         return replace(P._then(K, "controller."), outputs=plant.inputs, period=self.period)
 
@@ -396,7 +397,7 @@ class Loop:
         stop : float
             Time at which the last whole cycle ends, s.
         parameters : mapping, optional
-            Further parameters, which override the loop's.
+            Further parameters, which override the parameters of the loop.
         reference : DataFrame, optional
             Reference of a linear controller, as for `closed_loop`.
         inputs : DataFrame, optional
@@ -407,7 +408,7 @@ class Loop:
         substeps : int
             Rows of the result per cycle.
         tolerance : float, optional
-            Relative tolerance of the FMU's solver; by default its own choice.
+            Relative tolerance of the FMU's solver; by default the FMU chooses it.
 
         Returns
         -------
@@ -435,14 +436,14 @@ class Loop:
         measured, command = self.names
         if isinstance(inputs, pd.DataFrame):
             problems += [
-                f"{name} is the controller's command; inputs may not have it"
+                f"inputs has {name}, which the controller commands: leave it out"
                 for name in command
                 if name in inputs
             ]
         turned = {} if problems else self._turned
         plain = [name for name in command if name not in turned]
         problems += [
-            f"inputs has {name}, which the wheels set: leave it out"
+            f"inputs has {name}, which the reaction wheels set: leave it out"
             for name in MOMENTUM
             if turned and name in histories
         ]
@@ -478,7 +479,7 @@ class Loop:
         )  # fmt: skip
 
         def computed() -> dict[str, NDArray[np.float64]]:
-            """Return the commands, and torques and speeds of the wheels, after the run."""
+            """Return the histories of commands, wheel torques and wheel speeds after the run."""
             commands = feedback.commands
             commands[: feedback.latency * parts + switch] = list(constants.values())
             commands[-1] = commands[-2]
@@ -508,8 +509,8 @@ class Loop:
     def _momentum(self, fmu: Fmu, parameters: Parameters) -> tuple[float, float, float]:
         """Return the angular momentum of the wheels at the start of a run, N·m·s.
 
-        It is what the parameters say, which differs from that of the wheels if they have a further
-        momentum.
+        ``parameters`` override the momentum that follows from the speeds of the wheels, for example
+        if they contain the momentum of further wheels.
         """
         if not self._turned:
             return (0.0, 0.0, 0.0)
@@ -527,8 +528,8 @@ class Loop:
     ) -> tuple[Any, list[str]]:
         """Return the controller for a run, and the names of the variables that it measures.
 
-        The commands that the controller returns contain the ``constants``, which are named by the
-        commands in order.
+        ``constants`` has the constant that the controller adds to each command, by the name of the
+        command and in the order of the commands.
         """
         model, command = self.linear(), list(constants)
         if model is None:
@@ -540,7 +541,7 @@ class Loop:
             return _checked_law(self.controller, constants), measured
         table = _reference(reference, measured, command)
         attitude = all(name in table for name in QUATERNION)
-        # the scalar part, which a controller seldom has, is measured as well
+        # the attitude error needs the scalar part, which a controller seldom measures
         seen = measured + [n for n in QUATERNION if attitude and n not in measured]
         if attitude and any(n not in Fmu.open(self.model).variables for n in QUATERNION):
             raise FmuError(f"{Path(self.model).name} has no quaternion q[1], …, q[4]")
@@ -580,7 +581,7 @@ def closed_loop(
     """Simulate an FMU under a sampled controller from time 0 on.
 
     In every cycle the controller receives the values of ``measured``. Its command acts ``delay``
-    seconds and ``latency`` cycles later and is held for one cycle; until the first one acts,
+    seconds and ``latency`` cycles later and is held for one cycle. Until the first command acts,
     commands are 0. A command is added to the value that ``parameters`` give its input. With a
     linear controller the whole loop is compiled code; a function is called once per cycle.
 
@@ -601,30 +602,32 @@ def closed_loop(
     command : str or sequence of str
         Commanded inputs, as for `Loop`.
     latency : int
-        Delay from measurement to command in whole cycles.
+        Delay from measurement to command, whole cycles.
     delay : float
-        Further delay, s.
+        Delay in addition to ``latency``, s.
     reference : DataFrame, optional
-        For a linear controller: a table with the column ``time`` (s) and any of ``measured``
-        (reference values, otherwise 0) and of the commands (added to them: feedforward), with
-        straight lines between the rows. With the four columns q[1], …, q[4] the error of q[2],
-        q[3], q[4] is the vector part of q⁻¹ ⊗ q_reference: half the rotation that is left about
-        each body axis.
+        For a linear controller: a table with the column ``time`` (s). A column with the name of a
+        measured variable has its reference, which otherwise is 0; a column with the name of a
+        command is added to this command as feedforward. Values between the rows are interpolated
+        linearly. If the table has the four columns q[1], …, q[4], the error of q[2], q[3], q[4] is
+        the vector part of q⁻¹ ⊗ q_reference: about half the remaining rotation about each body
+        axis.
     inputs : DataFrame, optional
-        Histories of other inputs, as for `simulate`, with straight lines between the rows.
+        Histories of other inputs, as for `simulate`, interpolated linearly between the rows.
     outputs : str or sequence of str, optional
         Variables to record, as for `simulate`.
     substeps : int
         Rows of the result per cycle.
     tolerance : float, optional
-        Relative tolerance of the FMU's solver; by default its own choice.
+        Relative tolerance of the FMU's solver; by default the FMU chooses it.
 
     Returns
     -------
     Run
-        A table with the columns ``time``, the commanded inputs (as they are from this time on),
-        the inputs and ``outputs``. Units are in ``.attrs["units"]``. ``.out_of_range`` says which
-        tanks left the range of their model, why, when first, and for which share of the time.
+        A table with the columns ``time``, the commanded inputs (values from this time on), the
+        inputs and ``outputs``. Units are in ``.attrs["units"]``. ``.out_of_range`` lists the tanks
+        that left the range of their model, with the reason, the first time, and the share of the
+        time.
 
     Raises
     ------
@@ -653,10 +656,11 @@ def _repeated(names: list[str]) -> list[str]:
 def _points(
     grid: NDArray[np.float64], substeps: int, period: float, rest: float
 ) -> tuple[NDArray[np.float64], int, NDArray[np.bool_] | None]:
-    """Return the communication points of a run.
+    """Return the communication points of a run, s.
 
-    Also returned are the index in each cycle at which a command begins to act, and the points that
-    are rows of the result (None: all).
+    Also return the index of the point in each cycle at which a command begins to act, and a mask of
+    the points that are rows of the result (None if all are). ``rest`` is the delay in seconds
+    beyond whole cycles.
     """
     place = rest / period * substeps
     nearest = round(place)
@@ -673,7 +677,7 @@ def _points(
 def _checked_law(
     law: Law, constants: dict[str, float]
 ) -> Callable[[int, float, list[float]], list[float]]:
-    """Return the controller function with a check of its result plus ``constants``."""
+    """Return a function that calls the controller, checks its result and adds ``constants``."""
     command, added = list(constants), np.array(list(constants.values()))
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
@@ -694,7 +698,7 @@ def _checked_law(
 def _reference(
     reference: pd.DataFrame | None, measured: list[str], command: list[str]
 ) -> dict[str, History]:
-    """Return the reference histories by the names of their columns."""
+    """Return the history of each column of the reference, by name."""
     if reference is None:
         return {}
     allowed = [*measured, *command, *QUATERNION]
@@ -706,7 +710,7 @@ def _reference(
     problems = []
     time = reference["time"].to_numpy(float)
     if len(time) < 2 or not np.isfinite(time).all() or (np.diff(time) < 0).any():
-        problems.append("time in reference must be two finite numbers or more that grow")
+        problems.append("time in reference must be two or more finite numbers in ascending order")
     histories = {}
     for name in reference.columns:
         if name == "time":
@@ -779,9 +783,10 @@ def _tustin(model: LinearModel, period: float) -> LinearModel:
 def _bilinear(
     given: tuple[tuple[tuple[int, ...], bytes], ...], period: float
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return matrices discretised by scipy; each is given as its shape and bytes.
+    """Return the matrices of a system discretised by SciPy; each is given as shape and bytes.
 
-    Its threads wait: on two cores a call can take as long as all margins of a loop.
+    Results are cached, because the threads of SciPy wait for each other: on two cores a call can
+    take as long as all margins of a loop.
     """
     from scipy.signal import cont2discrete
 
@@ -790,12 +795,12 @@ def _bilinear(
 
 
 def _from_control(system: Any) -> LinearModel:
-    """Return a system of python-control; period None is continuous time."""
+    """Return a system of python-control as a `LinearModel`."""
     import control
 
     try:
         state_space = control.ss(system)
-    except Exception as error:  # of several kinds
+    except Exception as error:  # python-control raises several types
         raise FmuError(
             "the controller has no state space (an improper transfer function, such as s, has "
             f"none): {error}"

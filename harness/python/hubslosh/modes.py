@@ -1,4 +1,4 @@
-"""Number of slosh modes that a model needs: the force's error against the number of modes."""
+"""Number of slosh modes that a model needs: error of the slosh force over the number of modes."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from .simulation import parameters_of
 
 Vector = NDArray[np.float64]
 
-# Error limits for which `mode_errors` states the number of modes, as the thesis does (4.2.1).
+# Errors for which `mode_errors` returns the number of modes, as in Rubaga's thesis (section 4.2.1).
 TOLERANCES = (0.05, 0.01)
 
 
@@ -50,8 +50,8 @@ def mode_errors(
 ) -> pd.DataFrame:
     """Return the error of the slosh force on HubSlosh's tank for each number of modes.
 
-    The reference is the force of all ``slosh.modes``. An impulse excites every frequency equally;
-    a control loop does not, so use the column ``band`` for loops.
+    The reference is the force of all ``slosh.modes``. An impulse excites all frequencies equally,
+    but a control loop excites only its band, so use the column ``band`` for loops.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def mode_errors(
     Raises
     ------
     FmuError
-        If no mode moves, or a parameter is refused.
+        If the liquid cannot slosh, or a parameter is refused.
 
     Examples
     --------
@@ -91,15 +91,15 @@ def mode_errors(
         (liquid,) = plant.get(["tank.m_liq"])
     masses, frequencies, zetas = np.array(values).reshape(3, count)
     if not (masses > 0).all() or not (frequencies > 0).all():
-        raise FmuError("no mode moves: slosh.model is frozen, or g_axial is 0")
+        raise FmuError("the liquid cannot slosh: slosh.model is frozen, or g_axial is 0")
     omegas = 2 * np.pi * frequencies
     below = 1.5 * frequencies[0] if below is None else below
     if not below > 0:
         raise FmuError(f"below={below} (allowed: above 0)")
-    # sixty points in the fastest period, twenty periods of the slowest
+    # 60 points in the period of the fastest mode, over 20 periods of the slowest mode
     time = np.arange(0, 20 / frequencies[0], 1 / (60 * frequencies[-1]))
     forces = impulse(masses, omegas, zetas, time)
-    # the peak of a mode is 2 zeta wide: ten points in it
+    # a resonance peak has the relative width 2 zeta, which the step of 0.2 zeta divides into ten
     peaks = [
         np.linspace(f * (1 - 5 * z), f * (1 + 5 * z), 51)
         for f, z in zip(frequencies, zetas, strict=True)
@@ -108,7 +108,8 @@ def mode_errors(
     grid = grid[(grid >= 0) & (grid <= below)]
     whole = forces.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        # what is left out moves with the tank; without damping a mode in the band makes it infinite
+        # A mode that is left out counts as liquid that moves with the tank. The error is infinite
+        # at the frequency of an undamped mode.
         lacks = mode_responses(masses, omegas, zetas, grid) + masses[:, None]
     lacks[~np.isfinite(lacks)] = np.inf
     rows = []

@@ -1,4 +1,4 @@
-"""The compiled half of this package (``harness/native``), in a wheel or in Cargo's folder."""
+"""The compiled part of this package (``harness/native``), from the wheel or from Cargo's folder."""
 
 import os
 import sys
@@ -17,12 +17,12 @@ def source_tree() -> Path | None:
 
 
 def _built() -> Any:
-    """Load the library that ``cargo build`` has made."""
+    """Load the library that ``cargo build`` has built."""
     name = {"win32": "hubslosh_native.dll", "darwin": "libhubslosh_native.dylib"}
     file = name.get(sys.platform, "libhubslosh_native.so")
     path = _ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / file
     if not path.is_file():
-        raise ImportError(f"{path} is missing: cargo build --release -p hubslosh-native makes it")
+        raise ImportError(f"{path} is missing: cargo build --release -p hubslosh-native builds it")
     loader = ExtensionFileLoader(f"{__package__}._native", str(path))
     module = module_from_spec(spec_from_loader(loader.name, loader))
     loader.exec_module(module)

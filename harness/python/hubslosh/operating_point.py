@@ -1,7 +1,7 @@
-"""The operating point of Spacecraft: its thrust acts through the centre of mass, as after trimming.
+"""The trimmed operating point of Spacecraft, at which the thrust acts through the centre of mass.
 
-Otherwise the craft would turn faster and faster, and a linear model would hold only at its start.
-Appendages are deformed as the steady thrust deforms them, so that they rest.
+Otherwise the craft would turn faster and faster, and a linear model would be valid only at the
+start. Appendages have the deflection that the steady thrust causes, so that they do not vibrate.
 """
 
 import warnings
@@ -21,7 +21,8 @@ from .quantities import ModeQuantity, Modes
 
 Vector = NDArray[np.float64]
 
-# Angular acceleration that counts as none, rad/s²: 0.03° in 100 s. Rounding leaves 1e-17.
+# Largest angular acceleration that counts as 0, rad/s². It turns the craft by 0.03° in 100 s;
+# rounding errors are about 1e-17 rad/s².
 LEFT = 1e-7
 
 
@@ -36,8 +37,8 @@ class OperatingPoint:
     parameters : dict
         Parameters of the FMU at this point.
     shift : ndarray, shape (3,)
-        Displacement of the origin O, where the thrust acts, at right angles to the thrust, which
-        brings the centre of mass onto the line of thrust, body axes, m.
+        Displacement of the origin O, where the thrust acts, at right angles to the thrust, body
+        axes, m. It brings the line of thrust through the centre of mass.
     untrimmed : dict or None
         Parameters before trimming; None if the thrust is 0.
     tanks : tuple of str
@@ -82,7 +83,7 @@ class OperatingPoint:
     def untrimmed_acceleration(self) -> Vector:
         """Angular acceleration before trimming, body axes, rad/s².
 
-        Appendages are deflected as in this acceleration, so that they turn with the craft.
+        Appendages have the deflection of this acceleration, so that they do not vibrate.
         """
         if self.untrimmed is None:
             return np.zeros(3)
@@ -95,14 +96,15 @@ class OperatingPoint:
 
     @property
     def lateral_acceleration(self) -> dict[str, float]:
-        """Acceleration across each tank's axis after trimming, m/s², which moves the liquid.
+        """Specific force across each tank's axis after trimming, m/s², by the tank's name.
 
-        In a craft that spins it is taken at the slosh mass of the tank's first mode.
+        It moves the liquid. It is evaluated at the tank's origin or, if the craft spins, at the
+        slosh mass of the tank's first mode.
         """
         return self._remaining[1]
 
     def __repr__(self) -> str:
-        """Return the line that a console shows: the angular acceleration that trimming leaves."""
+        """Return one line with the angular acceleration that remains after trimming."""
         return f"OperatingPoint({np.linalg.norm(self.angular_acceleration):.2g} rad/s² left)"
 
     def __str__(self) -> str:
@@ -161,18 +163,18 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
 
 
 def _flexible(plant: Plant) -> list[str]:
-    """Return the beginnings of the names of the modes of appendages that the craft moves."""
+    """Return the name prefixes ("appendage[1].") of the modes that the craft's motion excites."""
     names = [f"appendage[{j}]." for j in range(1, int(plant.get(["appendages"])[0]) + 1)]
     return [name for name in names if _participation(plant, name).any()]
 
 
 def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
-    """Return the angular acceleration with appendages deflected so that they do not vibrate."""
+    """Return the angular acceleration, rad/s², if appendages are deflected without vibration."""
     with Plant(model, parameters) as plant:
         names = _flexible(plant)
 
     def accelerations(deflections: Vector) -> tuple[Vector, Vector]:
-        """Return the accelerations of the modes, and the angular acceleration of the craft."""
+        """Return the modal accelerations and the angular acceleration for given deflections."""
         start = dict(zip((f"{name}eta_0" for name in names), deflections.tolist(), strict=True))
         start |= dict.fromkeys((f"{name}eta_dot_0" for name in names), 0.0)
         with Plant(model, {**parameters, **start}) as plant:
@@ -184,19 +186,19 @@ def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
     if names:
         columns = [accelerations(row)[0] - rest for row in np.eye(len(names))]
         slope = np.array(columns).T
-        for _ in range(4):  # almost linear in the deflections
+        for _ in range(4):  # converges fast, because accelerations are almost linear in eta
             eta = eta - np.linalg.solve(slope, rest)
             rest, turning = accelerations(eta)
     return turning
 
 
 def _participation(plant: Plant, name: str) -> Vector:
-    """Return the participation of a mode of an appendage, whose parameters begin with ``name``."""
+    """Return the participation factors of an appendage mode; its parameters begin with ``name``."""
     return np.array(plant.get([f"{name}participation[{i}]" for i in range(1, 7)]))
 
 
 def _deflections(plant: Plant, names: Sequence[str], force: Vector) -> dict[str, Quantity]:
-    """Return the modal displacements of appendages under a steady specific force, m/s²."""
+    """Return the modal displacements of appendages under the steady specific force, m/s²."""
     found: dict[str, Quantity] = {}
     for name in names:
         along = _participation(plant, name)[:3]
@@ -222,13 +224,13 @@ def warn_of_attitude(what: str, names: Sequence[str], omega: Any) -> None:
         warnings.warn(
             f"{what} is no steady state of q: the attitude of a craft that spins at "
             f"{_row(np.asarray(omega, float))} rad/s changes by itself, so that linear models and "
-            "margins with q hold at its start only. Measure omega instead",
+            "margins with q are valid only at the start. Measure omega instead",
             FmuWarning, stacklevel=caller(),
         )  # fmt: skip
 
 
 def rotation(what: str, turning: Any) -> str:
-    """Return a warning if the angular acceleration ``turning`` is not 0; otherwise "".
+    """Return a warning if the angular acceleration ``turning`` is not 0, else an empty string.
 
     ``what`` names the point in the warning.
     """
@@ -236,9 +238,9 @@ def rotation(what: str, turning: Any) -> str:
     if size <= LEFT:
         return ""
     return (
-        f"{what} is no steady state: an angular acceleration of {size:.4g} rad/s² is left, "
+        f"{what} is no steady state: an angular acceleration of {size:.4g} rad/s² remains, "
         f"{_row(np.asarray(turning, float))} about the body axes, so that linear models and "
-        "margins hold at its start only. Causes are a thrust that misses the centre of mass "
-        "(Craft.trim moves it there), a constant torque, and liquid off its rest, as in a tank "
-        "that leans against the thrust"
+        "margins are valid only at the start. Possible causes are a thrust that misses the centre "
+        "of mass (Craft.trim corrects it), a constant torque, and liquid that is not at rest, as "
+        "in a tank whose axis is not parallel to the thrust"
     )

@@ -1,4 +1,4 @@
-"""Instances of an FMU that step from time to time; variables have their FMU names, in SI units."""
+"""Instances of FMUs, whose variables are set and read by name, in SI units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ class RunError(FmuError):
     time : float
         Start of the step that failed, s.
     columns : dict of ndarray
-        Record up to this time, with ``time``.
+        Time histories up to this time, by name, with the column ``time``.
 
     Examples
     --------
@@ -37,15 +37,15 @@ class RunError(FmuError):
     """
 
     def __init__(self, sentence: str, time: float, columns: dict[str, np.ndarray]) -> None:
-        """Store the message, the time and the record."""
+        """Store the message, the time and the time histories."""
         super().__init__(sentence)
         self.time = time
         """Start of the last step, s."""
         self.columns = columns
-        """Record up to the failure."""
+        """Time histories up to the failure, by name."""
 
 
-# Start values by which the package's FMUs move when nobody sets anything, for a host's first plot.
+# Start values that are not 0 by default, so that a user's first plot in a host shows a motion.
 _STARTS = {"HubSlosh": ["init.slosh_angle"]}
 
 
@@ -62,7 +62,7 @@ class Instance:
         self.fmu = fmu
         """The FMU."""
         self.native = native.Instance(fmu.native, exchange)
-        """The instance in the compiled half of this package."""
+        """The instance in the compiled part of this package."""
         for start in _STARTS.get(fmu.name, []):
             self.set(start, 0.0)
 
@@ -80,12 +80,12 @@ class Instance:
         self.close()
 
     def close(self) -> None:
-        """Free the instance; a call in another thread ends first.
+        """Free the instance, after a call in another thread has ended.
 
         Raises
         ------
         FmuError
-            Within a run, where a controller might call it.
+            If a controller calls this method during a run.
 
         Examples
         --------
@@ -118,7 +118,7 @@ class Instance:
         return self.fmu.names(*causalities)
 
     def set(self, name: str, value: Quantity) -> None:
-        """Set an input, or a parameter that may still change.
+        """Set an input or a tunable parameter.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Instance:
         Raises
         ------
         FmuError
-            If a variable does not exist, or is a text.
+            If a variable does not exist, or is a string.
 
         Examples
         --------
@@ -175,7 +175,7 @@ class Instance:
             raise FmuError(f"{', '.join(texts)}: only numbers can be read")
 
 
-# Types of a table's columns.
+# NumPy type of a column of a table for each type of variable.
 _DTYPES = {"Real": float, "Integer": np.intc, "Enumeration": np.intc, "Boolean": bool}
 
 
@@ -183,8 +183,8 @@ class Plant(Instance):
     """An instance of an FMU for Co-Simulation that is initialised and ready for its first step.
 
     Use it in a ``with`` statement, which frees the instance. If several threads call it, each call
-    waits until the call before has ended. The FMUs of this package start at rest, unless the
-    settings say otherwise.
+    waits until the call before has ended. The FMUs of this package start at rest, unless
+    ``settings`` contain an initial motion.
 
     Parameters
     ----------
@@ -193,13 +193,13 @@ class Plant(Instance):
     settings : mapping, optional
         Values of parameters and start values by name, as `Fmu.convert` takes them.
     tolerance : float, optional
-        Relative tolerance of the FMU's solver; by default its own choice.
+        Relative tolerance of the FMU's solver; by default the FMU chooses it.
     start : float
         Start time, s.
     stop : float, optional
         Stop time that the FMU is given, s; by default none.
     inputs : mapping of float, optional
-        Values of inputs at the start, in their own units.
+        Values of inputs at the start by name, in the unit of each input.
     torque : float, optional
         Value of ``tau_cmd`` at the start, N·m; for HubSlosh.
 
@@ -210,7 +210,7 @@ class Plant(Instance):
     fmu : Fmu
         The FMU.
     native : object
-        The instance in the compiled half of this package.
+        The instance in the compiled part of this package.
 
     Raises
     ------
@@ -238,7 +238,7 @@ class Plant(Instance):
         inputs: Mapping[str, float] | None = None,
         torque: float | None = None,
     ) -> None:
-        """Instantiate and initialise."""
+        """Instantiate the FMU and initialise it."""
         super().__init__(Fmu.open(fmu))
         self.time = start
         """Present time, s."""
@@ -256,7 +256,7 @@ class Plant(Instance):
             raise
 
     def step(self, end: float, torque: float | None = None, slope: float | None = None) -> None:
-        """Advance to a time.
+        """Advance the FMU by one step.
 
         Parameters
         ----------
@@ -297,7 +297,7 @@ class Plant(Instance):
         name : str
             Name of the input.
         slope : float
-            Its derivative, in the input's unit per s.
+            Derivative of the input, in the input's unit per s.
 
         Raises
         ------
@@ -324,27 +324,27 @@ class Plant(Instance):
         feedback: Feedback | None = None,
         wanted: np.ndarray | None = None,
     ) -> dict[str, np.ndarray]:
-        """Step from row to row in one call, and record variables at every row.
+        """Step through all communication points in one call, and record variables at each point.
 
-        At each row the outputs are recorded before the row's inputs are set. An output that follows
-        an input at once therefore shows a jump of the input one row later.
+        At each point the outputs are recorded before the inputs of this point are set. An output
+        that depends directly on an input therefore shows a jump of the input one row later.
 
         Parameters
         ----------
         time : ndarray, shape (n,)
             Communication points from the present time on, ascending, s.
         inputs : mapping of ndarray, shape (n,)
-            Values of inputs by name, each from its row to the next.
+            Values of inputs by name; each value applies from its row to the next row.
         slopes : mapping of ndarray, shape (n,), or None
-            Derivatives of Real inputs from each row to the next, in their unit per s; None holds
-            the inputs.
+            Derivatives of Real inputs by name from each row to the next, in the unit of the input
+            per s; None holds the inputs constant between rows.
         columns : sequence of str
             Numeric variables to record.
         feedback : Feedback, optional
             Controller that sets further inputs; `closed_loop` makes it.
         wanted : ndarray of bool, shape (n,), optional
-            Rows to record, by default all. The other rows repeat the row before them, which saves
-            the time to compute their outputs.
+            Mask of the rows to record, by default all. The other rows repeat the row before, which
+            saves the time to compute their outputs.
 
         Returns
         -------
@@ -354,7 +354,7 @@ class Plant(Instance):
         Raises
         ------
         RunError
-            If the FMU stops the run; the error has the record up to that time.
+            If the FMU stops the run; the error has the time histories up to that time.
 
         Examples
         --------
@@ -401,7 +401,7 @@ class Plant(Instance):
         raise RunError(sentence, self.time, record)
 
     def save(self) -> tuple[float, bytes]:
-        """Return the present time and state.
+        """Return the present time and the state of the FMU.
 
         Returns
         -------

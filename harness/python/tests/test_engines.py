@@ -107,7 +107,7 @@ def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
         replace(craft, engines={"a": Engine((0, 0, 0), (0, 0, 0), -1)})
     with pytest.raises(FmuError, match="engine a must be an Engine, not 5"):
         replace(craft, engines={"a": 5})
-    with pytest.raises(FmuError, match="engines must be Engine by name"):
+    with pytest.raises(FmuError, match="engines must be a dict of Engine by name"):
         replace(craft, engines=[Engine((0, 0, 0), (0, 0, 1), 1)])
     with_roll = replace(craft, engines={"roll": Engine((1, 0, 0), (0, 1, 0), 5, burns=False)})
     for firing, text in {
@@ -115,7 +115,7 @@ def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
         ("rol", ((0, 1),)): "did you mean roll",
         ("roll", (0, 1, 2)): "pulses must be",
         ("roll", ((0.2, 0.1),)): "must end after it starts",
-        ("roll", ((0.1, 0.3), (0.2, 0.4))): "without overlap",
+        ("roll", ((0.1, 0.3), (0.2, 0.4))): "must not overlap",
         ("roll", ((0.1, 3),)): "from 0 to stop = 1 s",
     }.items():
         given = dict([firing]) if isinstance(firing, tuple) else firing
