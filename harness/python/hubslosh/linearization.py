@@ -164,7 +164,7 @@ class LinearModel:
         return np.asarray(self.C @ states + self.D, np.complex128)
 
     def _then(self, other: "LinearModel", prefix: str) -> "LinearModel":
-        """Return this model in series with ``other``, whose states get ``prefix`` in their names."""
+        """Return this model in series with ``other``; names of its states begin with ``prefix``."""
         n, m = len(self.A), len(other.A)
         return LinearModel(
             np.block([[self.A, np.zeros((n, m))], [other.B @ self.C, other.A]]),

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from .linearization import LinearModel
     from .stability import Margins
 
-# Okabe and Ito's palette: distinct for colour-blind readers
-# Colours of series, in turn.
+# Colours of the lines in a diagram, one after the other: the palette of Okabe and Ito, which
+# colour-blind readers can distinguish.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequence[Axes]":
-    """Create a figure with this height in inches, and return its axes, one above the other."""
+    """Create a figure of ``height`` inches, and return its axes, one above the other."""
     try:
         import matplotlib.pyplot as plt
     except ModuleNotFoundError:
@@ -62,7 +62,7 @@ def _panels(
     panels: Mapping[str, Sequence[tuple[str | None, Any]]],
     axes: "Sequence[Axes] | None",
 ) -> "Sequence[Axes]":
-    """Draw the lines of each panel, pairs of label and values, over the time of a run."""
+    """Draw the lines of each panel over the time of a run; a line is a pair (label, values)."""
     axes = _subplots(len(panels), sharex=True) if axes is None else axes
     for ax, (title, lines) in zip(axes, panels.items(), strict=True):
         for label, values in lines:
@@ -75,7 +75,7 @@ def _panels(
 def time_histories(
     run: pd.DataFrame, *names: str, axes: "Sequence[Axes] | None" = None, label: str | None = None
 ) -> "Sequence[Axes]":
-    """Draw columns of a run over time, one above the other.
+    """Draw columns of a run over time, each in its own panel.
 
     Parameters
     ----------
@@ -158,9 +158,9 @@ def bode(
 ) -> "Sequence[Axes]":
     """Draw gain and phase of frequency responses, one above the other.
 
-    Estimates are dots with their standard deviation. Linear models are lines over the band of the
-    estimates; without an estimate, from a fifth of the lowest pole or zero to five times the
-    highest, but not above half the sampling rate.
+    Estimates are dots with their standard deviation. Linear models are lines over the frequency
+    band of the estimates. Without an estimate, the band reaches from a fifth of the lowest pole or
+    zero to five times the highest, but not beyond half the sampling rate.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def bode(
     Raises
     ------
     FmuError
-        If a response is neither, or matplotlib is not installed.
+        If a response is neither a table nor a LinearModel, or matplotlib is not installed.
 
     Examples
     --------
@@ -219,7 +219,7 @@ def bode(
                 low, high = min(lows), max(highs)
             line = frequencies(response, low, high, 2000)
             h = response.response(line)[:, 0, 0]
-            # above the dots, which would hide it
+            # draw the line above the dots, which would hide it
             style: dict[str, Any] = {"color": color, "linewidth": 1.2, "zorder": 3}
             gain.plot(line, np.abs(h), label=label, **style)
             phase.plot(line, np.degrees(np.unwrap(np.angle(h))), **style)
@@ -241,18 +241,18 @@ def margins(
     parameters: Mapping[str, Any] | None = None,
     axes: "Sequence[Axes] | None" = None,
 ) -> "Sequence[Axes]":
-    """Draw the loop gain of a loop with all its crossings, and its margins in the title.
+    """Draw the Bode diagram of a loop, with its crossings and, in the title, its margins.
 
-    The loop gain at each command has its own colour and is taken while the other loops are
-    closed, as `hubslosh.margins` does. Gain crossings are dots and phase crossings squares; the
-    smallest margins and those near slosh modes have labels.
+    There is a curve for the loop gain of each command, in a colour of its own, computed with the
+    loops of the other commands closed, as `hubslosh.margins` does. Gain crossings are dots, phase
+    crossings are squares. Labels show the smallest margins and the margins near slosh modes.
 
     Parameters
     ----------
     loop : Loop, LinearModel or system of python-control
         The loop, as for `hubslosh.margins`.
     parameters : mapping, optional
-        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+        Parameters of the FMU in addition to the parameters of the loop; only for a `Loop`.
     axes : sequence of two matplotlib Axes, optional
         Axes for gain and phase; by default the axes of a new figure.
 
@@ -279,7 +279,7 @@ def margins(
     draw_bode(gain, phase, curves)
     labels = []
     for curve, mark in _marks(found, curves):
-        # a gain crossing is a margin of phase, a phase crossing one of gain
+        # mark a gain crossing in the phase diagram, and a phase crossing in the gain diagram
         ax, y = (phase, mark.phase) if mark.symbol == "o" else (gain, mark.decibels)
         labels.append(_mark(ax, mark.frequency, y, mark.symbol, mark.text, curve.color))
     _finish(gain, found, labels)
@@ -292,17 +292,17 @@ def nichols(
 ) -> "Axes":
     """Draw the Nichols chart of a loop: gain over phase, for each command in its own colour.
 
-    Each loop gain is taken while the other loops are closed. A cross is -1, at all odd multiples of
-    180°; the contour around the point -1 has the distance 0.5 to -1. Dots and squares are the gain
-    and phase crossings of `hubslosh.margins`, with the smallest margins and those near slosh modes
-    as labels.
+    Each loop gain is computed with the loops of the other commands closed. Crosses mark the point
+    -1, at all odd multiples of 180°; the contour around it contains the loop gains at the distance
+    0.5 from -1. Dots are the gain crossings of `hubslosh.margins`, squares the phase crossings.
+    Labels show the smallest margins and the margins near slosh modes.
 
     Parameters
     ----------
     loop : Loop, LinearModel or system of python-control
         The loop, as for `hubslosh.margins`.
     parameters : mapping, optional
-        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+        Parameters of the FMU in addition to the parameters of the loop; only for a `Loop`.
     ax : matplotlib Axes, optional
         Axes to draw into; by default the axes of a new figure.
 
@@ -332,17 +332,17 @@ def nyquist(
 ) -> "Axes":
     """Draw the Nyquist plot of a loop near -1, for each command in its own colour.
 
-    Each loop gain is taken at positive frequencies, while the other loops are closed. A cross is
-    -1; the circle around the point -1 has the radius 0.5, the dotted circle is the unit circle.
-    Dots and squares are the gain and phase crossings of `hubslosh.margins`, with the smallest
-    margins and those near slosh modes as labels.
+    Each loop gain is drawn at positive frequencies, with the loops of the other commands closed. A
+    cross marks the point -1; the circle around it has the radius 0.5. The dotted circle is the unit
+    circle. Dots are the gain crossings of `hubslosh.margins`, squares the phase crossings. Labels
+    show the smallest margins and the margins near slosh modes.
 
     Parameters
     ----------
     loop : Loop, LinearModel or system of python-control
         The loop, as for `hubslosh.margins`.
     parameters : mapping, optional
-        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+        Parameters of the FMU in addition to the parameters of the loop; only for a `Loop`.
     ax : matplotlib Axes, optional
         Axes to draw into; by default the axes of a new figure.
 
@@ -379,7 +379,7 @@ def _diagram(
     draw: "Callable[[Axes, Curves], None]",
     place: "Callable[[_Mark], tuple[float, float]]",
 ) -> "Axes":
-    """Draw the loop gains into one diagram, in which ``place`` finds the place of a crossing."""
+    """Draw the loop gains with ``draw``; ``place`` returns the coordinates of a crossing."""
     found, curves = _loop_curves(loop, parameters)
     draw(ax, curves)
     labels = [
@@ -391,7 +391,7 @@ def _diagram(
 
 
 def _loop_curves(loop: Any, parameters: Mapping[str, Any] | None) -> "tuple[Margins, Curves]":
-    """Return the margins of a loop, and its loop gain at each command."""
+    """Return the margins of a loop, and the curve of the loop gain of each command."""
     found, gain = margins_and_gain(loop, parameters)
     names = gain.inputs or ("loop gain",)
     gains = [
@@ -408,18 +408,18 @@ class _Mark(NamedTuple):
     phase: float
     decibels: float
     text: str
-    """Margin; empty for a crossing without label."""
+    """Text of the label, with the margin; empty for a crossing without label."""
 
     @property
     def at(self) -> str:
-        """Return the margin's value and its frequency as text for a label."""
+        """Return the text of the label with the frequency of the crossing."""
         return f"{self.text} at {self.frequency:.3g} Hz" if self.text else ""
 
 
 def _marks(found: "Margins", curves: "Curves") -> "list[tuple[Curve, _Mark]]":
-    """Return the crossings of each curve; the smallest margins and those near slosh have texts.
+    """Return the crossings of each curve, with labels for the smallest margins and slosh modes.
 
-    The smallest margins come first, for their labels to find a place.
+    The crossings with the smallest margins come first, so that their labels are placed first.
     """
     table = found.crossings[found.crossings["frequency"] > 0]
     marks = []
@@ -430,7 +430,7 @@ def _marks(found: "Margins", curves: "Curves") -> "list[tuple[Curve, _Mark]]":
             if row.crossing == "gain":
                 shown = row.phase_margin == found.phase_margin or slosh
                 text, level = f"{row.phase_margin:.0f}°{slosh}", 0.0
-                ease = abs(row.phase_margin) / 45  # 6 dB and 45° are as good
+                ease = abs(row.phase_margin) / 45  # 45° counts as much as 6 dB
             else:
                 phase = 360 * np.round((phase - 180) / 360) + 180
                 shown = row.gain_margin in found.gain_margins
@@ -449,7 +449,7 @@ def _mark(ax: "Axes", x: float, y: float, symbol: str, text: str, color: str) ->
 
 
 def _finish(ax: "Axes", found: "Margins", labels: "list[_Label]") -> None:
-    """Add the margins as title, the names of several commands, and the labels of crossings."""
+    """Add a title with the margins, a legend if there are several commands, and the labels."""
     delay = f"delay margin {found.delay_margin:.3g} s" if found.stable else "UNSTABLE"
     table = found.crossings
     crossed = table.loc[
@@ -460,7 +460,8 @@ def _finish(ax: "Axes", found: "Margins", labels: "list[_Label]") -> None:
     slosh = f"; slosh crosses 0 dB at {', '.join(values[:4])}{more} Hz" if values else ""
     margin = f"{found.phase_margin:.0f}°" if np.isfinite(found.phase_margin) else "none"
     title = f"phase margin {margin}, {delay}{slosh}"
-    wide = ax.get_window_extent().width * 72 / ax.figure.dpi / 5.5  # letters of 10 points
+    # number of characters in a line; a character of 10-point type is about 5.5 points wide
+    wide = ax.get_window_extent().width * 72 / ax.figure.dpi / 5.5
     ax.set_title("\n".join(textwrap.wrap(title, int(wide))), fontsize=10)
     ax.grid(alpha=0.3, which="both")
     names = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
@@ -469,16 +470,16 @@ def _finish(ax: "Axes", found: "Margins", labels: "list[_Label]") -> None:
     _annotate([label for label in labels if label[3]])
 
 
-_Label = tuple[Any, float, float, str, str]  # Axes, place, text and colour of a label
+_Label = tuple[Any, float, float, str, str]  # Axes, coordinates, text and colour of a label
 
 
 def _annotate(labels: list[_Label]) -> None:
-    """Write labels next to their places; those that would cover another one are left out."""
+    """Write labels next to their points; leave out labels that would cover an earlier label."""
     if not labels:
         return
     from matplotlib.transforms import Bbox
 
-    labels[0][0].figure.draw_without_rendering()  # the layout moves the axes
+    labels[0][0].figure.draw_without_rendering()  # lays out the axes, which moves the points
     taken: list[Bbox] = []
     for ax, x, y, text, color in labels:
         at, unit = ax.transData.transform((x, y)), ax.figure.dpi / 72
@@ -511,8 +512,8 @@ def closed_loop(
     run : DataFrame
         Table of `hubslosh.closed_loop`.
     reference : DataFrame, optional
-        Commanded attitude over ``time``, with ``q[1]`` to ``q[4]`` or ``theta`` (rad). With the
-        target, the remaining rotation is also drawn.
+        Commanded attitude over ``time``, with the columns ``q[1]`` to ``q[4]`` or ``theta`` (rad).
+        If given, the remaining rotation is also drawn.
     axes : sequence of matplotlib Axes, optional
         Axes to draw into, one for each quantity; by default the axes of a new figure.
     label : str, optional
@@ -521,12 +522,12 @@ def closed_loop(
     Returns
     -------
     sequence of matplotlib Axes
-        One for each quantity that the run has.
+        One for each drawn quantity.
 
     Raises
     ------
     FmuError
-        If the run has no such quantity, or matplotlib is not installed.
+        If the run has neither attitude, rates nor torques, or matplotlib is not installed.
 
     Examples
     --------
@@ -574,17 +575,17 @@ def closed_loop(
 def monte_carlo(
     table: pd.DataFrame, *columns: str, axes: "Sequence[Axes] | None" = None, at: float = 0.95
 ) -> "Sequence[Axes]":
-    """Draw the cumulative distribution of results of a Monte Carlo study.
+    """Draw the cumulative distribution of each result of a Monte Carlo study.
 
-    A vertical line and a band show a quantile with its 95 % interval.
+    A vertical line shows a quantile, and a band its 95 % confidence interval.
 
     Parameters
     ----------
     table : DataFrame
         Result of `hubslosh.monte_carlo`, or its file ``runs.csv``.
     *columns : str
-        Results to draw; by default all numbers that ``outcome`` has returned. In a file, the
-        results are the columns without a dot or bracket in their names.
+        Results to draw; by default all numbers that ``outcome`` has returned. If ``table`` was read
+        from a file, the default is all columns without a dot or bracket in their names.
     axes : sequence of matplotlib Axes, optional
         Axes to draw into, one for each result; by default the axes of a new figure.
     at : float
@@ -613,7 +614,7 @@ def monte_carlo(
 
     check_table(table, "the table")
     drawn = table.attrs.get("drawn")
-    if drawn is None:  # a table from elsewhere, such as runs.csv
+    if drawn is None:  # a table that was read from a file, such as runs.csv
         drawn = [c for c in table.columns if "." in str(c) or "[" in str(c)]
     numbers = [str(c) for c in table.select_dtypes("number").columns if c != "run"]
     names = list(columns) or [n for n in numbers if n not in drawn]
@@ -638,7 +639,7 @@ def monte_carlo(
 
 
 def save(figure: "Figure | SubFigure", path: "str | Path") -> None:
-    """Write a figure to a file, so that equal figures give byte-identical files, also as SVG.
+    """Write a figure to a file; the same figure always gives the same bytes, also as SVG.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def campaign(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Simulate the runs of a plan and return their table, as ``hubslosh campaign`` does.
+    """Simulate the runs of a plan by ``hubslosh campaign``, and return the table of the runs.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def campaign(
         True shows a line on stderr, which is the default on a terminal and in a notebook; a
         function receives the line as text.
     program : str or Path, optional
-        The program ``hubslosh``; by default the one that comes with this package.
+        The program ``hubslosh``; by default the program of this package.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def campaign(
     Raises
     ------
     FmuError
-        If the plan is wrong or a run is refused; the message is the program's.
+        If the plan is wrong or a run is refused, with the message of the program.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def analyse(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Analyse recordings of a bench: resonance, antiresonance and fit (``hubslosh analyse``).
+    """Find resonance and antiresonance in recordings of a bench by ``hubslosh analyse``.
 
     Parameters
     ----------
@@ -114,18 +114,18 @@ def analyse(
     progress : bool or callable, optional
         As for `campaign`.
     program : str or Path, optional
-        The program ``hubslosh``; by default the one that comes with this package.
+        The program ``hubslosh``; by default the program of this package.
 
     Returns
     -------
     DataFrame
-        Content of ``runs.csv``: a row for each recording, as for `campaign`, with ``recording``
-        as its model. ``.attrs["directory"]`` is ``out``.
+        Content of ``runs.csv``: a row for each recording, with the columns of `campaign`; its
+        column ``model`` is "recording". ``.attrs["directory"]`` is ``out``.
 
     Raises
     ------
     FmuError
-        If a recording cannot be read or analysed; the message is the program's.
+        If a recording cannot be read or analysed, with the message of the program.
 
     Examples
     --------
@@ -169,13 +169,13 @@ class Estimated:
     value : float
         Estimate, in ``unit``.
     std : float
-        Standard deviation from all sources of error: noise and tolerances of known parameters.
+        Standard deviation due to all sources of error: noise and tolerances of known parameters.
         Infinite if the recording does not determine the number.
     std_noise : float
-        Standard deviation from the noise only.
+        Standard deviation due to noise only.
     interval : tuple of float
-        Ends of the 95 % interval. An end is infinite if the recording does not limit the number
-        on this side.
+        Ends of the 95 % confidence interval. An end is infinite if the recording does not limit
+        the number on this side.
     unit : str
         SI unit as FMI writes it, such as ``kg.m2``.
     determined : bool
@@ -198,7 +198,7 @@ class Estimated:
 
     @classmethod
     def _read(cls, found: Mapping[str, Any]) -> "Estimated":
-        """Return an estimate from result.json, where infinite numbers are null."""
+        """Return an estimate from an entry of result.json, in which null stands for infinity."""
         ends = zip(found["interval"], (-np.inf, np.inf), strict=True)
         low, high = (limit if end is None else float(end) for end, limit in ends)
         spread = {
@@ -227,12 +227,12 @@ class Identification:
     settings : dict of str to str
         Settings of the FMU for which the parameters were estimated.
     converged : bool
-        True if the search ended at a minimum.
+        True if the optimisation ended at a minimum of the residual.
     fits : bool or None
-        True if the residual is noise. If ``fits`` is False, the model is invalidated and no
-        interval can be trusted. None if the method does not test the fit.
+        True if the residual is noise. If it is False, the model is invalidated and no interval can
+        be trusted. None if the method does not test the fit.
     verdict : tuple of str
-        Sentences of the verdict.
+        Verdict about model and fit, in sentences.
     all : dict
         Content of the file that ``hubslosh identify --out`` writes.
 
@@ -260,10 +260,10 @@ class Identification:
 
     @property
     def covariance(self) -> pd.DataFrame:
-        """Covariance of the unknowns of ``free=`` from noise only, SI units, by name.
+        """Covariance of the unknowns in ``free=`` due to noise only, SI units, by name.
 
-        `Estimated.std` also includes tolerances. `uncertain` takes the whole result as
-        ``covariance=found`` and converts it to its own parameters.
+        `Estimated.std` also includes tolerances. To use the covariance in `uncertain`, pass the
+        whole result: ``covariance=found``.
 
         Raises
         ------
@@ -276,7 +276,7 @@ class Identification:
         return pd.DataFrame(np.array(self.all["covariance"], float), names, names)
 
     def __repr__(self) -> str:
-        """Return verdict and estimates."""
+        """Return the verdict and the estimates."""
         every = self.parameters | self.measurement
         lines = [
             f"{name} = {e.value:.6g} ± {e.std:.2g} {e.unit}".rstrip() for name, e in every.items()
@@ -290,7 +290,10 @@ class Identification:
 def _files(
     data: "Table | Sequence[Table]", needed: Sequence[str], folder: Path
 ) -> tuple[list[Path], dict[str, str]]:
-    """Write tables of recordings to a folder, and return all files and the names of those."""
+    """Write tables of recordings to a folder.
+
+    Return the files of all recordings, and for each written file a name for messages.
+    """
     tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
     files: list[Path] = []
     names: dict[str, str] = {}
@@ -324,8 +327,9 @@ def _free_flags(
     return [*flags, *(["--outputs", ",".join(outputs)] if outputs else [])]
 
 
-Table = pd.DataFrame | str | Path  # A table, or the file of one
-Free = float | tuple[float, float, float]  # Start of an unknown, or start, lowest and highest value
+Table = pd.DataFrame | str | Path  # A table, or a file that contains a table
+# Initial guess of an unknown, or (initial guess, lower bound, upper bound).
+Free = float | tuple[float, float, float]
 
 
 def identify(
@@ -346,8 +350,8 @@ def identify(
     """Estimate parameters of an FMU from recordings, by ``hubslosh identify``.
 
     Without ``free`` the unknowns are the parameters of the slosh bench, and ``method`` is the kind
-    of recordings. With ``free`` any FMU can be fitted, also one that is not from this project, by
-    the output-error method. To simulate the FMU with the estimates, pass
+    of recordings. With ``free`` the output-error method fits any FMU, also FMUs that are not from
+    this project. To simulate the FMU with the estimates, pass
     ``{n: e.value for n, e in found.parameters.items()} | found.settings`` as ``parameters`` to
     `simulate`, or the file written by ``out``: ``simulate(parameters="result.json")``.
 
@@ -383,7 +387,7 @@ def identify(
     progress : bool or callable, optional
         As for `campaign`.
     program : str or Path, optional
-        The program ``hubslosh``; by default the one that comes with this package.
+        The program ``hubslosh``; by default the program of this package.
 
     Returns
     -------
@@ -393,8 +397,8 @@ def identify(
     Raises
     ------
     FmuError
-        If arguments contradict each other, a recording cannot be used, or the search fails; a
-        model that does not fit is not an error.
+        If arguments contradict each other, a recording cannot be used, or the optimisation fails.
+        A model that does not fit is not an error.
 
     Examples
     --------
@@ -468,14 +472,14 @@ def posterior(
 ) -> pd.DataFrame:
     """Sample the posterior of the unknowns that `identify` has estimated with ``free=``.
 
-    emcee (Foreman-Mackey et al., PASP 125, 2013) samples the likelihood that `identify`
-    maximises, with the noise that it has estimated. Each step simulates the recordings once for
-    each walker. Needs the package emcee.
+    The package emcee (Foreman-Mackey et al., PASP 125, 2013), which must be installed, samples the
+    likelihood that `identify` maximises, with the noise that `identify` has estimated. Each step
+    simulates the recordings once for each walker.
 
     Parameters
     ----------
     found : Identification
-        Result of `identify`. The walkers start from its normal distribution.
+        Result of `identify`. Its normal distribution gives the start values of the walkers.
     data, *arguments, fmu, free, inputs, outputs, prior, settings
         Arguments of the call of `identify` that has given ``found``, unchanged.
     walkers : int, optional
@@ -483,11 +487,11 @@ def posterior(
     steps : int
         Number of steps of each walker.
     burn : int
-        Number of first steps that are dropped.
+        Number of steps at the beginning that are discarded.
     seed : int
         Seed of the random numbers; the same seed gives the same samples.
     program : str or Path, optional
-        The program ``hubslosh``; by default the one that comes with this package.
+        The program ``hubslosh``; by default the program of this package.
 
     Returns
     -------
@@ -500,8 +504,8 @@ def posterior(
     Raises
     ------
     FmuError
-        If emcee is not installed, ``found`` was not found with ``free=``, or an unknown is not
-        determined.
+        If emcee is not installed, ``found`` was estimated without ``free=``, or the recordings do
+        not determine an unknown.
 
     Examples
     --------

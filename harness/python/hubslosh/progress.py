@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-# True or False shows a line on stderr or none; a function is called with each new line. None shows
-# the line on a terminal and in a notebook.
+# True shows a line on stderr, False shows none, None shows it only on a terminal and in a notebook.
+# A function is called with each new line.
 Progress = bool | Callable[[str], Any] | None
 
 
 def is_watched() -> bool:
-    """Return True if somebody can see progress: stderr is a terminal or a notebook's output."""
+    """Return True if stderr is a terminal or the output of a notebook, where a user sees it."""
     return sys.stderr.isatty() or type(sys.stderr).__module__ == "ipykernel.iostream"
 
 
@@ -20,22 +20,22 @@ class Line:
     """A line on the terminal, or in a notebook, whose text is replaced as work proceeds."""
 
     def __init__(self, progress: Progress = None) -> None:
-        """Store the function that shows the line; None: a terminal or a notebook shows it."""
+        """Store how to show the line; see `Progress`."""
         show = is_watched() if progress is None else progress
         self._show = show if callable(show) else self._write if show else None
         self._width = 0
         self.start()
 
     def start(self) -> None:
-        """Count the time for `left` from now on."""
+        """Start the clock from which `left` estimates the remaining time."""
         self._started = time.monotonic()
 
     def left(self, share: float) -> float:
-        """Return the time, s, that is left after a share of the work."""
+        """Return an estimate of the remaining time, s, if ``share`` of the work is done."""
         return (time.monotonic() - self._started) * (1 / share - 1)
 
     def show(self, text: str) -> None:
-        """Replace the displayed text by a new one."""
+        """Replace the displayed text by ``text``."""
         if self._show is not None:
             self._show(text)
 

@@ -1,15 +1,16 @@
 """A project file: craft, controller, cases, uncertainty and requirements of a design.
 
-``python -m hubslosh.project PROJECT.toml …`` is what ``hubslosh review`` calls. The keys of the
+The command ``hubslosh review`` calls ``python -m hubslosh.project PROJECT.toml …``. The keys of the
 file are the arguments of `Craft.review`. The table ``craft`` has the arguments of `Craft`, each
 table of ``craft.tanks`` the arguments of `MountedTank`, each table of ``craft.engines`` the
 arguments of `Engine`, each table of ``craft.wheels`` the arguments of `Wheel`, and each table of
 ``craft.appendages`` the arguments of `Appendage`.
-``controller`` is a matrix of gains, a table with the matrices ``A``, ``B``, ``C``, ``D`` or with
-``num`` and ``den`` of transfer functions (in discrete time also ``period``), or ``"FILE.py:NAME"``:
-a controller, or a function without arguments that returns one, which is run. Each table of
-``cases`` has arguments that replace the file's for this case, and a table ``craft`` with values of
-the craft.
+
+``controller`` is a matrix of gains, a table with the matrices ``A``, ``B``, ``C``, ``D``, or a
+table with ``num`` and ``den`` of transfer functions; a table of a controller in discrete time also
+has ``period``. Or it is ``"FILE.py:NAME"``: the file is run, and the name is a controller, or a
+function without arguments that returns a controller. Each table of ``cases`` has the arguments that
+differ in this case, and a table ``craft`` with the arguments of `Craft` that differ.
 """
 
 import argparse
@@ -37,14 +38,14 @@ from .tanks import toml_key, toml_of
 from .temporary import write_file
 from .wheels import Wheel
 
-# Parts of a craft by name, which have tables of their own in the file
+# Classes of the named parts of a craft, each of which has a table of its own in the file.
 PARTS = {"tanks": MountedTank, "engines": Engine, "wheels": Wheel, "appendages": Appendage}
 OWN = ("controller", "craft", "cases")  # Keys of a project that are no arguments of `Craft.review`
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Project:
-    """A craft with its controller, cases, uncertainty and requirements, as one file (TOML).
+    """A craft with its controller, cases, uncertainty and requirements, stored as a TOML file.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ class Project:
         Cases by name. Each case is a mapping of the settings that differ from ``settings``; its key
         ``craft`` is a mapping of the values of the craft that differ from ``craft``.
     name : str
-        Name of the design on pages.
+        Name of the design on the pages of reviews.
     controller_file : str, optional
         ``"FILE.py:NAME"``, the Python object that `save` writes as the controller. Without this
         name `save` writes the matrices of the controller.
@@ -90,7 +91,7 @@ class Project:
 
     @classmethod
     def read(cls, path: str | Path) -> "Project":
-        """Return the project in a file; the Python file of its controller is run.
+        """Read a project from a file; the Python file of its controller is run.
 
         Parameters
         ----------
@@ -101,7 +102,7 @@ class Project:
         Returns
         -------
         Project
-            The project, whose name is the file's name.
+            The project. Its name is the name of the file without .toml.
 
         Raises
         ------
@@ -170,7 +171,7 @@ class Project:
         return "".join(parts)
 
     def _controller_text(self, folder: Path) -> Any:
-        """Return the controller in the form in which the project file states it."""
+        """Return the value of the key ``controller`` in the project file."""
         if self.controller_file is not None:
             file, _, name = self.controller_file.rpartition(":")
             return f"{_relative(Path(file), folder)}:{name}"
@@ -188,7 +189,7 @@ class Project:
         return np.asarray(law, float).tolist()
 
     def _each(self) -> "dict[str, tuple[Craft, dict[str, Any]]]":
-        """Return craft and settings of each case by name, or of the project without cases."""
+        """Return craft and settings of each case by name; without cases, those of the project."""
         if not self.cases:
             return {self.name: (self.craft, dict(self.settings))}
         found = {}
@@ -215,7 +216,7 @@ class Project:
         Returns
         -------
         Loop
-            The loop of the project's settings, without its cases.
+            The loop with the settings of the project; the settings of cases are ignored.
         """
         names = inspect.signature(Craft.loop).parameters
         options = {name: value for name, value in self.settings.items() if name in names}
@@ -227,7 +228,7 @@ class Project:
         Returns
         -------
         dict of Review
-            One review, by the project's name, if it has no cases.
+            Reviews by the names of the cases; without cases, one review by the project's name.
 
         Raises
         ------
@@ -240,12 +241,12 @@ class Project:
         }
 
     def __repr__(self) -> str:
-        """Return name and craft in a line."""
+        """Return the project's name and a one-line description of its craft."""
         return f"Project({self.name}: {self.craft!r})"
 
 
 def _set(of: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a class's fields that are not their defaults, for a file."""
+    """Return the values that differ from the defaults of the fields of a dataclass, for a file."""
     found = {}
     for item in fields(of):
         if item.name not in values:
@@ -261,12 +262,12 @@ def _set(of: type, values: Mapping[str, Any]) -> dict[str, Any]:
 def _relative(path: Path, folder: Path) -> str:
     try:
         return Path(os.path.relpath(path.absolute(), folder)).as_posix()
-    except ValueError:  # another drive
+    except ValueError:  # on Windows, if the file is on another drive than the folder
         return str(path.absolute())
 
 
 def _named(kind: str, tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of the project by their full names, without the tables of the craft."""
+    """Return tables by their full names, such as ``cases.slow``, without their key ``craft``."""
     found = {}
     for name, of in tables.items():
         if not isinstance(of, Mapping):
@@ -276,7 +277,7 @@ def _named(kind: str, tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _masses(fills: Any) -> Any:
-    """Return fills with masses as pairs: TOML has ``[120, "kg"]`` for ``(120, "kg")``."""
+    """Return fills in which each mass, ``[120, "kg"]`` in TOML, is the pair ``(120, "kg")``."""
     if isinstance(fills, Mapping):
         return {name: _masses(fill) for name, fill in fills.items()}
     if isinstance(fills, list):
@@ -338,7 +339,7 @@ def _controller(given: Any, folder: Path) -> Any:
         names = tuple("ABCD") if "A" in given else ("num", "den")
         if not {*names} <= set(given) <= {*names, "period"}:
             raise FmuError(
-                "the table controller needs A, B, C and D, or num and den, in discrete time also "
+                "the table controller needs A, B, C and D, or num and den; in discrete time also "
                 "period"
             )
         try:
@@ -362,7 +363,10 @@ def _controller(given: Any, folder: Path) -> Any:
 
 
 def _from_transfer_functions(num: Any, den: Any, period: float | None) -> LinearModel:
-    """Return transfer functions, a row for each command and a column for each measurement."""
+    """Return a matrix of transfer functions as a state-space model.
+
+    ``num`` and ``den`` have a row for each command and a column for each measurement.
+    """
     from scipy.linalg import block_diag
     from scipy.signal import tf2ss
 
@@ -384,8 +388,8 @@ def _from_transfer_functions(num: Any, den: Any, period: float | None) -> Linear
 
 
 def main() -> None:
-    """Write the page of one or several projects and print their reviews (``hubslosh review``)."""
-    parser = argparse.ArgumentParser(description="Reviews a loop around a craft by its project.")
+    """Print the reviews of one or several projects and write their page (``hubslosh review``)."""
+    parser = argparse.ArgumentParser(description="Reviews the control loop of a project file.")
     parser.add_argument("projects", type=Path, nargs="+", metavar="PROJECT", help=".toml")
     parser.add_argument("--out", type=Path, metavar="FILE", help="page to write, .html")
     arguments = parser.parse_args()

@@ -1,9 +1,10 @@
-"""Names of a craft's uncertain quantities, with one meaning in every method of `Craft`.
+"""Names of a craft's quantities, which have the same meaning in every method of `Craft`.
 
-A quantity of a slosh mode changes alone. ``frequency`` is that with the tank held, under the thrust
-that acts: the bob's height stays, and a centring stiffness keeps its share of the restoring force.
-``mass`` and ``bob`` (the bob's height on the tank's axis) leave mass, centre of mass and inertia of
-the liquid at rest as they are. The rigid liquid takes up the difference.
+If one quantity of a slosh mode changes, its other quantities stay the same. ``frequency`` is the
+natural frequency in a fixed tank under the present thrust. If it changes, the height of the slosh
+mass stays the same, and a centring stiffness keeps its share of the restoring force. If ``mass`` or
+``bob`` (the height of the slosh mass on the tank's axis) changes, mass, centre of mass and inertia
+of the liquid at rest stay the same, because the rigid liquid is changed by the opposite amount.
 """
 
 import re
@@ -19,36 +20,37 @@ from .plant import Plant
 
 TURN = 2 * np.pi
 
-# Quantities of a mode: Hz, 1, kg, and height of the bob on the tank's axis, m.
+# Quantities of a slosh mode, in Hz, 1, kg and m. ``bob`` is the height of the slosh mass on the
+# tank's axis.
 KINDS = ("frequency", "zeta", "mass", "bob")
 
 DELAY = "delay"  # Delay of a loop, s
 
 OMEGA = tuple(f"init.omega[{i}]" for i in (1, 2, 3))  # Angular velocity at the start, rad/s
 
-# Names that no tank or appendage of a `Craft` may have: parameters of the FMU begin with them.
+# Names that a tank or appendage of a `Craft` must not have, because names of the FMU begin so.
 RESERVED = re.compile(
     r"(tank|appendage)(\[\d\])?|appendages|craft|init|pivot|solver|delay|force|torque|omega|q"
 )
 
-# What is wrong with a quantity of a mode that the tank does not have.
+# Rest of the error message, after the name of a quantity, if the tank does not have the mode.
 NO_MODE = "does not exist: its tank has no such mode"
 
-# Parameters that a tank without this mode does not have.
+# Parameters of a slosh mode, which exist only if the tank has this mode.
 OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
 
 _MODE_QUANTITY = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
-_MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
+_LENGTH_OR_HINGE = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
 
 
 class Names(tuple[str, ...]):
-    """Names of the tanks of a craft, in the order of the FMU, and of the appendage of each mode."""
+    """Names of a craft's tanks, and the name of the appendage of each flexible mode."""
 
     appendages: tuple[str, ...] = ()
 
     @classmethod
     def collect(cls, tanks: Iterable[str], appendages: Iterable[str] = ()) -> "Names":
-        """Return the names of the tanks, and the name of each flexible mode's appendage."""
+        """Create the names of a craft; ``appendages`` has the appendage's name for each mode."""
         if isinstance(tanks, Names):
             return tanks
         found = cls(tanks)
@@ -130,7 +132,7 @@ def short_name(name: str, tanks: Iterable[str]) -> str:
 
 
 def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()) -> str:
-    """Return an error message if a name is not a quantity of a craft; otherwise "".
+    """Return an error message if a name is not a quantity of a craft, else an empty string.
 
     ``also`` has names that are allowed in addition to the FMU's variables, the quantities of slosh
     modes and the delay.
@@ -169,38 +171,37 @@ def full_names(
     return found
 
 
-def moves_the_bob(name: str) -> str:
-    """Return an error message if a parameter moves the slosh mass; otherwise "".
+def slosh_mass_error(name: str) -> str:
+    """Return an error message if a parameter would move the slosh mass, else an empty string.
 
-    An uncertain length or hinge of a pendulum would also move the slosh mass, and an uncertain
-    length would also change the frequency. One uncertain parameter would then change several
-    quantities, so it is refused.
+    An uncertain length or hinge of a pendulum is refused, because it would change several
+    quantities at once: both move the slosh mass, and the length also changes the frequency.
     """
-    if not (match := _MOVES_THE_BOB.fullmatch(name)):
+    if not (match := _LENGTH_OR_HINGE.fullmatch(name)):
         return ""
     frequency, bob = (f"{match[1]}.{kind}{match[3]}" for kind in ("frequency", "bob"))
     also = " and changes the frequency" if match[2] == "length" else ""
     return (
-        f"moves the bob{also}: give {frequency}, Hz, which keeps the bob where it is, or {bob}, "
-        "the bob's height on the tank's axis, m"
+        f"moves the slosh mass{also}: give {frequency}, Hz, which keeps the height of the slosh "
+        f"mass, or {bob}, m, the height of the slosh mass on the tank's axis"
     )
 
 
 class Modes:
-    """The slosh modes in parameters of Spacecraft, whose quantities can be read and changed."""
+    """Parameters of Spacecraft in which quantities of slosh modes can be read and changed."""
 
     def __init__(self, model: str | Path, given: Parameters) -> None:
-        """Store the parameters of an FMU; quantities of modes are computed when they are read."""
+        """Store the parameters of an FMU."""
         self.model, self.fmu, self.given = model, Fmu.open(model), dict(given)
 
     def number(self, name: str) -> float:
-        """Return the value of a parameter: the given value, otherwise the FMU's start value."""
+        """Return the given value of a parameter or, if none is given, the FMU's start value."""
         if name in self.given:
             return float(self.fmu.convert(name, self.given[name]))
         return float(self.fmu.variable(name).start or 0.0)
 
     def problem(self, mode: ModeQuantity) -> str:
-        """Return the reason why a quantity is not defined for a mode, or "" if it is defined."""
+        """Return the reason why a quantity cannot be given, or an empty string if it can."""
         if mode.tank > self.number("tanks") or mode.number > self.number(
             f"tank[{mode.tank}].modes"
         ):
@@ -220,11 +221,11 @@ class Modes:
             for i in (1, 2)
         )
         if planar and mode.kind in ("mass", "bob"):
-            return "is for tanks without planar modes; a box has its mass from its drawing"
+            return "is for tanks without planar modes; the mass of a box follows from its drawing"
         return ""
 
     def value(self, mode: ModeQuantity) -> float:
-        """Return the value of a quantity."""
+        """Return the value of a quantity of a slosh mode, SI units."""
         if mode.kind == "bob":
             return self.number(mode.name("hinge")) - self._length(mode)
         if mode.kind != "frequency":
@@ -302,14 +303,16 @@ class Modes:
             self.given |= {mode.name("hinge"): value + length, mode.name("length"): length}
             self.given[mode.name("frequency")] = 0.0
             self._keep_at_rest(mode.tank, [(m, old), (-m, value)])
-            if before:  # the specific force differs there, but not the frequency
+            # in a craft that spins the specific force differs at the new height; keep the frequency
+            if before:
                 length *= self._axial_force(mode) / before
                 self.given |= {mode.name("length"): length, mode.name("hinge"): value + length}
 
     def _keep_at_rest(self, tank: int, points: list[tuple[float, float]]) -> None:
-        """Add point masses (kg) at heights (m) to the rigid liquid.
+        """Add point masses (kg) at heights (m) to the rigid liquid, so that the sum stays the same.
 
-        If the rigid liquid's inertia would become negative, inertia is taken from the dry craft.
+        If the rigid liquid's inertia would become negative, the dry craft's inertia is reduced
+        instead; see `rigid_rest`.
         """
         prefix = f"tank[{tank}]"
         m_0, H_0, I_0, more = (
@@ -330,10 +333,10 @@ class Modes:
 
 
 def nominal_value(modes: Modes, untrimmed: Parameters, name: str) -> float | None:
-    """Return the value of a quantity by its full name; None if the craft does not have the mode.
+    """Return the nominal value of a quantity by its full name, or None if its mode is missing.
 
-    ``modes`` has the parameters of the operating point. ``untrimmed`` has the given parameters,
-    before trimming moves the origin.
+    ``modes`` has the parameters of the trimmed operating point. ``untrimmed`` has the parameters
+    before trimming, which moves the origin and with it all positions.
     """
     if mode := mode_quantity(name):
         return None if modes.problem(mode) else modes.value(mode)

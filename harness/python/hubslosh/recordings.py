@@ -2,10 +2,10 @@
 
     python -m hubslosh.recordings bench.mf4 bench.csv
 
-The compiled half of the package reads text in columns and Parquet. Each other kind of file has a
-function here that returns its columns. They are written as text, which the compiled half then
-reads: units and times of all kinds go through one grammar. The program ``hubslosh`` calls the form
-above for files of these kinds.
+The compiled part of the package reads text in columns and Parquet. For each other kind of file, a
+function of this module returns the columns, which are written as text and then read by the compiled
+part, so that only one parser interprets units and times. The program ``hubslosh`` calls the command
+above for such files.
 """
 
 import csv
@@ -25,16 +25,16 @@ from .fmu import FmuError
 if TYPE_CHECKING:
     import pandas as pd
 
-# Most values of a file, columns that are not used included: three signals in 20 million rows.
+# Largest number of values in a file, including unused columns; 20 million rows of three signals.
 MOST_VALUES = 60_000_000
-WIDEST = 100  # Most columns of a matrix: a wider one is no table of signals
-DEEPEST = 8  # Deepest structure within structures
+WIDEST = 100  # Largest number of columns of a matrix; a wider matrix is no table of signals
+DEEPEST = 8  # Largest depth of nested structures
 
 
 def read_recording(
     path: str | Path, columns: str | None = None, *, rate: float | None = None
 ) -> "pd.DataFrame":
-    r"""Read the file of a logger as a table in SI units with the time from its first sample.
+    r"""Read a recording of a data logger as a table in SI units; time starts at the first sample.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def read_recording(
     Raises
     ------
     FmuError
-        If the file cannot be read, has no such column or a unit is not known; the message says
-        what was found instead.
+        If the file cannot be read, a column is missing, or a unit is not known. The message lists
+        the columns of the file.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def read_recording(
     import pandas as pd
 
     if not isinstance(path, str | Path):
-        raise FmuError(f"a recording is a file, not {type(path).__name__}")
+        raise FmuError(f"path must be the path of a file, not {type(path).__name__}")
     path = Path(path)
     found = native.read_recording(path, path, columns, rate)
     if found is None:
@@ -98,10 +98,10 @@ class Column(NamedTuple):
 
     name: str
     values: Any
-    """Numbers, dates, durations or texts; a matrix has a signal in each of its columns."""
+    """Numbers, dates, durations or strings; a matrix has one signal in each column."""
     unit: str = ""
     time: np.ndarray | None = None
-    """Times of the values, s, in a file whose signals have clocks of their own."""
+    """Times of the values, s, if each signal of the file has its own sampling times."""
 
 
 def _matlab(path: Path) -> Iterator[Column]:
@@ -114,7 +114,7 @@ def _matlab(path: Path) -> Iterator[Column]:
 
 
 def _matlab_value(name: str, value: Any, depth: int = 0) -> Iterator[Column]:
-    """Yield an array, the fields of a structure, or the columns of a table."""
+    """Yield the columns of a variable: an array, or the fields of a structure or of a timetable."""
     if hasattr(value, "columns"):
         units = value.attrs.get("varUnits", ())
         if value.index.name:
@@ -158,7 +158,7 @@ def _tdms(path: Path) -> Iterator[Column]:
         for channel in (channel for group in file.groups() for channel in group.channels()):
             _check_size(len(channel))
             known = channel.properties
-            # 0 where the channel is no waveform
+            # the increment is 0 if the channel is no waveform
             time = channel.time_track() if known.get("wf_increment") else None
             name = f"{channel.group_name}/{channel.name}"
             yield Column(name, channel[:], str(known.get("unit_string", "")), time)
@@ -189,7 +189,7 @@ def _parquet(path: Path) -> Iterator[Column]:
 
 
 def _excel(path: Path) -> Iterator[Column]:
-    """Yield the cells of the first sheet; the header is found as in a text file."""
+    """Yield the columns of the first sheet; its header is found as in a text file."""
     from openpyxl import load_workbook
 
     book = load_workbook(path, read_only=True, data_only=True)
@@ -204,7 +204,7 @@ class Kind(NamedTuple):
 
     name: str
     start: bytes
-    """First bytes of its files."""
+    """First bytes of every file of this format."""
     endings: tuple[str, ...]
     columns: Callable[[Path], Iterator[Column]]
 
@@ -231,8 +231,8 @@ def convert(path: Path, out: Path) -> None:
     signed = [kind for kind in KINDS if start.startswith(kind.start)]
     if not named and not signed:
         allowed = ", ".join(kind.name for kind in KINDS)
-        raise FmuError(f"the file is of no known kind (allowed: text in columns, {allowed})")
-    # .mat of version 7.3 is HDF5 that begins as other .mat files do
+        raise FmuError(f"the format of the file is not known (allowed: text in columns, {allowed})")
+    # a .mat file of version 7.3 is HDF5, but begins like .mat files of version 5
     kind = (signed or named)[0]
     try:
         with warnings.catch_warnings():
@@ -242,10 +242,12 @@ def convert(path: Path, out: Path) -> None:
         words = ""
     except ModuleNotFoundError as error:
         words = f"{kind.name} needs the package {error.name}: pip install 'hubslosh[recordings]'"
-    except Exception as error:  # of any library, about a file that may be damaged
+    except Exception as error:  # libraries raise any exception if a file is damaged
         words = str(error) or type(error).__name__
     if words:
-        gc.collect()  # half an MDF fails as it goes: here, not in somebody else's code
+        # An incomplete MDF object raises an error when it is destroyed. Destroy it here, so that
+        # the error does not appear later in other code.
+        gc.collect()
         raise FmuError(words)
     with temporary.output(out) as new, new.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -259,7 +261,7 @@ def _check_size(values: int) -> None:
 
 
 def _parts(column: Column) -> Iterator[Column]:
-    """Yield the signals of a column, each with its cells as a list; nothing for other data."""
+    """Yield the signals of a column with their values as lists; skip data that are no signal."""
     values = np.asarray(column.values)
     if values.ndim == 2 and values.shape[1] > values.shape[0]:
         values = values.T
@@ -280,7 +282,7 @@ def _duration(ns: int) -> str:
 
 
 def _cells(values: np.ndarray) -> list | None:
-    """Return the cells of a signal, or None if the data is not a signal."""
+    """Return the values of a signal as cells of a text file, or None if they are no signal."""
     if values.dtype.kind in "fiu":
         return values.tolist()
     if values.dtype.kind == "b":
@@ -296,7 +298,11 @@ def _cells(values: np.ndarray) -> list | None:
 
 
 def _aligned(columns: list[Column]) -> tuple[list[str], list[list]]:
-    """Return header and cells of columns, in rows of their number or of their time."""
+    """Return the header and the cells of a table of all columns.
+
+    If the columns have times of their own, the rows are all these times; otherwise row n has the
+    value n of each column.
+    """
     if not columns:
         raise FmuError("the file holds no vector or matrix of numbers")
     names = [

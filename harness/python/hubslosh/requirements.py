@@ -1,4 +1,4 @@
-"""Requirements of a design review: least margins, judged over its points."""
+"""Requirements of a design review: minimum margins that its operating points must have."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,16 +11,17 @@ from .arguments import not_positive, refuse
 from .fmu import FmuError, did_you_mean
 from .short import ShortTable
 
-# Margins that may be required, and their units. The gain margin is the smaller of up and down.
+# Margins that may be required, and their units. The gain margin is the smaller of the margins for
+# an increase and for a decrease of the gain.
 UNITS = {"modulus_margin": "", "phase_margin": "°", "gain_margin": " dB", "delay_margin": " s"}
 
-# Points for which a requirement may hold: those without uncertainty, or all of them.
+# Operating points to which a requirement may apply: only the nominal points, or all points.
 POINTS = ("nominal", "all")
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """The least value that one margin must have at the nominal, or at all, operating points."""
+    """Minimum of one margin at the nominal operating points, or at all operating points."""
 
     margin: str
     points: str
@@ -28,7 +29,7 @@ class Requirement:
 
     @property
     def unit(self) -> str:
-        """Unit of the limit, as it is printed after the number; "" for a number without unit."""
+        """Unit of the limit, printed after the number; an empty string if it has no unit."""
         return UNITS[self.margin]
 
     def __str__(self) -> str:
@@ -74,9 +75,10 @@ def margins_of(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def judged(requirements: tuple[Requirement, ...], points: pd.DataFrame) -> ShortTable:
-    """Judge the margins of the operating points by the requirements, failed requirements first.
+    """Compare the margins of the operating points with the requirements.
 
-    The returned table has one row for each requirement and the columns of `Review.requirements`.
+    The returned table has the columns of `Review.requirements` and one row for each requirement,
+    failed requirements first.
     """
     margins = margins_of(points).where(points["stable"], -np.inf)  # an unstable point has no margin
     rows = []

@@ -1,4 +1,4 @@
-"""A design review of a loop around a `Craft` over its fills: margins, slosh, worst case."""
+"""Design review of the control loop of a `Craft` over its fills: margins, slosh, worst case."""
 
 import re
 import warnings
@@ -33,7 +33,7 @@ from .quantities import (
     Modes,
     full_names,
     mode_quantity,
-    moves_the_bob,
+    slosh_mass_error,
     nominal_value,
     short_name,
 )
@@ -51,7 +51,7 @@ from .worst_case import Confirmation, confirm, search
 if TYPE_CHECKING:
     from .craft import Craft, Fill
 
-# Share by which damping ratios of appendages vary, which no formula predicts.
+# Share by which damping ratios of appendages vary, because no formula predicts them.
 ZETA_PART = 0.5
 
 # Ways in which a slosh mode is stabilised, worst first.
@@ -63,15 +63,16 @@ class Uncertain:
     """An uncertain quantity of a review, with its range at each fill."""
 
     name: str
-    """Its name as it was given, or "damping of" or "frequency of" a tank or an appendage, or
-    "inertia of craft"."""
+    """Name as given by the user, or a default: "inertia of craft", or "damping of" or "frequency
+    of" with the name of a tank or appendage."""
     text: str
-    """Its range in words."""
+    """Range in words, such as "± 10%"."""
     ends: tuple[dict[str, tuple[float, float, float]], ...]
-    """At each fill low end, nominal value and high end by full name; empty without this mode."""
+    """For each fill, low end, nominal value and high end of each parameter, by its full name; empty
+    if the tank has no such slosh mode at this fill."""
 
     def values(self, fill: int, share: float) -> dict[str, float]:
-        """Return the parameters' values at one fill and one position within their ranges.
+        """Return the values of the parameters at one fill and one position in their ranges.
 
         ``fill`` is the index of the fill; ``share`` is -1 at the low end of the range, 0 at the
         nominal value and 1 at the high end.
@@ -91,7 +92,7 @@ class Review:
     craft : Craft
         The craft that was reviewed.
     fills : tuple of str
-        Fills in words.
+        Fills in words, such as "50%" or "120 kg".
     at : ndarray, shape (n,)
         Fills as numbers, in ``unit``.
     unit : str
@@ -100,8 +101,8 @@ class Review:
         Uncertain quantities, each with its ``name``, its range as ``text`` and the ``ends`` of
         the range at each fill.
     family : tuple of LinearModel
-        Linear model of the craft at each fill, from commands to measurements. All have the same
-        states; at a fill where a mode is missing, its states are zero.
+        Linear model of the craft at each fill, from commands to measurements. All models have the
+        same states; if a mode is missing at a fill, its rows and columns are zero.
     nominal : tuple of Point
         Nominal operating point at each fill, with its ``loop``, ``margins`` and loop ``gain``.
     points : DataFrame
@@ -123,7 +124,7 @@ class Review:
     suggestion : Suggestion
         A notch or roll-off that raises the smallest margin, with its cost in phase.
     warnings : tuple of str
-        Warnings about the tanks, each for one of the fills where it applies.
+        Warnings about the tanks; a warning that applies to several fills is given for only one.
     limits : tuple of Requirement
         Required margins, as `requirements` judges them.
 
@@ -209,12 +210,12 @@ class Review:
         Returns
         -------
         DataFrame
-            A row for each requirement. ``requirement`` states it in words, and ``passed`` says
-            whether it is met. ``least`` is the smallest margin over all operating points to which
-            the requirement applies (-inf if one of them is unstable), and ``fill`` the index of
+            A row for each requirement. ``requirement`` is the requirement in words, and ``passed``
+            is true if it is met. ``least`` is the smallest margin over all operating points to
+            which the requirement applies (-inf if a point is unstable), and ``fill`` the index of
             the fill with this margin. ``points`` is the number of operating points to which the
-            requirement applies, and ``failing`` the number of those that fail; an unstable point
-            always fails.
+            requirement applies, and ``failing`` the number of operating points that fail; an
+            unstable point always fails.
         """
         return judged(self.limits, self.points)
 
@@ -224,14 +225,14 @@ class Review:
         return bool(self.points["stable"].all() and self.requirements()["passed"].all())
 
     def modes(self) -> dict[str, str]:
-        """Return for each slosh mode, by its name, how it is stabilised, in words.
+        """Return how each slosh mode is stabilised, in words, by the name of the mode.
 
-        Unstable modes come first. At each fill the verdict is the worst verdict over all commands.
+        Unstable modes come first. At each fill, the verdict is the worst verdict over all commands.
 
         Returns
         -------
         dict of str to str
-            Such as ``{"main mode 1": "phase-stabilised"}``.
+            For example ``{"main mode 1": "phase-stabilised"}``.
         """
         found = []
         for mode, rows in self.slosh.groupby("mode", sort=False):
@@ -249,7 +250,7 @@ class Review:
         return {mode: words for _, mode, words in sorted(found, key=lambda row: row[0])}
 
     def _fill_text(self, fills: Sequence[int]) -> str:
-        """Return fills in words; those that follow one another as a span."""
+        """Return fills in words; successive fills are joined, such as "5% to 35%"."""
         spans: list[list[int]] = []
         for fill in fills:
             if spans and fill == spans[-1][-1] + 1:
@@ -284,7 +285,7 @@ class Review:
         return " ".join([self._stability(), *self._failures()])
 
     def _failures(self) -> list[str]:
-        """Return one sentence that lists the requirements that fail; none without requirements."""
+        """Return a sentence about the requirements that fail; empty without requirements."""
         table = self.requirements()
         failed = table[~table["passed"]]
         if table.empty:
@@ -304,7 +305,7 @@ class Review:
         return self._stable_points() + self._neutral()
 
     def _neutral(self) -> str:
-        """Return a sentence on neutral poles of nominal points; "" if there are none."""
+        """Return a sentence on neutral poles of nominal points, or an empty string if none."""
         fills = [k for k, point in enumerate(self.nominal) if len(point.margins.neutral)]
         if not fills:
             return ""
@@ -339,7 +340,7 @@ class Review:
         )
 
     def worst_values(self) -> dict[str, float]:
-        """Return the parameters at the worst point that differ from the nominal ones.
+        """Return the parameters that differ from their nominal values at the worst point.
 
         Returns
         -------
@@ -353,7 +354,7 @@ class Review:
         return found
 
     def _describe(self, point: Point) -> str:
-        """Return fill and quantities of a point that are not nominal, in words."""
+        """Return the fill of a point, and its quantities that are not nominal, in words."""
         words = [f"fill {self.fills[point.fill]}"]
         for quantity, share in zip(self.uncertain, point.shares, strict=True):
             values = quantity.values(point.fill, float(share)) if share else {}
@@ -374,7 +375,7 @@ class Review:
         Returns
         -------
         str
-            HTML that contains everything it needs, so that it works without a network.
+            HTML that refers to no other files, so that it can be read without a network.
         """
         from .review_page import page
 
@@ -386,7 +387,7 @@ class Review:
         Parameters
         ----------
         path : str or Path
-            File, .html.
+            File to write, .html.
 
         Raises
         ------
@@ -396,7 +397,7 @@ class Review:
         write_file(path, ".html", self.html)
 
     def __str__(self) -> str:
-        """Return the summary, then the figures on which it rests."""
+        """Return the summary, then the numbers on which it rests."""
         table = self.points
         lines = [self.summary, *self.stabilisation()[:8]]
         stable = table[table["stable"]]
@@ -420,7 +421,7 @@ class Review:
         return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines)
 
     def __repr__(self) -> str:
-        """Return the answer."""
+        """Return the first sentence of the summary."""
         return f"Review({self.summary})"
 
 
@@ -517,7 +518,10 @@ def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
 
 
 def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
-    """Return the plants with the same states: all states of any plant, in the FMU's order."""
+    """Return the plants of all points, extended by zeros so that all have the same states.
+
+    These are all states that any plant has, in the FMU's order.
+    """
     models = []
     used: set[str] = set()
     for point in points:
@@ -544,7 +548,7 @@ def _check_work(points: int, loop: Loop) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """Fills and uncertain quantities of a review."""
+    """Space of the operating points of a review: fills and uncertain quantities."""
 
     craft: "Craft"
     names: tuple[str, ...]
@@ -552,7 +556,7 @@ class _Space:
     unit: str
     loops: tuple[Loop, ...]
     given: tuple[tuple[dict[str, Quantity], dict[str, Quantity]], ...]
-    """Untrimmed parameters, and quantities of slosh modes, at each fill."""
+    """Untrimmed parameters and given quantities of slosh modes at each fill."""
     uncertain: tuple[Uncertain, ...]
     warnings: tuple[str, ...]
 
@@ -575,11 +579,11 @@ class _Space:
             raise FmuError(f'damping must be "interval" or "nominal", not {damping!r}')
         Loop(
             controller, period, craft.model, wheels=craft.wheels, **options
-        )._must_be_linear()  # before the tanks are computed
+        )._must_be_linear()  # raise an error before the time-consuming computation of the tanks
         loops, tanks, given, problems, turns = [], [], [], [], ""
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            with suppress(FmuError):  # the loop below names the fill
+            with suppress(FmuError):  # the loop below raises the error with the fill
                 craft.solve(fills)
             for k, fill in enumerate(fills):
                 try:
@@ -597,12 +601,12 @@ class _Space:
                     )
         refuse(problems)
         said = tuple(dict.fromkeys([*(str(w.message) for w in caught), *filter(None, [turns])]))
-        # the same warning with another number at another fill
+        # report a warning only once if it differs between fills only in its numbers
         said = tuple({re.sub(r"= [\d.e+-]+", "", text): text for text in said}.values())
         for text in said:
             warnings.warn(text, FmuWarning, stacklevel=4)
         ranges = _full_ranges(craft, uncertain or {})
-        # a damping ratio that was given has no interval
+        # a damping ratio that is given does not vary over the interval of the formula
         known = full_names(parameters_of(parameters), Fmu.open(craft.model), craft._names)
         known |= dict.fromkeys(ranges, 0.0)
         points = [every for every, _ in given]
@@ -624,9 +628,10 @@ class _Space:
         return cls(craft, words, np.array(at), unit, tuple(loops), tuple(given), tuple(found), said)
 
     def point(self, fill: int, shares: Vector) -> Point:
-        """Return the point at the fill with this index and at these positions in the ranges.
+        """Compute the operating point at one fill.
 
-        See `Uncertain.values` for the positions.
+        ``fill`` is the index of the fill. ``shares`` has the position of each uncertain quantity in
+        its range, as in `Uncertain.values`.
         """
         loop, (every, modes) = self.loops[fill], self.given[fill]
         plain: dict[str, Any] = {}
@@ -637,7 +642,7 @@ class _Space:
                 mode = mode_quantity(name)
                 if mode is None:
                     plain[name] = value
-                elif mode.kind == "frequency":  # a mass that changes too moves it further
+                elif mode.kind == "frequency":  # as a factor, because the mass may change it, too
                     factors[name] = value / quantity.ends[fill][name][1]
                 else:
                     modes[name] = value
@@ -648,9 +653,9 @@ class _Space:
         return Point(fill, np.array(shares, float), loop, margins, gain)
 
     def evaluate(self, which: Iterable[tuple[int, Vector]]) -> list[Point]:
-        """Return points for pairs of a fill's index and positions in the ranges, on all cores."""
+        """Compute operating points on all cores; each is given by the arguments of `point`."""
         with warnings.catch_warnings(), ThreadPoolExecutor(cores()) as pool:
-            warnings.simplefilter("ignore", FmuWarning)  # those of the nominal points are told
+            warnings.simplefilter("ignore", FmuWarning)  # `create` has issued them already
             return list(pool.map(lambda job: self.point(*job), which))
 
 
@@ -666,7 +671,7 @@ def _list_of(fills: Any) -> list[Any]:
 
 
 def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
-    """Return a dictionary from full names to the ranges with their names as given."""
+    """Return, by the full name of each quantity, its name as given and its range."""
     if not isinstance(given, Mapping):
         raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
                        f"not {given!r}")  # fmt: skip
@@ -675,10 +680,10 @@ def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
 
 
 def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str]) -> list[Uncertain]:
-    """Return the range of the damping of each tank.
+    """Return the range of the damping of each tank, over which all its modes vary together.
 
-    All modes of a tank share the error of one correlation. ``given`` has the full names of
-    quantities that have a value or a range of their own.
+    The reason is that one correlation gives the damping of all modes of a tank. ``given`` has the
+    full names of quantities for which the user gives a value or a range.
     """
     found, known = [], False
     for number, name in enumerate(craft.tanks, 1):
@@ -696,13 +701,13 @@ def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str])
     if craft.tanks and not known:
         raise FmuError(
             'damping="interval" needs the viscosity of a liquid: MountedTank(…, nu=…), m²/s; '
-            'damping="nominal" takes damping ratios as they are'
+            'damping="nominal" does not vary damping ratios'
         )
     return found
 
 
 def _part(given: Any, what: str) -> float:
-    """Return the part by which a quantity varies; 0 for "nominal"."""
+    """Return the share by which a quantity varies, such as 0.1 for "10%"; 0 for "nominal"."""
     part = 0.0 if given == "nominal" else parse_share(given)
     if part is None or part >= 1:
         raise FmuError(
@@ -719,7 +724,7 @@ def _scaled(part: float, values: Mapping[str, float]) -> dict[str, tuple[float, 
 def _frequencies(
     craft: "Craft", loops: Sequence[Loop], part: float, ranges: Mapping[str, Any]
 ) -> list[Uncertain]:
-    """Return the slosh frequencies of each tank, whose modes vary together."""
+    """Return the range of the slosh frequencies of each tank, whose modes vary together."""
     found = []
     for number, name in enumerate(craft.tanks if part else (), 1):
         ends = []
@@ -741,9 +746,9 @@ def _frequencies(
 def _of_appendages(
     craft: "Craft", given: Sequence[Parameters], kind: str, part: float, known: Container[str]
 ) -> list[Uncertain]:
-    """Return frequency or damping of each appendage, whose modes vary together.
+    """Return the range of frequency or damping of each appendage, whose modes vary together.
 
-    ``known`` has the full names of quantities that have a value or a range of their own.
+    ``known`` has the full names of quantities for which the user gives a value or a range.
     """
     found, words = [], {"frequency": "frequency of", "zeta": "damping of"}[kind]
     for name in craft.appendages if part else ():
@@ -762,7 +767,7 @@ def _of_appendages(
 def _inertia(
     given: Sequence[Parameters], part: float, ranges: Mapping[str, Any]
 ) -> list[Uncertain]:
-    """Return the range of the dry inertia's factor; none if a component has its own range."""
+    """Return the range of the dry craft's inertia; empty if the user varies a component."""
     names = [f"craft.J{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
     if not part or any(name in ranges for name in names):
         return []
@@ -779,19 +784,22 @@ def _quantities(
     ranges: Mapping[str, tuple[str, Any]],
     tanks: Iterable[str],
 ) -> list[Uncertain]:
-    """Return the quantities whose ranges were given, by full names; given: untrimmed parameters."""
+    """Return the quantities whose ranges the user gives.
+
+    ``given`` has the untrimmed parameters at each fill; the keys of ``ranges`` are full names.
+    """
     fmu = Fmu.open(loops[0].model)
     allowed = [DELAY]
     allowed += [n for n in fmu.names("parameter", "structuralParameter") if fmu.kind(n) == "Real"]
     problems, found = [], []
     for full, (name, range_) in ranges.items():
         shown = short_name(full, tanks)
-        if instead := moves_the_bob(full):
+        if instead := slosh_mass_error(full):
             problems.append(f"uncertain: {shown} {instead}")
             continue
         if mode_quantity(full) is None and full not in allowed:
             problems.append(
-                f"uncertain has {shown}, which is not a Real parameter of {fmu.name}, nor delay"
+                f"uncertain has {shown}, which is neither a Real parameter of {fmu.name} nor delay"
             )
             continue
         if (mode := mode_quantity(full)) and (bad := _problem(loops[0], mode)) != NO_MODE and bad:
@@ -826,7 +834,7 @@ def _problem(loop: Loop, mode: ModeQuantity) -> str:
 
 
 def _nominal(loop: Loop, untrimmed: Parameters, name: str) -> float | None:
-    """Return the nominal value; None if this fill does not have the mode."""
+    """Return the nominal value of a quantity, or None if its mode does not exist at this fill."""
     if name == DELAY:
         return float(loop.delay)
     return nominal_value(Modes(loop.model, loop.parameters), untrimmed, name)  # type: ignore[arg-type]
@@ -836,7 +844,7 @@ Ends = list[tuple[float, float]]
 
 
 def _ends(given: Any, nominals: list[float | None]) -> tuple[Ends, str]:
-    """Return the ends of a range at each fill, or a sentence on what is wrong with the range."""
+    """Return the ends of a range at each fill, or the rest of an error sentence about the range."""
     known = [value for value in nominals if value is not None]
     if not known:
         return [], NO_MODE

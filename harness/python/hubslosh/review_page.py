@@ -1,4 +1,4 @@
-"""The page of a design review: one file of HTML that needs no network and prints on paper."""
+"""The page of a design review: one HTML file that needs no network and can be printed."""
 
 import html
 import io
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from .review import Review
     from .worst_case import Confirmation
 
-WIDTH = 4.8  # Width of a figure, inches; it fits a telephone without shrinking much
+WIDTH = 4.8  # Width of a figure, inches; on a telephone it is shrunk only a little
 
-# Colours in figures, also in review_page.mplstyle, that the page replaces by those of its light or
-# dark mode.
+# Placeholder colours in figures and in review_page.mplstyle. The page replaces them by the colours
+# of its light or dark mode.
 INK, SOFT, LINE, BAD = "#010203", "#595a5b", "#cfd0d1", "#b30102"
 
-MOST_CURVES = 12  # Number of fills that are drawn in Nichols and Bode diagrams
+MOST_CURVES = 12  # Largest number of fills that are drawn in Nichols and Bode diagrams
 
-MOST_UNSTABLE = 12  # Number of unstable points in their table
+MOST_UNSTABLE = 12  # Largest number of rows in the table of unstable points
 
-GAINS = (-50.0, 40.0)  # Range of the resonances' loop gain, dB
+GAINS = (-50.0, 40.0)  # Range of the peak loop gain in the diagram of slosh modes, dB
 
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
@@ -51,7 +51,7 @@ def page(review: "Review") -> str:
 
 
 def document(title: str, body: str) -> str:
-    """Return an HTML page with this title, which is also its heading, and this body."""
+    """Return an HTML page with ``title`` as title and heading, and with ``body``."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -74,7 +74,7 @@ def _facts(review: "Review") -> str:
 
 
 def _figures(review: "Review") -> Iterator[str]:
-    """Yield the figures; each title is a question."""
+    """Yield the figures as HTML; the title of each figure is a question."""
     from .fmu import Fmu
 
     unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
@@ -167,7 +167,7 @@ def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure],
 
 
 def _signs(margin: str, drawn: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the signs of a margin's limits in a panel; a gain margin has two limits."""
+    """Return the signs of a margin's limits in a panel; a gain margin is limited on both sides."""
     if margin == "gain_margin":
         return (1, -1) if "gain_up" in drawn else ()
     return (1,) if margin in drawn else ()
@@ -203,18 +203,18 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
 
 
 def _marked(review: "Review") -> str:
-    """Return the sentence that explains the marks of unstable fills, or an empty text."""
+    """Return text that explains the marks of unstable fills, or an empty string if none."""
     bands = review.bands()
     if not bands["unstable"].any():
         return ""
     return (
-        " that are stable, since an unstable one has no margin. Red lines: fills whose nominal "
-        "point is unstable (solid), or another one within the uncertainty (dashed)"
+        " that are stable, because an unstable point has no margin. Solid red line: fill with an "
+        "unstable nominal point. Dashed red line: fill with another unstable point"
     )
 
 
 def _mark_unstable(ax: "Axes", bands: pd.DataFrame) -> None:
-    """Draw a line at each fill with unstable points: solid if its nominal point is one."""
+    """Draw a line at each fill with unstable points: solid if the nominal point is unstable."""
     nominal = bands["modulus_margin_nominal"].isna()
     for chosen, style, label in (
         (nominal, "-", "nominal loop unstable"),
@@ -226,14 +226,17 @@ def _mark_unstable(ax: "Axes", bands: pd.DataFrame) -> None:
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
-    """Return ends of an axis at least 1 % apart, so that rounding errors do not fill it."""
+    """Return limits of an axis at least 1 % apart, so that it does not magnify rounding errors."""
     least = 0.01 * max(abs(low), abs(high))
     more = max(least - (high - low), 0) / 2
     return low - more, high + more
 
 
 def _by_mode(review: "Review") -> list[tuple[str, str, pd.DataFrame]]:
-    """Return colour, name and rows of each mode; beyond the palette they share one colour."""
+    """Return colour, name and rows of each slosh mode.
+
+    If there are more modes than colours, the remaining modes share one colour.
+    """
     groups = list(review.slosh.groupby("mode", sort=False))
     last = len(COLORS) - 1
     if len(groups) > len(COLORS):
@@ -266,7 +269,7 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
 def key_of(figure: "Figure", columns: int = 2, shown: Sequence[int] | None = None) -> None:
     """Move the legend of a figure below its axes, where it hides no curve.
 
-    ``shown`` has the numbers of the lines to be named; by default all lines are.
+    ``shown`` has the indices of the lines in the legend; by default it has all lines.
     """
     handles, labels = figure.axes[0].get_legend_handles_labels()
     if handles:
@@ -296,7 +299,7 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
 
 
 def _curves(review: "Review") -> list[Curves]:
-    """Return the loop gains to draw, by command: at fills in equal steps, and at the worst case."""
+    """Return for each command the loop gains at equally spaced fills and at the worst case."""
     count = len(review.fills)
     chosen = sorted(set(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int)))
     unstable = [k for k, point in enumerate(review.nominal) if not point.margins.stable]
@@ -318,14 +321,14 @@ def _curves(review: "Review") -> list[Curves]:
 
 
 def _shade(share: float) -> str:
-    """Return a colour between the palette's first two, which both modes of the page show well."""
+    """Return a colour between the palette's first two, which suit both light and dark mode."""
     ends = np.array([[0x00, 0x82, 0xC8], [0xE0, 0x6A, 0x10]])
     r, g, b = (ends[0] + share * (ends[1] - ends[0])).round().astype(int)
     return f"#{r:02x}{g:02x}{b:02x}"
 
 
 def _key(figure: "Figure") -> None:
-    """Name the first and the last fill, unstable ones, and the worst case."""
+    """Add a legend with the first fill, the last fill, unstable fills and the worst case."""
     _, labels = figure.axes[0].get_legend_handles_labels()
     unstable = [k for k, label in enumerate(labels[:-1]) if label.endswith("unstable")]
     last = len(labels) - 1
@@ -364,7 +367,7 @@ def _what_is_drawn(found: "Confirmation") -> str:
 
 
 def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
-    """Draw the size of the command at the limit; of an unstable loop all commands."""
+    """Draw the peaks of the commands in the simulation of the worst case."""
     found = review.confirmation
     ax = figure.subplots()
     commands = [found.command] if found.command else list(review.worst.gain.inputs)
@@ -376,7 +379,7 @@ def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
         groups = (time / window).astype(int)
         peaks = pd.Series(signal).groupby(groups).max().iloc[:-1]
         times = pd.Series(time).groupby(groups).mean().iloc[:-1]
-        if peaks.iloc[len(peaks) // 2 :].max() > 1e-6 * last:  # another axis is at rest
+        if peaks.iloc[len(peaks) // 2 :].max() > 1e-6 * last:  # leave out axes that are at rest
             text = f"gain × {factor:.4g}" if found.command else name
             ax.plot(times, peaks, "-", color=COLORS[k % len(COLORS)], label=text)
     name = found.command or "size of the command"
@@ -388,7 +391,7 @@ def _tables(review: "Review") -> str:
     bands = review.bands()
     head = ("fill", "unstable", "modulus", "phase, deg", "gain up, dB", "gain down, dB", "delay, s")
     names = ("modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin")
-    # unstable fills first, the nominal ones before the others
+    # sort fills with an unstable nominal point first, then other fills with unstable points
     first = np.isnan(bands["modulus_margin_nominal"]) * 2 + (bands["unstable"] > 0)
     bands = bands.loc[first.sort_values(ascending=False, kind="stable").index]
     rows = [
@@ -401,7 +404,7 @@ def _tables(review: "Review") -> str:
     if len(review.slosh):
         head = ("mode", "frequency, Hz", "ζ open, %", "ζ closed, %", "peak, dB", "stabilised by")
         rows, words = [], review.modes()
-        for mode in words:  # unstable ones first
+        for mode in words:  # unstable modes come first
             of = review.slosh[review.slosh["mode"] == mode]
             columns = (of["frequency"], 100 * of["zeta"], 100 * of["zeta_closed"], of["peak"])
             spans = [f"{c.min():.3g} to {c.max():.3g}" for c in columns]
@@ -422,7 +425,7 @@ def _tables(review: "Review") -> str:
 
 
 def _requirements(review: "Review") -> str:
-    """Return the table of requirements; nothing without them."""
+    """Return the table of requirements as HTML; empty if there are none."""
     rows, units = [], {str(limit): limit.unit for limit in review.limits}
     for row in review.requirements().itertuples():
         least = f"{row.least:.3g}{units[row.requirement]}" if row.least > -np.inf else "unstable"
@@ -436,7 +439,7 @@ def _requirements(review: "Review") -> str:
 
 
 def _unstable(row: Any) -> str:
-    """Return which points of a fill are unstable."""
+    """Return text with the number of unstable points of a fill; the nominal point is named."""
     if not row["unstable"]:
         return "no"
     nominal = "nominal, " if np.isnan(row["modulus_margin_nominal"]) else ""
@@ -444,7 +447,7 @@ def _unstable(row: Any) -> str:
 
 
 def _unstable_points(review: "Review") -> str:
-    """Return the table of unstable points; nothing if all are stable."""
+    """Return the table of unstable points as HTML; empty if all points are stable."""
     table = review.unstable()
     if table.empty:
         return ""

@@ -1,4 +1,4 @@
-"""A point of a design review: a loop with its margins."""
+"""An operating point of a design review: a loop with its margins."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One point of a review: a fill and values of the uncertain quantities, with their margins."""
+    """An operating point of a review: a fill, values of the uncertain quantities, and margins."""
 
     fill: int
     """Index of the fill."""
     shares: Vector
-    """Position of each uncertain quantity: -1 low end, 0 nominal, 1 high end."""
+    """Position of each uncertain quantity in its range: -1 low end, 0 nominal, 1 high end."""
     loop: Loop
-    """Loop at this point, its thrust through the centre of mass."""
+    """Loop at this point, around the trimmed craft."""
     margins: Margins
     """Margins of the loop."""
     gain: LinearModel

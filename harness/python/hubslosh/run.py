@@ -1,4 +1,4 @@
-"""A run's table: pandas' own, with ``view()``."""
+"""Table of a run: a pandas.DataFrame with ``view()`` and ``out_of_range``."""
 
 from pathlib import Path
 from typing import Any
@@ -8,14 +8,14 @@ from .viewing import View, view
 
 
 class Noted(dict[str, Any]):
-    """Values by name among a run's ``attrs``; each value, such as a number, is never changed.
+    """Dictionary in the ``attrs`` of a run, whose values are never changed.
 
-    Pandas copies ``attrs`` with all that is in them for each part of a table. A copy of the
-    dictionary itself is enough here, and takes a hundredth of the time.
+    Pandas makes a deep copy of ``attrs`` for each selection of a table. Because the values never
+    change, a shallow copy is enough; it takes a hundredth of the time.
     """
 
     def __deepcopy__(self, _memo: Any) -> "Noted":
-        """Return a copy with the same values."""
+        """Return a shallow copy."""
         return Noted(self)
 
 
@@ -36,11 +36,11 @@ class Run(ShortTable):
 
     @property
     def out_of_range(self) -> list[str]:
-        """Sentences about the tanks that left the range of their model, one for each.
+        """One sentence for each tank that left the range of its model.
 
-        Each sentence states the reasons, the share of the time and the first time at which the tank
-        was out of range. The list is empty if the whole run stayed in range, or if the FMU has no
-        variable that says so. A selection of a run has the sentences of the whole run.
+        The sentence states why, for which share of the time, and when for the first time. The list
+        is empty if all tanks stayed in range, or if the FMU has no variable for this. A selection
+        of a run has the sentences of the whole run.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Monte Carlo studies: runs with random parameters, resumable, and quantiles of the results."""
+"""Monte Carlo studies, which can be resumed after a stop, and quantiles of their results."""
 
 import hashlib
 import json
@@ -30,17 +30,17 @@ from .store import Store, encoded
 if TYPE_CHECKING:
     import pandas as pd
 
-# Evaluation of one draw: numbers by name, from values by name.
+# Function that evaluates one draw: it takes the drawn values by name and returns numbers by name.
 Outcome = Callable[[dict[str, Any]], Mapping[str, float]]
 
-# (low, high) or a share of a nominal value, such as "10%": uniform; a list: one of its items; a
-# frozen distribution of ``scipy.stats``.
+# Range of a random value: (low, high) or a share of a nominal value, such as "10%", for a uniform
+# distribution; a list, of which one item is drawn; or a frozen distribution of ``scipy.stats``.
 Range = Any
 
-FAILED = "refused"  # Column that says what the FMU refused
+FAILED = "refused"  # Column with the error message if the FMU refuses a run
 
-# Runs that a Dask cluster has at a time. More would keep no more workers busy, and each result is
-# found by a search through all of them.
+# Number of runs that a Dask cluster has at a time. A larger number would not keep more workers
+# busy, and would slow down the collection of results, which searches all these runs.
 ON_DASK = 1000
 
 
@@ -54,8 +54,8 @@ def draw(
     """Return the values of one run of `monte_carlo`.
 
     A value depends only on the seed, on the number of the run, and on the names in ``ranges`` up to
-    its own name; the values of a run do not depend on the number of runs in the study. A uniform
-    distribution gives the numbers that a plan with the same ``[random]`` draws.
+    its own name; it does not depend on the number of runs in the study. A plan of ``hubslosh
+    campaign`` with the same uniform distributions in ``[random]`` has the same values.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def draw(
     Raises
     ------
     FmuError
-        If a range is not one of those that are allowed, or a number is out of range.
+        If a range has none of the allowed forms, or a number is out of range.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def _drawn(ranges: Mapping[str, Range], run: int, seed: int) -> dict[str, Any]:
 
 
 def _value(of: Range, share: float) -> Any:
-    """Return the value that a uniform number in [0, 1) stands for."""
+    """Return the value of a range for the uniform random number ``share`` in [0, 1)."""
     if hasattr(of, "ppf"):
         value = of.ppf(share)
     elif isinstance(of, list):
@@ -108,7 +108,7 @@ def _value(of: Range, share: float) -> Any:
 
 
 def _resolved(ranges: Any, nominal: Any) -> tuple[dict[str, Range], list[str]]:
-    """Return ranges with (low, high) for relative limits, and a message for each error."""
+    """Return ranges with (low, high) in place of shares such as "10%", and all error messages."""
     if not isinstance(ranges, Mapping) or not ranges:
         return {}, ["ranges must be (low, high), a share, a list or a distribution for each name"]
     if not isinstance(nominal, Mapping | None):
@@ -125,7 +125,7 @@ def _resolved(ranges: Any, nominal: Any) -> tuple[dict[str, Range], list[str]]:
         except KeyError:
             problems.append(
                 f"{name} is given as {of} of its nominal value, which is not known: give "
-                f"nominal={{{name!r}: …}}, or take Craft.monte_carlo, which knows it"
+                f"nominal={{{name!r}: …}}, or use Craft.monte_carlo, which computes it"
             )
             continue
         except (TypeError, ValueError):
@@ -138,7 +138,7 @@ def _resolved(ranges: Any, nominal: Any) -> tuple[dict[str, Range], list[str]]:
     return found, problems
 
 
-# Further kinds of ranges, in messages after those of `range_ends`.
+# End of the error messages of `range_ends`: further forms of ranges that are allowed here.
 ALSO = "; or a list of values, or a distribution such as scipy.stats.norm(650, 10)"
 
 
@@ -154,34 +154,36 @@ def monte_carlo(
     progress: Progress = None,
     nominal: Mapping[str, float] | None = None,
 ) -> "pd.DataFrame":
-    """Run a Monte Carlo study: draw random values, simulate each draw, and return a row for each.
+    """Run a Monte Carlo study: draw random values for each run, and simulate each run.
 
     Parameters
     ----------
     ranges : mapping
         Range of each name: (low, high) for a uniform distribution, a share such as "10%" of the
         value in ``nominal`` on both sides, a list of values, or a frozen distribution of
-        ``scipy.stats``. A run's values depend only on seed and number: the first 200 of 400 runs
-        are the runs of a study with 200. Items of a list keep their type.
+        ``scipy.stats``. Items of a list keep their type. The values of a run depend only on the
+        seed and the number of the run, so that the first 200 of 400 runs are the same as the runs
+        of a study with 200 runs.
     runs : int
         Number of runs.
     seed : int, default 1
         Seed of the draws.
     outcome : callable, optional
         Function of the drawn values (a dict by name) that makes the run and returns numbers by
-        name. By default the table has only the draws. The parameters of a `Craft`, such as
-        ``NTO.frequency[1]`` and ``delay``, may be names of ranges:
-        ``craft.loop(law, period, fill, parameters=values)`` takes them. `Craft.monte_carlo` knows
-        their nominal values.
+        name. By default nothing is simulated, and the table has only the drawn values. Ranges may
+        have the names of parameters of a `Craft`, such as ``NTO.frequency[1]`` and ``delay``; then
+        pass the drawn values to ``craft.loop(law, period, fill, parameters=values)``.
+        `Craft.monte_carlo` also computes their nominal values.
     folder : path, optional
-        Folder that makes the study resumable. Each run is stored as soon as it is done, and the
-        same call continues a stopped study, even after kill -9. Stored runs are verified by their
-        SHA-256 in ``manifest.sha256`` and by the seed. A run that was changed from outside is
-        simulated again, and a warning says why. ``runs.csv`` is written at the end. One process
-        at a time holds the folder. A change of the function ``outcome`` is not detected: use
-        another folder if you change it.
+        Folder in which each run is stored as soon as it is done, so that the same call continues a
+        stopped study, even after kill -9. Stored runs are verified by their SHA-256 in
+        ``manifest.sha256`` and by the seed. A stored run that was changed is simulated again, with
+        a warning. ``runs.csv`` is written at the end. Only one process at a time can use the
+        folder. A change of the function ``outcome`` is not detected: use another folder if you
+        change it.
     client : distributed.Client, optional
-        Client of Dask; its workers need this package. Without a client the study uses threads.
+        Client of a Dask cluster, on whose workers this package must be installed. Without a client
+        the study uses threads.
     workers : int, optional
         Number of threads, by default one per core. `simulate` and loops with a linear controller
         run in parallel; a controller in Python runs on one core at a time.
@@ -201,9 +203,9 @@ def monte_carlo(
     Raises
     ------
     FmuError
-        If an argument is wrong, the FMU refuses every run, another process holds the folder, or
-        the folder belongs to another study or to a campaign, or its manifest is damaged. Any
-        other exception of ``outcome`` ends the study, too; stored runs stay.
+        If an argument is wrong, the FMU refuses every run, another process uses the folder, the
+        folder belongs to another study or to a campaign, or its manifest is damaged. Any other
+        exception of ``outcome`` also ends the study; stored runs are kept.
 
     Examples
     --------
@@ -228,7 +230,7 @@ def monte_carlo(
     if outcome is not None and not callable(outcome):
         problems.append(f"outcome must be a function of the drawn values, not {outcome!r}")
     refuse(problems)
-    runs, seed = int(runs), int(seed)  # numpy's integers too
+    runs, seed = int(runs), int(seed)  # convert integers of NumPy
     draws = [_drawn(ranges, run, seed) for run in range(runs)]
     if outcome is None:
         table = ShortTable([{"run": run} | values for run, values in enumerate(draws)])
@@ -270,7 +272,7 @@ def monte_carlo(
 
 
 def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the results of one random run."""
+    """Call ``outcome`` for one run, and return its results, or the message of the FMU's error."""
     try:
         found = outcome(dict(values))
     except FmuError as error:
@@ -290,7 +292,7 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _result(value: Any) -> float:
-    """Return an outcome as a float; raise an error for a text, even if it is a number."""
+    """Return an outcome as a float; raise an error for a string, even for a string of digits."""
     if isinstance(value, str | bytes | bytearray):
         raise TypeError
     return float(value)
@@ -305,7 +307,7 @@ def _checked(found: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
 def _results(
     pool: Executor, most: int, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield each run with its results when it is done, with ``most`` runs under way."""
+    """Yield number and results of each run when it is done; up to ``most`` runs are in progress."""
     with pool:
         under_way: dict[Future[dict[str, Any]], tuple[int, dict[str, Any]]] = {}
         try:
@@ -315,7 +317,7 @@ def _results(
                 if not under_way:
                     return
                 done = wait(under_way, return_when=FIRST_COMPLETED).done
-                # A run that raised ends the study: after those that were done with it.
+                # A run with an exception ends the study. Yield the other finished runs first.
                 for future in sorted(done, key=lambda future: future.exception() is not None):
                     run, values = under_way.pop(future)
                     yield run, _checked(future.result(), values)
@@ -325,7 +327,7 @@ def _results(
 
 
 def _text(name: str, of: Range) -> str:
-    """Return a text that identifies a range, so that stored runs of other ranges are not reused."""
+    """Return a string that identifies a range; runs that were stored for others are not reused."""
     if hasattr(of, "ppf"):
         shape = ", ".join(f"{of.ppf(share):.17g}" for share in (0.01, 0.2, 0.5, 0.8, 0.99))
         kind = getattr(getattr(of, "dist", None), "name", type(of).__name__)
@@ -335,9 +337,9 @@ def _text(name: str, of: Range) -> str:
             text = json.dumps(encoded(of))
         except TypeError as error:
             raise FmuError(
-                f"{name} has {error}, which a study's folder cannot store (allowed: numbers, "
-                "numpy's too, Booleans, texts, paths, and lists, tuples and dictionaries of them); "
-                "draw a number or a text instead and look the value up in outcome"
+                f"{name} has {error}, which a study's folder cannot store (allowed: numbers, also "
+                "of NumPy, Booleans, strings, paths, and lists, tuples and dictionaries of these); "
+                "draw a number or a string instead, and look the value up in outcome"
             ) from None
         return text if len(text) < 200 else hashlib.sha256(text.encode()).hexdigest()
     low, high = of

@@ -1,11 +1,11 @@
 r"""D and G scalings of real, repeated parameters (Fan, Tits and Doyle 1991), by Clarabel.
 
-Δ is diagonal and real, each parameter in one block of copies. With Hermitian D > 0 and G that have
-a full block for each parameter, and thus commute with Δ,
+Δ is diagonal and real, and the copies of each parameter form one block. Let D > 0 and G be
+Hermitian with a full block for each parameter, so that both commute with Δ. If
 
     X = N^H D N - D + j (G N - N^H G) < 0
 
-shows that I - N Δ is regular for all |δ| ≤ 1: (I - N Δ) v = 0 with w = Δ v, v = N w would give
+then I - N Δ is regular for all |δ| ≤ 1. Proof: (I - N Δ) v = 0 with w = Δ v, v = N w would give
 w^H X w = v^H D v - w^H D w ≥ 0, because the term with G vanishes for a real Δ.
 """
 
@@ -20,15 +20,15 @@ from .fmu import FmuError
 Complex = NDArray[np.complex128]
 Vector = NDArray[np.float64]
 
-FLOOR = 1e-6  # Least eigenvalue of D; its mean is 1, in coordinates in which |N| is balanced
+FLOOR = 1e-6  # Lower bound of the eigenvalues of D, whose mean is 1, after balancing of N
 
-SMALLEST = 1e-3  # Bounds of µ below this are not resolved
+SMALLEST = 1e-3  # Smallest bound of µ that is computed
 
 
 def solver() -> Any:
     """Return the module of the convex solver Clarabel.
 
-    Raises FmuError, which says how to install it, if it is missing.
+    Raises FmuError with the command that installs Clarabel if it is missing.
     """
     try:
         import clarabel
@@ -72,7 +72,7 @@ class Scalings:
         self.clarabel = solver()
         self.counts = tuple(int(count) for count in counts)
         self.copies = np.repeat(np.arange(len(self.counts)), self.counts)
-        """Number of the parameter of each copy."""
+        """Index of the parameter for each row of Δ."""
         self.solved = 0
         """Number of convex problems that were solved."""
         n, basis, start = sum(self.counts), [], 0
@@ -85,7 +85,8 @@ class Scalings:
                         basis.append(unit)
             start += count
         self.basis = np.array(basis)
-        # D ≥ FLOOR in each block, and its trace is n; the last column is that of the margin
+        # Constraints: D ≥ FLOOR in each block, and the trace of D is n. The last unknown is the
+        # margin.
         rows, bounds, self.cones, start = [], [], [], 0
         for count in self.counts:
             block = self.basis[:, start : start + count, start : start + count]
@@ -96,7 +97,7 @@ class Scalings:
         rows.append(np.trace(self.basis, axis1=1, axis2=2).real[:, None])
         bounds.append(np.array([float(n)]))
         self.cones.append(self.clarabel.ZeroConeT(1))
-        # where N allows it, G makes the margin as large as one likes
+        # limit the margin to 1, because for some N a large G would make it arbitrarily large
         bounds.append(np.array([1.0]))
         self.cones.append(self.clarabel.NonnegativeConeT(1))
         left = np.hstack(rows)
@@ -106,7 +107,8 @@ class Scalings:
         self.bounds = np.concatenate(bounds)
         settings = self.clarabel.DefaultSettings()
         settings.verbose, settings.max_iter, settings.max_threads = False, 60, 1
-        # |N| is balanced already; what comes back is judged by its eigenvalues, not by tolerances
+        # No equilibration, because N is balanced already. Coarse tolerances suffice, because the
+        # eigenvalues of X decide whether a solution proves anything.
         settings.equilibrate_enable = settings.chordal_decomposition_enable = False
         settings.tol_gap_abs = settings.tol_gap_rel = 1e-3
         settings.tol_feas = 1e-7
@@ -160,7 +162,7 @@ class Scalings:
 
         if not N.any():
             return 1 / SMALLEST
-        # the size below which the norm of N proves it
+        # size below which the norm of N alone proves that I - N Δ is regular
         norm = -float(np.log(np.linalg.norm(_balanced(N)[0], 2))) - 1e-9
         most, step = -float(np.log(SMALLEST)), 0.1
         low = high = min(max(float(np.log(guess)), norm), most)
@@ -182,17 +184,18 @@ class Scalings:
 def mu_upper(N: Complex, counts: Sequence[int], least: Vector | None = None) -> float:
     """Return an upper bound of µ of a matrix for real, repeated parameters.
 
-    ``counts`` has the number of copies of each parameter in Δ. ``least`` has lower ends of δ for
-    parameters whose range ends on one side, such as damping ratios.
+    ``counts`` has the number of copies of each parameter in Δ. ``least`` has lower bounds of δ for
+    parameters such as damping ratios, which cannot be below 0.
     """
     ends = np.full(len(counts), -np.inf) if least is None else least
     return 1 / Scalings(counts).largest(np.asarray(N, complex), ends)
 
 
 def _balanced(N: Complex) -> tuple[Complex, Vector]:
-    """Return N scaled so that rows and columns have the same size (Osborne), and the scale.
+    """Return N scaled so that its rows and columns have the same norm (Osborne), and the scale.
 
-    LAPACK's scales are powers of 2; these are continuous in N, and with them D and G.
+    LAPACK is not used, because its scales are powers of 2. The scales here are continuous in N, so
+    that D and G are continuous, too.
     """
     sizes = np.abs(N) + 1e-9 * np.abs(N).max()
     np.fill_diagonal(sizes, 0.0)
@@ -208,7 +211,7 @@ def _balanced(N: Complex) -> tuple[Complex, Vector]:
 
 
 def _triangle(matrices: Complex) -> Vector:
-    """Return Hermitian matrices in the solver's form: triangles of real symmetric matrices."""
+    """Return the triangles of the real symmetric matrices that represent Hermitian matrices."""
     real, imaginary = matrices.real, matrices.imag
     whole = np.concatenate([
         np.concatenate([real, -imaginary], -1), np.concatenate([imaginary, real], -1)

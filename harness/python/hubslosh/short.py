@@ -1,4 +1,4 @@
-"""Texts for ``print``: at most 20 lines."""
+"""Short texts for ``print``, of at most 20 lines."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,11 +9,11 @@ MOST = 10  # Rows of a table that are printed
 
 
 class ShortTable(pd.DataFrame):
-    """A pandas.DataFrame that prints in ten rows and eight columns; notebooks show it as usual."""
+    """A pandas.DataFrame of which ``print`` shows at most ten rows and eight columns."""
 
     @property
     def _constructor(self) -> Any:
-        """Return the type of a part of the table."""
+        """Return the class of selections of the table."""
         return type(self)
 
     def __repr__(self) -> str:
@@ -25,13 +25,13 @@ class ShortTable(pd.DataFrame):
 
 
 def rows(table: pd.DataFrame, most: int = MOST) -> str:
-    """Return the first rows of a table, and the number of rows that follow."""
+    """Return the first rows of a table as text, and the number of rows that are left out."""
     text = table.head(most).to_string(index=False, na_rep="", float_format=lambda x: f"{x:.4g}")
     left = len(table) - most
     return f"{text}\nand {left} more" if left > 0 else text
 
 
 def names(of: Sequence[str], most: int = 6) -> str:
-    """Return names separated by commas; of many names only the first, and the total number."""
+    """Return names separated by commas; of many names, the first ones and the total number."""
     left = len(of) - most
     return ", ".join(of[:most]) + (f" and {left} more" if left > 0 else "")

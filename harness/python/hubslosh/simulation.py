@@ -1,4 +1,4 @@
-"""A simulation in one function: parameters and input histories in, a table out."""
+"""Simulation of an FMU in one call: from parameters and input histories to a table."""
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
@@ -26,22 +26,22 @@ from .wheels import Wheel, columns_of, follow, torques_of, units_of
 
 Real = NDArray[np.float64]
 
-# Columns of a torque history (``hubslosh torque``) that are the slope of an input.
+# Columns of a torque history (``hubslosh torque``) that have the slope of an input, by this input.
 SLOPES = {"tau_slope": TORQUE}
 
-DEFAULT_STEP = 0.02  # s, where neither rows nor the FMU suggest another
+DEFAULT_STEP = 0.02  # Step if neither the rows of the inputs nor the FMU specify one, s
 
 MOST_ROWS = 20_000_000  # Largest size of a table; the same as in ``harness/files/src/budget.rs``
 
 
 class History:
-    """An input over time: straight lines between rows, or steps.
+    """An input over time, interpolated linearly between rows or held from row to row.
 
     Two rows with the same time are a jump.
     """
 
     def __init__(self, time: Real, values: Real, slopes: Real | None, hold: bool) -> None:
-        """Store rows. ``slopes`` are those until the next row; None: lines join the rows."""
+        """Store the rows, with the slope after each row; without slopes, interpolate linearly."""
         self.time = time
         self.native = native.History(time, values, slopes, hold)
 
@@ -65,56 +65,57 @@ def simulate(
 ) -> Run:
     """Simulate an FMU by its own solver (Co-Simulation) and return its outputs over time.
 
-    In each row of the result the inputs are the values that act from the time of the row on, and
+    In each row of the result, the inputs are the values that act from the time of the row on, and
     the outputs are the values just before these inputs act. Therefore, if an output depends
-    directly on an input, a jump of the input shows in the output one row later. ``.attrs["rows"]``
-    and ``.attrs["inputs"]`` also state this.
+    directly on an input, a jump of the input appears in the output one row later.
+    ``.attrs["rows"]`` and ``.attrs["inputs"]`` also state this.
 
     Parameters
     ----------
     model : str or Path
         Name of an FMU of this package (see `fmu_path`), such as "HubSlosh" or, of FMI 3.0,
-        "HubSlosh-fmi3"; or the file of any FMU 2.0 or 3.0 for Co-Simulation. Results of FMI 2.0
-        and FMI 3.0 are bit-identical if inputs are held; with interpolated inputs the last digits
-        may differ.
+        "HubSlosh-fmi3"; or the file of any FMU 2.0 or 3.0 for Co-Simulation. The FMI 2.0 and 3.0
+        versions of an FMU give bit-identical results if inputs are held; with interpolated inputs
+        the last digits may differ.
     parameters : mapping, str or Path, optional
         Values of parameters and inputs by name, in SI units or with one of the variable's own
         units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of
         parameters, see `read_parameters`.
     inputs : DataFrame, optional
-        A table with the column ``time`` (s, growing; two rows at one time are a jump) and one
-        column for each input, with straight lines between the rows. Values are in SI units, or
-        in the units that ``inputs.attrs["units"]`` names, such as ``{"wheel_speed": "rpm"}``;
-        these must be units that the FMU declares for the input. ``tau_slope``, which ``hubslosh
-        torque`` writes, is the slope of ``tau_cmd``.
+        A table with the column ``time`` (s, in ascending order; two rows with the same time are a
+        jump) and one column for each input, interpolated linearly between the rows. Values are in
+        SI units, or in the units of ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``,
+        if the FMU declares the unit for the input. ``tau_slope``, which ``hubslosh torque`` writes,
+        is the slope of ``tau_cmd``.
     stop : float, optional
-        Time of the last row, s; by default the last time of the inputs, otherwise the FMU's
-        suggestion.
+        Time of the last row, s; by default the last time of the inputs or, without inputs, the
+        default of the FMU.
     step : float, optional
-        Time between the rows of the result, s; by default the rows of the inputs, otherwise the
-        FMU's suggestion. The FMU steps to every row of the inputs whatever the step.
+        Time between the rows of the result, s. By default the result has the rows of the inputs or,
+        without inputs, the default step of the FMU. The FMU always steps to every row of the
+        inputs.
     outputs : str or sequence of str, optional
-        Variables to record, a vector by its name (``"omega"``). By default all outputs, and for
-        the six-axis FMUs also the slosh angles of the tanks in use and the liquid of tanks that
-        drain, by which `view` draws the run.
+        Names of variables or vectors (``"omega"``) to record. By default all outputs and, for
+        Spacecraft and SloshTank, the variables from which `view` draws the run: the slosh angles of
+        the tanks in use, and the liquid of tanks that drain.
     start : float, optional
-        Time of the first row, s; by default the first time of the inputs, otherwise the FMU's
-        suggestion.
+        Time of the first row, s; by default the first time of the inputs or, without inputs, the
+        default of the FMU.
     tolerance : float, optional
-        Relative tolerance of the FMU's solver; by default its own choice.
+        Relative tolerance of the FMU's solver; by default the FMU chooses it.
     hold : bool
-        True: each input keeps its value until the next row. False: inputs follow straight lines
+        True: each input keeps its value until the next row. False: inputs are interpolated linearly
         between the rows; if the FMU cannot interpolate its inputs, this is possible only for
         inputs that are constant.
 
     Returns
     -------
     Run
-        A pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
-        number. Units are in ``.attrs["units"]``, and the simulated FMU and its parameters in
-        ``.attrs["model"]`` and ``.attrs["parameters"]``. ``.out_of_range`` says which tanks left
-        the range of their model, why, when first, and for which share of the time. ``.view()``
-        shows the run in 3-D.
+        A pandas table with the columns ``time``, the inputs and ``outputs``; enumerations are
+        numbers. Units are in ``.attrs["units"]``, and the simulated FMU and its parameters in
+        ``.attrs["model"]`` and ``.attrs["parameters"]``. ``.out_of_range`` lists the tanks that
+        left the range of their model, with the reason, the first time, and the share of the time.
+        ``.view()`` shows the run in 3-D.
 
     Raises
     ------
@@ -152,9 +153,10 @@ def run_of(
     wheels: Mapping[str, Wheel] = MappingProxyType({}),
     momentum: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Run:
-    """Return the run of `simulate`, in which columns of ``inputs`` can also command wheels.
+    """Simulate as `simulate` does; columns of ``inputs`` can also command reaction wheels.
 
-    ``times`` are start, stop and step; ``momentum`` is that of all wheels at the start, N·m·s.
+    ``times`` are start, stop and step, s. ``momentum`` is the angular momentum of all wheels at the
+    start, N·m·s.
     """
     fmu, (start, stop, step) = Fmu.open(model), times
     parameters = parameters_of(parameters)
@@ -224,21 +226,23 @@ def record_run(
     units: Mapping[str, str] = MappingProxyType({}),
     computed: Callable[[], dict[str, Real]] = dict,
 ) -> Run:
-    """Run an FMU from point to point along ``histories`` and return its table.
+    """Simulate an FMU through the times ``points`` with inputs ``histories``, and return its table.
 
-    * ``wanted`` marks the rows to return; None returns all.
-    * ``constants``: values of further inputs at the start, which ``feedback`` then sets.
-    * ``computed`` returns, after the run, columns that are no variables of the FMU, or that the
-      controller has computed; ``units`` has the units of the former.
+    * ``wanted``: mask of the rows to return; None returns all.
+    * ``constants``: values at the start of the inputs that ``feedback`` sets later.
+    * ``computed``: function that is called after the run and returns further columns by name, such
+      as the commands of the controller; ``units`` has the units of columns that are not variables
+      of the FMU.
 
-    The variables that say why a tank is out of range are recorded in any case, and become columns
-    if ``columns`` names them.
+    The variables that state why a tank is out of range are always recorded, but are columns of the
+    table only if ``columns`` names them.
     """
     fmu = Fmu.open(model)
     limits = native.limit_columns(fmu.native)
     values = {name: history.after(points) for name, history in histories.items()}
     given = {name: value for name, (value, _) in values.items()}
-    # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
+    # Set slopes only if an input has one. This saves calls, and also allows FMUs that cannot
+    # interpolate inputs.
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
     known = given.keys() | constants.keys()
@@ -271,7 +275,7 @@ def record_run(
 def parameters_of(
     parameters: Parameters | str | Path | None,
 ) -> dict[str, Quantity]:
-    """Return a dictionary of parameters; a text or a path is read as a file of parameters.
+    """Return a dictionary of parameters; a string or a path is read as a parameter file.
 
     See `hubslosh.read_parameters` for the formats of the file.
     """
@@ -292,7 +296,7 @@ def without_replaced(
 ) -> dict[str, Quantity]:
     """Return parameters without the constants that a history in ``inputs`` replaces.
 
-    Parameters in ``given``, which the caller gave together with ``inputs``, are kept, so that
+    Parameters in ``given``, which the user gives together with ``inputs``, are kept, so that
     `check_parameters` refuses values that are given twice.
     """
     columns = getattr(inputs, "columns", ())
@@ -307,7 +311,7 @@ def outputs_of(
 ) -> list[str]:
     """Return the names of the variables to record.
 
-    For ``None`` the function returns all outputs and the variables from which `view` draws the run.
+    If ``outputs`` is None, these are all outputs and the variables from which `view` draws the run.
     """
     if outputs is not None:
         return fmu.components(names_of(outputs, "outputs", problems))
@@ -318,7 +322,7 @@ def outputs_of(
         try:
             return int(fmu.convert(name, parameters.get(name, fmu.variables[name].start)))
         except (FmuError, TypeError):
-            return 0  # what is wrong with a parameter is said elsewhere
+            return 0  # `check_parameters` reports what is wrong with the parameter
 
     tanks = ["tank", *(f"tank[{i}]" for i in range(1, max(number("tanks"), 1) + 1))]
     drawn = [
@@ -333,7 +337,7 @@ def outputs_of(
 
 
 def too_many_rows(start: float, stop: float, step: float) -> list[str]:
-    """Return a list with an error message if there are more than `MOST_ROWS` rows; else []."""
+    """Return a list with an error message if there are more than `MOST_ROWS` rows, else []."""
     rows = (stop - start) / step
     if rows <= MOST_ROWS:
         return []
@@ -348,9 +352,10 @@ def histories_of(
     problems: list[str],
     torques: Container[str] = (),
 ) -> dict[str, History]:
-    """Return the history of each input by its name, and of the torques of wheels, which are held.
+    """Return the history of each column of ``inputs`` by its name.
 
-    Everything that is wrong with the table ``inputs`` is appended to ``problems``.
+    ``torques`` are the names of torques of reaction wheels, which are allowed, too; they are held
+    from row to row. Everything that is wrong with ``inputs`` is appended to ``problems``.
     """
     if inputs is None:
         return {}
@@ -378,7 +383,7 @@ def histories_of(
         if (values := column_of(inputs, name, "inputs", problems)) is not None:
             columns[name] = values
     if "time" not in inputs.columns:
-        problems.append("inputs has no column time")
+        problems.append("inputs has no column named time")
     if len(inputs) < 2:
         problems.append(f"inputs needs two rows or more, not {len(inputs)}")
     for name, unit in dict(inputs.attrs.get("units", {})).items():
@@ -401,7 +406,7 @@ def histories_of(
     for name, values in columns.items():
         kind = "Real" if name in slopes or name in torques else fmu.kind(name)
         if kind == "String":
-            problems.append(f"the input {name} is a text; only numbers can be given over time")
+            problems.append(f"the input {name} is a string; only numbers can be given over time")
         if kind in ("Integer", "Enumeration"):
             whole = (values == np.round(values)) & (abs(values) <= INTEGERS[-1])
             if not whole.all():
@@ -442,8 +447,8 @@ def check_parameters(
             continue
         if variable.causality == "structuralParameter":
             problems.append(
-                f"{name} sizes arrays, which this package leaves as declared; take the FMU without "
-                f"-arrays in its name, or hubslosh run --set {name}={value}"
+                f"{name} changes the size of arrays, which this package does not support; use the "
+                f"FMU without -arrays in its name, or hubslosh run --set {name}={value}"
             )
         elif variable.causality not in ("parameter", "input") or variable.variability == "constant":
             problems.append(
@@ -474,9 +479,9 @@ def check_outputs(
             problems.append(str(error))
             continue
         if list(names).count(name) > 1:
-            problems.append(f"{name} is wanted twice")
+            problems.append(f"{name} is named twice")
         if kind == "String":
-            problems.append(f"{name} is a text; only numbers are recorded")
+            problems.append(f"{name} is a string; only numbers can be recorded")
         elif real and kind != "Real":
             problems.append(f"{name} is of type {kind}, not Real")
         elif inputs and name not in allowed:

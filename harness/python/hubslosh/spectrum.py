@@ -1,6 +1,6 @@
-"""Frequency responses from time histories, by scipy.signal.
+"""Estimates of frequency responses from time histories, by scipy.signal.
 
-This estimate is independent of the one in the program ``hubslosh``.
+The program ``hubslosh`` has its own, independent estimate.
 """
 
 import numpy as np
@@ -9,9 +9,9 @@ import pandas as pd
 from .arguments import check_numbers, numbers_in, vector
 from .fmu import FmuError
 
-BINS = 3  # Half the width of the smoothing in lines of the spectrum, unless a resolution is given
+BINS = 3  # Default half width of the smoothing window, lines of the spectrum
 
-INPUT_FLOOR = 1e-4  # Share of the input's maximum power below which there is no estimate
+INPUT_FLOOR = 1e-4  # Ratio to the largest input power below which a frequency is left out
 
 
 def frequency_response(
@@ -25,12 +25,13 @@ def frequency_response(
 ) -> pd.DataFrame:
     """Estimate the frequency response from one column of a time history to another.
 
-    The estimate is H1 = S_uy / S_uu with the spectra of the whole record smoothed over frequency
-    by a Hann window (Ljung, *System Identification*, section 6.4). The record must contain the
-    whole motion: it must begin at rest, and it must end at rest or be much longer than the decay
-    time. The estimate is corrected for the input between the rows: an input that is linear between
-    rows by sinc²(f Δt), a held input by sinc(f Δt) and a delay of half a row. For a held input an
-    error of about f Δt remains, from the power of its steps above half the sampling rate.
+    The estimate is H1 = S_uy / S_uu with the spectra of the whole time history smoothed over
+    frequency by a Hann window (Ljung, *System Identification*, section 6.4). The time history must
+    contain the whole motion: it must begin at rest, and it must end at rest or be much longer than
+    the decay time. The estimate is corrected for the course of the input between the rows: by
+    sinc²(f Δt) if the input is linear, and by sinc(f Δt) and a delay of half a row if it is held.
+    For a held input an error of about f Δt remains, because its steps have power above half the
+    sampling rate.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def frequency_response(
     output : str
         Column of the output.
     resolution : float, optional
-        Half the width of the smoothing, Hz; by default three lines of the spectrum. A wider
+        Half width of the smoothing window, Hz; by default three lines of the spectrum. A wider
         window reduces noise more, but flattens a narrow resonance: keep the resolution below ζ f.
     band : tuple of float, optional
         Lowest and highest frequency, Hz; by default all.
@@ -60,7 +61,7 @@ def frequency_response(
     Raises
     ------
     FmuError
-        If a column is missing or not finite, time does not grow in equal steps, or the input
+        If a column is missing or not finite, time does not increase in equal steps, or the input
         has no power in the band.
 
     Examples
@@ -86,11 +87,13 @@ def frequency_response(
     if len(time) < 16:
         raise FmuError(f"a frequency response needs 16 rows or more, not {len(time)}")
     step = float(np.median(np.diff(time)))
-    # one row off by a thousandth of a step is what times rounded in a file may be
+    # allow deviations of a thousandth of a step, because times in files are rounded
     uneven = np.flatnonzero(np.abs(np.diff(time) - step) > 1e-3 * step)
     if step <= 0 or len(uneven):
         row = uneven[0] if len(uneven) else 0
-        raise FmuError(f"time must grow in equal steps; it does not after row {row}, {time[row]} s")
+        raise FmuError(
+            f"time must increase in equal steps; it does not after row {row}, {time[row]} s"
+        )
     if not np.ptp(u):
         raise FmuError(f"{input} is constant, so its effect on the output cannot be estimated")
 

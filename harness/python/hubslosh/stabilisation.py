@@ -1,10 +1,11 @@
-"""Slosh in a loop: says whether each mode is stabilised by phase or by gain.
+"""Stabilisation of slosh modes in a loop: by phase, by gain, by both or by neither.
 
 Near a lightly damped pole p of the plant the loop gain is L(s) = R/(s - p) + L0. Closing the loop
-with u = -L u moves this pole by about -R/(1 + L0). The phase of R/(1 + L0) decides: near 0° the
-loop adds damping, near ±180° it removes damping. In the Nyquist plane the resonance is a circle
-from L0 in the direction of R: away from -1 at 0°, towards -1 at ±180°. The zero next to the pole is
-at about p - R/L0, so the order of pole and zero shows the sign of R/L0.
+with u = -L u moves this pole by about -R/(1 + L0). If the phase of R/(1 + L0) is near 0°, the loop
+adds damping to the mode; if it is near ±180°, the loop removes damping. In the Nyquist plot the
+resonance is a circle that begins at L0 in the direction of R: away from -1 if the phase is 0°,
+towards -1 if it is ±180°. The zero next to the pole is at about p - R/L0, so that the order of pole
+and zero shows the sign of R/L0.
 """
 
 import re
@@ -17,23 +18,22 @@ from numpy.typing import NDArray
 from .linearization import LinearModel
 from .stability import LIGHT, MOVED, _broken_at, _moved
 
-SHOWN = 1e-2  # Size of a resonance circle in the loop gain below which a mode is left out (-40 dB)
+SHOWN = 1e-2  # Diameter of a mode's resonance circle (-40 dB) below which the mode is left out
 
 _TANK = re.compile(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]")
 
 
 def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Return a table of the slosh modes that appear in a sampled loop gain, with a row for each.
+    """Return rows of a table of the slosh modes that appear in a sampled loop gain.
 
     A mode has one row for each command. ``gain`` is the sampled loop gain with the names of its
     states, as `Loop.gain` returns it; ``tanks`` has the names of the tanks in the FMU's order.
     Columns of the table:
 
-    * ``loop``: command at which the loop is broken while the loops of the other commands are
-      closed.
-    * ``mode``: tanks that take part, and number of the mode.
-    * ``frequency`` (Hz), ``zeta``: of the pole of the loop gain.
-    * ``zeta_closed``: damping ratio of this mode when this loop is also closed.
+    * ``loop``: command at which the loop is broken, with the loops of the other commands closed.
+    * ``mode``: names of the tanks whose liquid moves, and number of the mode.
+    * ``frequency`` (Hz), ``zeta``: frequency and damping ratio of the mode's pole in the loop gain.
+    * ``zeta_closed``: damping ratio of this mode if this loop is closed, too.
     * ``zero`` (Hz): frequency of the zero next to the pole.
     * ``order``: "zero first" if the zero has the lower frequency, otherwise "pole first".
     * ``peak`` (dB): loop gain at the frequency of the pole.
@@ -59,7 +59,7 @@ Complex = NDArray[np.complex128]
 
 
 def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
-    """Return pole (z plane), residue and states of each slosh mode; equal poles go together."""
+    """Return pole (z plane), residue and states of each slosh mode; equal poles count as one."""
     from scipy.linalg import eig
 
     assert one.period is not None
@@ -96,7 +96,7 @@ def _row(
         return complex(one._at(np.array([z]))[0, 0, 0])
 
     s = np.log(pole) / T
-    near = np.exp((1e-3 * abs(s) + 1j * s.imag) * T)  # where an undamped pole is finite too
+    near = np.exp((1e-3 * abs(s) + 1j * s.imag) * T)  # L is finite here even for an undamped pole
     rest = value(near) - residue / (near - pole)
     height = np.exp(1j * s.imag * T) - pole
     own = residue / height if abs(height) > 1e-12 else complex(np.inf)
@@ -105,7 +105,7 @@ def _row(
     if abs(own) < SHOWN and not closed.real > 0:
         return None
     zero = np.log(_solved(value, pole, pole - residue / rest, 0.0)) / T
-    # R of the s plane is that of the z plane over T z
+    # the residue R in the s plane is the residue in the z plane divided by T z
     phase = float(np.degrees(np.angle(residue / (T * pole * (1 + rest)))))
     peak = 20 * np.log10(abs(own + rest))
     adds = abs(phase) < 90
@@ -126,7 +126,10 @@ def _row(
 
 
 def _solved(value: Any, pole: complex, start: complex, offset: float) -> complex:
-    """Return the root of offset + L(z) near a start, by the secant rule on (z - pole) times it."""
+    """Return the root of offset + L(z) near ``start``, by the secant method.
+
+    The method is applied to (z - pole) (offset + L(z)), which is smooth near the pole.
+    """
 
     def smooth(z: complex) -> complex:
         return complex((z - pole) * (offset + value(z)))
@@ -142,7 +145,7 @@ def _solved(value: Any, pole: complex, start: complex, offset: float) -> complex
         if b == pole:
             break
         at_b = smooth(b)
-    # a root of something else than this resonance
+    # a root farther away belongs to another mode
     return b if abs(b - pole) < 3 * abs(start - pole) else start
 
 

@@ -1,4 +1,4 @@
-"""Margins of a loop: every gain and phase crossing, however narrow."""
+"""Stability margins of a loop from all its gain and phase crossings, however narrow."""
 
 import re
 from collections.abc import Callable
@@ -19,18 +19,17 @@ if TYPE_CHECKING:
 
 Matrix = NDArray[np.float64]
 
-# A crossing is near a mode if their frequencies differ by at most this part of the mode's.
-NEAR = 0.2
+NEAR = 0.2  # Largest relative difference between the frequencies of a mode and a crossing "near" it
 
-FAR = 20  # dB; phase crossings with larger margins are not printed
+FAR = 20  # Gain margin above which phase crossings are not printed, dB
 
-MOST = 13  # Number of crossings that are printed: those with the least gain and phase margins
+MOST = 13  # Number of printed crossings: the crossings with the smallest margins
 
-LIGHT = 0.2  # Damping ratio below which a pole is a mode to be named
+LIGHT = 0.2  # Damping ratio below which a pole counts as a lightly damped mode
 
-CONVERGED = 1e-11  # Relative change below which a delay has converged; rounding is a tenth of it
+CONVERGED = 1e-11  # Relative change at which a delay has converged; rounding errors are about 1e-12
 
-MOVED = 1e-11  # Residue, over the norms of B and C, below which an input does not move a mode
+MOVED = 1e-11  # Residue, relative to the norms of B and C, below which a mode is not excited
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +46,26 @@ class Margins:
         gain, that moves this crossing to -1, the limit of stability. ``phase_margin`` (gain
         crossings) is in deg, from -180 to 180. ``delay_margin`` is the delay in s that uses up the
         phase margin at this frequency, where a negative phase margin counts as a lag of up to
-        360°. ``near`` names the lightly damped modes of the plant whose frequency differs from the
-        crossing frequency by at most a fifth of its own: by their tank or, without a tank, by the
-        states that take part most.
+        360°. ``near`` has the lightly damped modes of the plant whose frequency differs from the
+        crossing frequency by at most a fifth; a mode is named by its tank or, if it belongs to no
+        tank, by the states that take part most.
     stable : bool
-        True if every pole of the closed loop decays, neutral poles excepted. Of a `Loop` only the
-        controllable and observable part is judged.
+        True if every pole of the closed loop decays, except neutral poles. For a `Loop`, only its
+        controllable and observable part counts.
     poles : ndarray of complex
         Poles of the closed loop, sorted by magnitude: in rad/s, or in the z plane if the loop is
         sampled.
     modulus_margin : float
         Smallest distance between the loop gain and the point -1.
     delay_margin : float
-        Smallest further delay of all commands, s, that makes the loop unstable; 0 if the loop is
+        Smallest additional delay of all commands, s, that makes the loop unstable; 0 if the loop is
         already unstable.
     modes : DataFrame
-        Modes of the plant with damping ratios below 0.2; for the columns see `LinearModel.modes`.
+        Modes of the plant with damping ratios below 0.2, with the columns of `LinearModel.modes`.
     neutral : ndarray of complex
-        Neutral poles among ``poles``: they neither grow nor decay, to rounding, because the
-        controller does not move them. Examples are an attitude that the controller does not use,
-        and a craft whose controller has no gain about an axis.
+        Poles among ``poles`` that neither grow nor decay, because the controller has no effect on
+        them. Examples are an attitude that the controller does not use, and the motion about an
+        axis about which the controller has no gain.
 
     Examples
     --------
@@ -87,17 +86,17 @@ class Margins:
 
     @property
     def gain_margins(self) -> tuple[float, float]:
-        """Gain margins, dB: how far the gain may be reduced, and how far it may be increased.
+        """Gain margins, dB: by how much the gain may be reduced, and by how much increased.
 
         The result is (-inf, inf) if any gain is allowed.
         """
-        every = self.crossings["gain_margin"].to_numpy(float)  # NaN: a gain crossing
+        every = self.crossings["gain_margin"].to_numpy(float)  # NaN for gain crossings
         down, up = every[every < 0], every[every >= 0]
         return float(down.max(initial=-np.inf)), float(up.min(initial=np.inf))
 
     @property
     def phase_margin(self) -> float:
-        """Phase margin, deg: the smallest in magnitude of all gain crossings.
+        """Phase margin with the smallest magnitude of all gain crossings, deg.
 
         The margin is inf if the loop gain has no gain crossing.
         """
@@ -106,7 +105,7 @@ class Margins:
         return float(margins[np.abs(margins).argmin()]) if len(margins) else np.inf
 
     def __str__(self) -> str:
-        """Return the verdict, then the crossings."""
+        """Return the verdict on stability, the margins, and the main crossings."""
         down, up = self.gain_margins
         lines = [
             f"closed loop: {'stable' if self.stable else 'UNSTABLE'}{_neutral_text(self.neutral)}",
@@ -121,7 +120,7 @@ class Margins:
             return "\n".join([*lines, "no crossings"])
         margin, phase = self.crossings["gain_margin"].abs(), self.crossings["phase_margin"].abs()
         far = (margin > FAR) & ~self.crossings["gain_margin"].isin(self.gain_margins)
-        # 6 dB and 45° are as good
+        # a gain margin of 6 dB counts as much as a phase margin of 45°
         ease = (margin / 6).fillna(phase / 45)[~far].sort_values(kind="stable")
         first = self.crossings["delay_margin"].dropna().nsmallest(1).index
         shown = self.crossings.loc[sorted({*ease.index[:MOST], *first})]
@@ -133,12 +132,12 @@ class Margins:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        """Return the verdict in a line."""
+        """Return the verdict on stability and the margins in one line."""
         return f"Margins({'; '.join(str(self).splitlines()[:2])})"
 
 
 def _neutral_text(neutral: NDArray[np.complex128]) -> str:
-    """Return a sentence on neutral poles; an empty text if there are none."""
+    """Return the end of a sentence about neutral poles, or an empty string if there are none."""
     count = len(neutral)
     if not count:
         return ""
@@ -160,21 +159,21 @@ def _decibel(value: float) -> str:
 
 
 def margins(loop: Loop | LinearModel | Any, parameters: Parameters | None = None) -> Margins:
-    """Return every gain and phase crossing of a loop, its margins, and whether it is stable.
+    """Return the stability margins of a loop, with every gain and phase crossing.
 
     Crossings are found without a frequency grid: poles and zeros bound slope and curvature of the
-    loop gain, and intervals of frequency are halved until each has one crossing at most. Crossings
-    are then refined in the state space to rounding. A phase crossing with a loop gain below 1e-12
-    or above 1e8 is left out.
+    loop gain, and intervals of frequency are halved until each has at most one crossing. Then each
+    crossing is refined with the state-space model up to rounding errors. Phase crossings with a
+    loop gain below 1e-12 or above 1e8 are left out.
 
     Parameters
     ----------
     loop : Loop, LinearModel or system of python-control
-        A `Loop` with a linear controller, whose sampled loop gain is exact, delay included. Or a
-        loop gain L that is closed with u = -L u, continuous or discrete. With several commands
-        each loop is broken in turn while the others are closed.
+        A `Loop` with a linear controller; its sampled loop gain is exact, also for delays. Or a
+        loop gain L, continuous or discrete, for the closed loop u = -L u. If there are several
+        commands, the loop is broken at one command after the other, with the others closed.
     parameters : mapping, optional
-        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+        Parameters of the FMU in addition to the parameters of the loop; only for a `Loop`.
 
     Returns
     -------
@@ -219,13 +218,14 @@ def margins_and_gain(
     return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain
 
 
-Modes = list[tuple[float, float, tuple[str, ...]]]  # Frequency, damping ratio and states of each
+Modes = list[tuple[float, float, tuple[str, ...]]]  # Frequency (Hz), damping ratio, active states
 
 
 def _controllable_modes(plant: LinearModel, modes: Modes) -> list[Modes]:
-    """Return, for each input, the modes that it moves and an output shows.
+    """Return, for each input, the modes that it excites and that are observable.
 
-    Modes of one frequency go together: of two equal tanks an input moves a combination.
+    Modes with equal frequencies are treated together, because an input excites a combination of
+    them, for example of the modes of two equal tanks.
     """
     _, B, C, _ = plant
     poles, left, right = eigenvectors(plant)
@@ -308,7 +308,7 @@ def _margins(
 
 
 def _broken_at(gain: LinearModel, i: int) -> LinearModel:
-    """Return the loop gain at one command while all other loops are closed with u = -L u."""
+    """Return the loop gain of command ``i``, with the loops of all other commands closed."""
     if gain.D.shape == (1, 1):
         return gain
     others = [j for j in range(len(gain.D)) if j != i]
@@ -340,7 +340,7 @@ def _closed(gain: LinearModel) -> NDArray[np.complex128]:
 
 
 def _size(A: Matrix) -> Any:
-    """Return the norm of a matrix, or of each of a stack of matrices; 1 instead of 0."""
+    """Return the norm of a matrix, or of each matrix of a stack; 1 for a matrix of zeros."""
     size = np.linalg.norm(A, axis=(-2, -1))
     return np.where(size > 0, size, 1.0)
 
@@ -366,19 +366,19 @@ def _may_be_neutral(A: Matrix, poles: NDArray[np.complex128], period: float | No
 
 
 def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.bool_]:
-    """Return which poles of the closed loop are neutral.
+    """Return a mask of the poles of the closed loop that are neutral.
 
-    A neutral pole is at the limit of stability to rounding, and the feedback does not move it: the
-    loop gain has this pole, too. The rounding error of a pole is n ε ‖A‖ times its condition number
-    (LAPACK Users' Guide, 4.8.1). The condition number of a multiple pole is infinite; the error of
-    a double pole is the square root of n ε times ‖A‖. A chain of three integrators has its poles at
-    the point 0 (if sampled: 1), with an error of the cube root of n ε times ‖A‖. Poles that are
-    farther than that from the limit need no condition number.
+    A neutral pole is at the limit of stability up to rounding errors, and feedback does not move
+    it, so that the loop gain has this pole, too. The rounding error of a simple pole is n ε ‖A‖
+    times its condition number (LAPACK Users' Guide, 4.8.1). The condition number of a multiple pole
+    is infinite; the error of a double pole is the square root of n ε times ‖A‖. The poles of a
+    chain of three integrators, at 0 (or 1 if sampled), have an error of the cube root of n ε times
+    ‖A‖. No condition number is computed for poles that are farther from the limit than this error.
     """
     from scipy.linalg import eig, matrix_balance
 
     A = _closed_matrix(gain)
-    # balancing reduces the norm, so that most loops are decided without it
+    # balancing reduces the norm, so that most loops need no condition numbers
     if not len(A) or not _may_be_neutral(A, poles, gain.period):
         return np.zeros(len(poles), bool)
     A = matrix_balance(A)[0]
@@ -404,7 +404,7 @@ def _moved(gain: LinearModel) -> NDArray[np.complex128]:
 
 
 def _largest(poles: NDArray[np.complex128], period: float | None) -> float:
-    """Return the number that decides stability: largest real part, or magnitude if sampled.
+    """Return the largest real part of the poles or, of a sampled model, the largest magnitude.
 
     ``poles`` has no neutral poles.
     """
@@ -424,7 +424,7 @@ def _zeros(gain: LinearModel) -> NDArray[np.complex128]:
             return np.linalg.eigvals(A - np.outer(b, c) / d).astype(complex)
         if size <= 1e-300 or not b.any():
             break
-        # the first state is to be the output: a reflection takes c to it
+        # a Householder reflection makes the output the first state
         v = c / size
         v[0] += np.copysign(1.0, v[0])
         H = np.eye(len(A)) - 2 * np.outer(v, v) / (v @ v)
@@ -442,12 +442,12 @@ def _frequencies(values: Any, period: float | None) -> Matrix:
 
 
 def _compiled(model: LinearModel) -> Any:
-    """Return the model in the form that the compiled half of the package evaluates."""
+    """Return the model in the form that the compiled part of the package evaluates."""
     return Model(*(np.ascontiguousarray(matrix, float) for matrix in model), model.period or 0.0)
 
 
 def band(model: LinearModel) -> tuple[float, float]:
-    """Return the frequency band (Hz) in which a diagram should show the first input and output.
+    """Return the frequency band (Hz) of a diagram from the first input to the first output.
 
     The band reaches from a fifth of the frequency of the lowest pole or zero to five times the
     highest, but not above half the sampling rate.
@@ -464,7 +464,7 @@ def band(model: LinearModel) -> tuple[float, float]:
 
 
 def frequencies(model: LinearModel, low: float, high: float, count: int = 200) -> Matrix:
-    """Return ``count`` frequencies from ``low`` to ``high`` (Hz), and more near light damping."""
+    """Return ``count`` frequencies from ``low`` to ``high`` (Hz), and more near light poles."""
     lines = [np.geomspace(low, high * (1 - 1e-9), count)]
     s = np.linalg.eigvals(model.A).astype(complex)
     if model.period is not None:
@@ -480,9 +480,9 @@ def frequencies(model: LinearModel, low: float, high: float, count: int = 200) -
 def _crossings(
     gain: LinearModel, closed: NDArray[np.complex128]
 ) -> "tuple[list[tuple[str, float, complex]], float]":
-    """Return kind, frequency (rad/s) and loop gain of each crossing; and the modulus margin.
+    """Return kind, frequency (rad/s) and loop gain of each crossing, and the modulus margin.
 
-    closed: poles of the closed loop.
+    ``closed`` has the poles of the closed loop.
     """
     poles, zeros = np.linalg.eigvals(gain.A).astype(complex), _zeros(gain)
     low, high = _band(gain, [poles, zeros, closed])
@@ -497,7 +497,7 @@ def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float
     nyquist = np.inf if gain.period is None else np.pi / gain.period
     known = np.concatenate([_frequencies(values, gain.period) for values in roots])
     sizes = np.concatenate([np.abs(values) for values in roots])
-    if gain.period is None:  # real poles too
+    if gain.period is None:  # real poles count, too
         known = np.concatenate([known, sizes[(sizes > 0) & np.isfinite(sizes)]])
     else:
         near = np.concatenate(roots)
@@ -510,7 +510,7 @@ def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float
 
 
 def _nearby_modes(frequency: float, modes: Modes, tanks: tuple[str, ...]) -> str:
-    """Return the modes near a frequency, by name."""
+    """Return the names, frequencies and damping ratios of the modes near a frequency (Hz)."""
     close = [mode for mode in modes if abs(mode[0] - frequency) <= NEAR * mode[0]]
     if not close:
         return ""
@@ -525,7 +525,7 @@ def _span(values: list[float]) -> str:
 
 
 def _mode_of(state: str, tanks: tuple[str, ...]) -> str:
-    """Return the mode that a state of our FMUs belongs to, otherwise the state itself."""
+    """Return the name of the mode to which a state belongs, or the state's name if unknown."""
     if found := re.fullmatch(r"slosh\.\w+\[(\d+)\]", state):
         return f"slosh mode {found[1]}"
     shown = short_name(state, tanks)
@@ -540,15 +540,16 @@ def _mode_of(state: str, tanks: tuple[str, ...]) -> str:
 def _delay_margin(
     delayed: Callable[[float], LinearModel], gain: LinearModel, closed: NDArray[np.complex128]
 ) -> float:
-    """Return the least further delay at which a sampled loop is no longer stable, s.
+    """Return the smallest additional delay, s, at which a sampled loop becomes unstable.
 
-    Where an eigenvalue of L has the magnitude 1, a delay of whole cycles can turn it to -1. The
-    hold acts otherwise between whole cycles, so that frequency and delay are then refined.
+    At a frequency at which an eigenvalue of L has the magnitude 1, a delay rotates the eigenvalue
+    to -1. This is exact only for whole cycles, because of the zero-order hold. Frequency and delay
+    are therefore refined.
     """
     least = np.inf
-    with np.errstate(all="ignore"):  # an eigenvalue of 0
+    with np.errstate(all="ignore"):  # an eigenvalue may be 0
         for delay, w in sorted(_unit_eigenvalues(gain, closed)):
-            # what the hold changes between whole cycles is less than half a cycle
+            # the refinement changes the delay by less than half a cycle
             if delay - (gain.period or 0.0) / 2 >= least:
                 break
             least = min(least, _exact_delay(delayed, gain, delay, w))
@@ -558,11 +559,11 @@ def _delay_margin(
 def _exact_delay(
     delayed: Callable[[float], LinearModel], gain: LinearModel, delay: float, w: float
 ) -> float:
-    """Return the delay at which an eigenvalue of L is -1, from its value without the hold."""
+    """Refine the estimates of the delay (s) and the frequency w (rad/s) at which det(I + L) is 0."""
     period = gain.period or 0.0
 
     def refined_delay(delay: float) -> float:
-        """Return the delay corrected for the phase that remains at w, where the magnitude is 1."""
+        """Return the delay corrected by the remaining phase at the frequency of magnitude 1."""
         nonlocal w
         cycles = int(delay / period)
         model = _compiled(delayed(delay - cycles * period))
@@ -584,7 +585,10 @@ def _exact_delay(
 def _unit_eigenvalues(
     gain: LinearModel, closed: NDArray[np.complex128]
 ) -> list[tuple[float, float]]:
-    """Return delay (s) and frequency (rad/s) where an eigenvalue of L has the magnitude 1."""
+    """Return frequencies (rad/s) at which an eigenvalue of L has the magnitude 1.
+
+    Each is returned after the delay (s) that rotates the eigenvalue to -1.
+    """
     period = gain.period or 0.0
     roots = [np.linalg.eigvals(gain.A).astype(complex), closed]
     low, high = _band(gain, roots)
@@ -606,7 +610,7 @@ def minimal(model: LinearModel, tolerance: float = 1e-11) -> LinearModel:
     """Return the part of a model that is both controllable and observable.
 
     The states are transformed by orthonormal bases of the controllable and of the observable
-    subspace. Directions smaller than ``tolerance`` times the norm of the matrix count as rounding.
+    subspace. Singular values below ``tolerance`` times the norm of the matrix count as 0.
     """
 
     def basis(A: Matrix, B: Matrix) -> Matrix:

@@ -1,4 +1,7 @@
-"""Stored runs of a study: values as JSON; ``native.Store`` locks the folder and verifies files."""
+"""Stored runs of a Monte Carlo study, as JSON files in a folder.
+
+``native.Store`` locks the folder and verifies the files.
+"""
 
 import json
 import math
@@ -12,7 +15,7 @@ import numpy as np
 from .native import FmuWarning
 from .native import Store as NativeStore
 
-_NAMED = 3  # Number of runs that a warning names
+_NAMED = 3  # Largest number of damaged runs that a warning lists
 
 
 def encoded(value: Any) -> Any:
@@ -55,8 +58,8 @@ class Store:
     """The folder of a study, which is locked within a ``with`` statement."""
 
     def __init__(self, folder: str | Path, seed: int, ranges: Mapping[str, str]) -> None:
-        """Lock the folder for the study with this seed and a text for each range."""
-        # Absolute: loading an FMU changes the working directory for a moment.
+        """Lock the folder for a study; ``ranges`` has a string that identifies each range."""
+        # an absolute path, because the working directory changes while an FMU is loaded
         self.path = Path(folder).absolute()
         self._store = NativeStore.study(self.path, seed, list(ranges.items()))
 
@@ -91,7 +94,7 @@ class Store:
     def add(
         self, run: int, drawn: Mapping[str, Any], found: Mapping[str, float], **more: Any
     ) -> None:
-        """Store the result of a run. When the call returns, the run is on the disk."""
+        """Store the result of a run; the run is on the disk when the method returns."""
         row = {"run": run, "drawn": _texts(drawn), "found": _texts(found)} | more
         self._store.add(_name(run), (json.dumps(row) + "\n").encode())
 
@@ -103,15 +106,16 @@ class Store:
 def _row(
     data: bytes, draw: Mapping[str, Any], damage: str | None
 ) -> tuple[dict[str, Any], str | None]:
-    """Return the results of a stored run, and the reason if they cannot be used.
+    """Return the results of a stored run, or an empty dictionary and the reason for its rejection.
 
-    Values that differ from the draw's are the best reason, then the ``damage`` of the file.
+    The reason is a value that differs from the drawn value or, if there is none, the ``damage`` of
+    the file.
     """
     try:
         stored = json.loads(data)
         drawn = stored["drawn"]
         changed = [
-            f"{name} is {json.dumps(drawn.get(name))}, the seed gives {json.dumps(value)}"
+            f"{name} is {json.dumps(drawn.get(name))}, but the seed gives {json.dumps(value)}"
             for name, value in _texts(draw).items()
             if json.dumps(drawn.get(name)) != json.dumps(value)
         ]

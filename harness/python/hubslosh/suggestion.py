@@ -1,4 +1,4 @@
-"""A notch or roll-off that a review suggests, and its cost in phase."""
+"""Suggestion of a notch or roll-off filter by a design review, with the phase that it costs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from .stability import _compiled, _largest, _moved, frequencies
 if TYPE_CHECKING:
     from .review_point import Point
 
-DEAREST = 15.0  # Largest loss of phase at the rigid crossover that a suggestion may cost, deg
+DEAREST = 15.0  # Largest loss of phase at the rigid-body crossover that is accepted, deg
 
-WORTH = 0.02  # Least gain in modulus margin that is worth a filter
+WORTH = 0.02  # Smallest increase of the modulus margin for which a filter is suggested
 
-WORST = 5  # Number of worst points that a filter is tried on, besides the nominal ones
+WORST = 5  # Number of worst points at which filters are tested, in addition to the nominal points
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,17 +27,17 @@ class Suggestion:
     """The notch or roll-off filter that increases the smallest modulus margin most, if any."""
 
     text: str
-    """The suggestion in a sentence."""
+    """Suggestion in one sentence."""
     filter: LinearModel | None
-    """Sampled filter of one command; None if no filter is worth it."""
+    """Sampled filter for one command; None if no filter increases the margin enough."""
     controller: LinearModel | None
     """Sampled controller with this filter on each command."""
     before: float
-    """Least distance without the filter over the points tried; see `Review.points`."""
+    """Smallest `distance` of the tested points without the filter; see `Review.points`."""
     after: float
-    """Least distance with the filter."""
+    """Smallest `distance` of the tested points with the filter."""
     cost: float
-    """Phase that the filter loses at the rigid crossover, deg; the most over all commands."""
+    """Loss of phase by the filter at the rigid-body crossover, deg; the largest of all commands."""
 
 
 def suggest(
@@ -83,9 +83,9 @@ def suggest(
 def _candidates(
     slosh: pd.DataFrame, rigid: "pd.Series[float]", period: float
 ) -> list[tuple[str, LinearModel]]:
-    """Return candidate filters with their names.
+    """Return candidate filters, each with its description, for one slosh mode.
 
-    They act at the slosh mode that is unstable or has the largest loop gain.
+    This is an unstable slosh mode or, if all are stable, the mode with the largest loop gain.
     """
     if slosh.empty:
         return []
@@ -107,7 +107,11 @@ def _candidates(
 
 
 def _second_order(f: float, zeta: float, period: float, notch: float | None) -> LinearModel:
-    """Return w²/(s² + 2 ζ w s + w²), or a notch with that denominator, prewarped and sampled."""
+    """Return the low-pass w²/(s² + 2 ζ w s + w²), or a notch with this denominator, sampled.
+
+    ``notch`` is the gain of the notch at its centre frequency ``f`` (Hz), or None for the low-pass.
+    Sampling is by Tustin's rule, prewarped at ``f``.
+    """
     w = 2 / period * np.tan(np.pi * f * period)
     A, B = np.array([[0.0, 1.0], [-w * w, -2 * zeta * w]]), np.array([[0.0], [1.0]])
     if notch is None:
@@ -118,7 +122,7 @@ def _second_order(f: float, zeta: float, period: float, notch: float | None) -> 
 
 
 def _series(first: LinearModel, law: LinearModel) -> LinearModel:
-    """Return a system with the filter on each of its outputs."""
+    """Return the controller ``law`` with the filter ``first`` on each of its outputs."""
     count = len(first.D)
     matrices = [np.kron(np.eye(count), matrix) for matrix in law]
     states = tuple(f"filter[{i + 1}]" for i in range(len(matrices[0])))
@@ -126,7 +130,7 @@ def _series(first: LinearModel, law: LinearModel) -> LinearModel:
 
 
 def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return points on the unit circle, and the loop gain's matrices there."""
+    """Return points z on the unit circle, and the matrix of the loop gain at each of them."""
     high = 0.5 / point.loop.period
     f = frequencies(point.gain, high / 1e4, high)
     count = len(point.gain.D)

@@ -1,4 +1,4 @@
-"""From a tank's drawing and a fill to modal parameters, by linear potential flow."""
+"""Slosh modes of a tank from its drawing and a fill, by linear potential flow."""
 
 import json
 import os
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from .fmu import Value
 
-# FMUs in six axes; their tanks differ in the beginning of a name alone.
+# FMUs with six degrees of freedom. Names of tank parameters differ only in their prefix.
 SIX_AXES = ("Spacecraft", "SloshTank")
 
 
@@ -55,7 +55,7 @@ class Tank:
     _case: "TankCase" = field(repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the arguments from which a copy in another process is solved."""
+        """Return the arguments from which another process computes a copy of the tank."""
         return _solve_case, (self._case,)
 
     @cached_property
@@ -70,12 +70,12 @@ class Tank:
 
     @cached_property
     def modes(self) -> "pd.DataFrame":
-        """Slosh modes as pendulums, a row for each.
+        """Slosh modes as pendulums, one in each row.
 
-        Columns: ``frequency`` (Hz), ``mass`` (kg), ``length`` of the pendulum (m), heights of
-        ``bob`` and ``hinge`` above the tank's zero (m), ``wave`` height at the wall per pendulum
-        angle (m/rad). With a viscosity also the damping ratio ``zeta`` and its interval from
-        ``zeta_low`` to ``zeta_high``.
+        Columns: ``frequency`` (Hz), slosh ``mass`` (kg), ``length`` of the pendulum (m), heights
+        ``bob`` of the slosh mass and ``hinge`` of the hinge above the origin of the drawing (m),
+        and ``wave``, the wave height at the wall per pendulum angle (m/rad). If the viscosity is
+        known, also the damping ratio ``zeta`` and its interval from ``zeta_low`` to ``zeta_high``.
         """
         import pandas as pd
 
@@ -93,7 +93,7 @@ class Tank:
         return table
 
     def __repr__(self) -> str:
-        """Return the liquid and its first modes."""
+        """Return mass and fill of the liquid, the specific force, and the first modes."""
         from .short import rows
 
         what = f"{self.all['name']}: " if self.all.get("name") else ""
@@ -104,12 +104,12 @@ class Tank:
         return self.picture
 
     def save(self, path: str | Path) -> None:
-        """Write the picture.
+        """Write the picture of the tank to a file.
 
         Parameters
         ----------
         path : str or Path
-            File, .svg.
+            File to write, .svg.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class Tank:
         axis: Sequence[float] | None = None,
         rigid: bool = False,
     ) -> "dict[str, Value]":
-        """Return the tank as parameters of an FMU, for `simulate`, `Loop` and others.
+        """Return the parameters of an FMU for this tank, for example for `simulate`.
 
         Damping ratios and centring stiffnesses are included if `tank` was given viscosity and
         surface tension. Warns with FmuWarning if a formula is used outside its range.
@@ -173,8 +173,7 @@ class Tank:
         (0.2, 3)
         """
         if model not in (*SIX_AXES, "HubSlosh"):
-            raise FmuError(f"there are no parameters of a tank for {model!r} (for: Spacecraft, "
-                           "SloshTank, HubSlosh)")  # fmt: skip
+            raise FmuError(f"model must be Spacecraft, SloshTank or HubSlosh, not {model!r}")
         if model == "HubSlosh":
             for name, value in {"position": position, "axis": axis}.items():
                 if value is not None:
@@ -192,7 +191,7 @@ class Tank:
             kept = {f"{prefix}.{name}" for name in whole}
             found = {name: value for name, value in found.items() if name in kept}
             found |= {f"{prefix}.m_0": self.mass, f"{prefix}.H_0": float(self.all["z_cg"])}
-            # of a box with two lengths that about y, along its first length
+            # inertia of a box with different lengths about x; I_eff_cg is its inertia about y
             about_x = float(self.all["I_eff_cg"]) - float(found.get(f"{prefix}.dI_y", 0.0))
             found |= {f"{prefix}.I_0": about_x, f"{prefix}.modes": 0}
         if place is not None:
@@ -203,7 +202,7 @@ class Tank:
 
     @cached_property
     def _spacecraft_parameters(self) -> "dict[str, Value]":
-        if not self.all["modes"]:  # a full tank has the parameters of rigid liquid alone
+        if not self.all["modes"]:  # a full tank has only the parameters of rigid liquid
             return {"tank[1].I_z": 0.0}
         return self._parameters("Spacecraft")
 
@@ -223,30 +222,30 @@ class Tank:
 
 
 def prefix_of(model: str, number: int) -> str:
-    """Return the beginning of the names of a tank's parameters in Spacecraft or SloshTank."""
+    """Return the prefix of the names of a tank's parameters in Spacecraft or SloshTank."""
     if model == "SloshTank":
         return "tank"
     if number not in (1, 2, 3, 4):
-        raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
+        raise FmuError(f"number must be 1 to 4, the number of a tank, not {number!r}")
     return f"tank[{number}]"
 
 
 @dataclass(frozen=True, eq=False)
 class TankCase:
-    """A tank to compute: its drawing, its fill and its liquid."""
+    """Input of the computation of a tank: drawing, fill and properties of the liquid."""
 
     source: "dict[str, Any] | Path"
-    """File, or what stands in one."""
+    """Tank file, or a dict with the content of a tank file."""
     fill: Any
-    """Height, m; ``"60%"``; or (120, "kg")."""
+    """Height, m; share of the volume, ``"60%"``; or mass, (120, "kg")."""
     modes: int
     gravity: float
-    """m/s²."""
+    """Specific force along the tank's axis, m/s²."""
     nu: float | None
     sigma: float | None
     contact_angle: float | None
     spin: float | None = None
-    """rad/s."""
+    """Spin rate about the tank's axis, rad/s."""
     large_waves: bool = False
 
 
@@ -258,16 +257,17 @@ def read_drawing(source: "dict[str, Any] | Path") -> Any:
 
 
 def toml_of(source: Mapping[str, Any]) -> str:
-    """Return the text of a TOML file with this content, a tank file as a dictionary."""
+    """Return the text of a TOML file with the content of ``source``, such as a tank file."""
     return "".join(f"{toml_key(key)} = {_toml(value)}\n" for key, value in source.items())
 
 
 def solve(
     cases: Sequence[TankCase], drawings: Sequence[Any] | None = None
 ) -> "list[Tank | FmuError]":
-    """Compute the modes of several tanks on all cores, and return for each its result or its error.
+    """Compute the modes of several tanks on all cores.
 
-    ``drawings`` are the results of `read_drawing` for the cases, if they were read already.
+    Return for each tank its result or its error. ``drawings`` are the results of `read_drawing` for
+    the cases, if these are known already.
     """
     drawings = drawings or [read_drawing(case.source) for case in cases]
     found = native.solve(
@@ -306,17 +306,17 @@ def tank(
     spin: float | None = None,
     large_waves: bool = False,
 ) -> Tank:
-    """Find the slosh modes of a tank that is a body of revolution or a box.
+    """Compute the slosh modes of a tank that is a body of revolution or a box.
 
-    The modes are computed by linear potential flow in the contour of the tank. For tanks of other
-    shapes use `liquid_modes`.
+    The method is linear potential flow in the contour of the tank. For tanks of other shapes use
+    `liquid_modes`.
 
     Parameters
     ----------
     source : str, Path or mapping
         A tank file (.toml), or a dict with its content, such as
-        ``{"density": 1010, "shape": {"sphere": {"radius": 0.4}}}``. The book's page on tanks has
-        every shape.
+        ``{"density": 1010, "shape": {"sphere": {"radius": 0.4}}}``. The book's page on tanks
+        describes all shapes.
     fill : float or str, optional
         Height of the surface above the lowest point, m, or ``"60%"`` of the volume.
     fill_mass : float, optional
@@ -332,12 +332,12 @@ def tank(
     contact_angle : float, optional
         Contact angle of the liquid at the wall, deg.
     spin : float, optional
-        Rate at which tank and liquid turn about the tank's axis, rad/s. `Tank.parameters` of
-        SloshTank and Spacecraft then have the liquid's spin.
+        Rate at which tank and liquid turn about the tank's axis, rad/s. `Tank.parameters` for
+        SloshTank and Spacecraft then include the spin of the liquid.
     large_waves : bool
-        True: compute the coefficients with which the pendulum of mode 1 has the energy of large
-        waves, from fully nonlinear potential flow, in about 10 s. False: these coefficients are
-        available only for spheres and upright cylinders, from tables that cover a range of fills.
+        True: compute the coefficients that give the pendulum of mode 1 the energy of large waves,
+        from fully nonlinear potential flow, in about 10 s. False: these coefficients are available
+        only for spheres and upright cylinders, from tables that cover a range of fills.
 
     Returns
     -------
@@ -365,7 +365,7 @@ def tank(
         contact_angle=contact_angle, spin=spin,
     )  # fmt: skip
     if modes < 1 or modes != int(modes):
-        raise FmuError(f"modes must be a whole number from 1 on, not {modes!r}")
+        raise FmuError(f"modes must be a whole number of 1 or more, not {modes!r}")
     amount = (float(fill_mass), "kg") if fill_mass is not None else fill
     case = TankCase(
         _tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle, spin,
@@ -400,20 +400,22 @@ def _tank_source(source: Any) -> "dict[str, Any] | Path":
     """Return the path of a tank file, or a dictionary with the content of a tank file."""
     if isinstance(source, Mapping):
         given = dict(source)
-        for key in ("points", "svg"):  # relative to the tank file
+        for key in ("points", "svg"):  # paths that are relative to the tank file
             if isinstance(given.get(key), str):
                 given[key] = str(Path(given[key]).absolute())
         return given
     if isinstance(source, str | Path):
         return Path(source)
-    raise FmuError(f"a tank is a tank file, or a dict with the content of one, not {source!r}")
+    raise FmuError(
+        f"a tank must be a tank file, or a dict with the content of a tank file, not {source!r}"
+    )
 
 
 def check_fill(fill: Any) -> Any:
     """Return a fill; raise FmuError if it is neither a height, a percentage nor a mass."""
     amount = amount_of(fill)
     if not is_number(amount) or np.isnan(amount):
-        raise FmuError(f'fill is a height in m, or a text such as "60%", not {fill!r}')
+        raise FmuError(f'fill must be a height in m, or a share such as "60%", not {fill!r}')
     return fill
 
 
@@ -430,7 +432,7 @@ def is_mass(fill: Any) -> bool:
 
 
 def toml_key(key: Any) -> str:
-    """Return a key in the form in which TOML writes it, with quotes if necessary."""
+    """Return a key in the notation of TOML, with quotes if necessary."""
     return str(key) if re.fullmatch(r"[A-Za-z0-9_-]+", str(key)) else json.dumps(str(key))
 
 
@@ -443,17 +445,17 @@ def _toml(value: Any) -> str:
         return json.dumps(str(value), ensure_ascii=False)
     if isinstance(value, bool):
         return "true" if value else "false"
-    if hasattr(value, "tolist"):  # of numpy
+    if hasattr(value, "tolist"):  # an array or a number of NumPy
         return _toml(value.tolist())
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, Sequence):
         return f"[{', '.join(_toml(v) for v in value)}]"
-    raise FmuError(f"{value!r} is no value for a TOML file (allowed: numbers, texts, lists)")
+    raise FmuError(f"{value!r} cannot be written to TOML (allowed: numbers, strings, lists)")
 
 
 def _from_z(axis: Sequence[float]) -> list[float]:
-    """Return the quaternion of the shortest turn that takes z to an axis."""
+    """Return the quaternion of the shortest rotation from the z axis to ``axis``."""
     given = vector(axis, 3, "axis")
     if not given.any():
         raise FmuError("axis must not be zero")

@@ -1,4 +1,8 @@
-"""Temporary folders, which go however the program ends, and files that appear complete or not."""
+"""Temporary folders, and output files that are never left incomplete.
+
+A folder that remains because Python was killed is removed when the next folder is created. An
+output is first written to a temporary file, which replaces the output when it is complete.
+"""
 
 import os
 import tempfile
@@ -13,8 +17,8 @@ from .native import FmuError, Folder, destination, put
 def folder(parent: Path | None = None, *, hidden: bool = False) -> Folder:
     """Return a temporary folder for a ``with`` statement, which removes the folder at its end.
 
-    By default the new folder is in the system's folder for temporary files. Folders that were left
-    there by killed processes of Python or of the program are removed first.
+    By default the new folder is in the system's folder for temporary files. First, this function
+    removes folders that killed processes of Python or of the program have left.
     """
     return Folder(Path(tempfile.gettempdir()) if parent is None else parent, hidden)
 
@@ -27,7 +31,7 @@ def output(path: Path) -> Iterator[Path]:
     instead.
     """
     place = destination(path)
-    # a device has no folder of its own next to it
+    # a device has no folder in which a temporary file could be created
     parent = None if place is None else Path(place).parent
     if parent is not None and not parent.is_dir():
         raise FmuError(f"{path} cannot be written: there is no folder {parent}")
@@ -51,10 +55,9 @@ def check_path(path: Any, ending: str) -> Path:
 
 
 def write_file(path: str | Path, ending: str, content: Callable[[], str | bytes]) -> None:
-    """Write a text or bytes to a file, after checking that the file's name has the ending.
+    """Write text or bytes to a file, after checking that the file's name has the ending.
 
-    ``content`` is a function that returns the text or the bytes; the function is called after the
-    check.
+    ``content`` is a function that returns the text or the bytes; it is called after the check.
     """
     path = check_path(path, ending)
     with output(path) as new:

@@ -66,7 +66,7 @@ from .loop import Loop
 from .operating_point import warn_of_attitude, warn_of_rotation
 from .plant import Plant
 from .progress import Progress
-from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest, short_name
+from .quantities import KINDS, TURN, full_name, slosh_mass_error, rigid_rest, short_name
 from .short import names
 from .simulation import parameters_of
 from .stability import minimal
@@ -1285,7 +1285,7 @@ def _kind(name: str) -> str:
 
 def _unknown(name: str, values: Mapping[str, float]) -> str:
     """Return advice about a name that does not belong to an uncertain parameter."""
-    if instead := moves_the_bob(name):
+    if instead := slosh_mass_error(name):
         return f"{name} {instead}"
     return f"there is no uncertain {name}{did_you_mean(name, values)}"
 

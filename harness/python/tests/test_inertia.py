@@ -88,5 +88,5 @@ def test_all_faults_are_reported_at_once() -> None:
         assert words in str(said.value)
     with pytest.raises(FmuError, match="there are no parts"):
         bottom_up({})
-    with pytest.raises(FmuError, match="inner radius is above"):
+    with pytest.raises(FmuError, match="inner radius is larger"):
         bottom_up({"a": {"mass": 1.0, "tube": (0.2, 0.1)}})

@@ -65,7 +65,7 @@ def test_linear_models_convert_to_python_control(fmu: Path) -> None:
 
 def test_linearising_a_stuck_hub_brings_a_warning(fmu: Path) -> None:
     """Dry friction holds the hub at rest, so that no small torque moves it."""
-    with pytest.warns(UserWarning, match="held by dry friction"):
+    with pytest.warns(UserWarning, match="does dry friction hold the hub"):
         model = linearize(fmu, {"friction.model": "stribeck"}, ["tau_cmd"], ["omega"])
     assert not model.B.any()
 

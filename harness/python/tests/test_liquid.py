@@ -220,11 +220,11 @@ def test_spacecraft_has_slosh_modes_along_both_axes_and_their_moments_about_a_pi
     values = found.parameters(2)
     alone = {name.replace("tank[2]", "tank"): value for name, value in values.items()}
     assert found.parameters(model="SloshTank") == alone
-    with pytest.raises(FmuError, match="for Spacecraft and SloshTank, not for 'HubSlosh'"):
+    with pytest.raises(FmuError, match="must be Spacecraft or SloshTank, not 'HubSlosh'"):
         found.parameters(model="HubSlosh")
     shift, count = np.array([0.4, 0.7, 0.2]), values["tank[2].modes"]
     assert count == 3
-    with pytest.raises(FmuError, match="modes is 1 to 3"):
+    with pytest.raises(FmuError, match="modes must be 1 to 3"):
         found.parameters(modes=4)
     values = found.parameters(position=shift)
     own, heavy = 0.3 * found.mass, 1e9 * found.mass
@@ -344,7 +344,7 @@ def test_stated_errors_hold() -> None:
 @pytest.mark.parametrize(
     ("shape", "fill", "words"),
     [
-        ({"pear": {}}, 0.1, "shape is one of cylinder, horizontal_cylinder"),
+        ({"pear": {}}, 0.1, "shape must be one of cylinder, horizontal_cylinder"),
         ({"sphere": {"radius": -1}}, 0.1, "radius of the sphere must be positive, not -1.0"),
         ({"sphere": {"diameter": 1}}, 0.1, "sphere expects radius"),
         ({"sphere": {"radius": 1}}, 2.5, "between 0 and 2 m"),

@@ -63,7 +63,7 @@ def test_four_modes_err_by_one_per_cent_and_one_mode_suffices_in_the_band(
     # mode 2, the largest that is missing, after an impulse: m w against that of mode 1
     ratio = 0.0302 * 4.0318 / 2.3436
     assert ratio < errors["impulse"][1] < 2 * ratio
-    with pytest.raises(hubslosh.FmuError, match="no mode moves"):
+    with pytest.raises(hubslosh.FmuError, match="the liquid cannot slosh"):
         hubslosh.mode_errors({"slosh.model": "frozen"}, fmu=fmu)
     with pytest.raises(hubslosh.FmuError, match="below=0"):
         hubslosh.mode_errors(below=0, fmu=fmu)

@@ -58,7 +58,7 @@ def test_loop_linearize_review_and_uncertain_linearise_at_one_trimmed_point(craf
     assert model.at([0.0]).response(f) == pytest.approx(plant, rel=1e-9, abs=1e-12 * size)
     with pytest.warns(FmuWarning, match="untrimmed, is no steady state"):
         beside = craft.parameters("50%", trimmed=False)
-    with pytest.warns(FmuWarning, match=r"angular acceleration of 0\.0\d+ rad/s² is left, \("):
+    with pytest.warns(FmuWarning, match=r"angular acceleration of 0\.0\d+ rad/s² remains, \("):
         untrimmed = hubslosh.margins(replace(loop, parameters=beside))
     assert abs(untrimmed.delay_margin / by_loop.delay_margin - 1) > 0.01
 
@@ -96,7 +96,7 @@ def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft:
     pushed = craft.trim("50%", {"torque[1]": 3.0})
     assert np.linalg.norm(pushed.angular_acceleration) > 1e-3
     with pytest.warns(
-        FmuWarning, match=f"of {np.linalg.norm(pushed.angular_acceleration):.4g} rad/s² is left"
+        FmuWarning, match=f"of {np.linalg.norm(pushed.angular_acceleration):.4g} rad/s² remains"
     ):
         craft.linearize("50%", parameters={"torque[1]": 3.0})
     leaning = replace(craft.tanks["NTO"], axis=(np.sin(0.1), 0, np.cos(0.1)))
@@ -145,9 +145,9 @@ def test_every_method_accepts_names_and_numbers_of_tanks(craft: Craft, name: str
             "are the same quantity",
         lambda: craft.loop(GAINS, PERIOD, "50%", parameters={"NTO.zeta[2]": 0.1}): "no such mode",
         lambda: craft.uncertain("50%", {"NTO.length[1]": "5%"}):
-            r"moves the bob and changes the frequency: give tank\[1\]\.frequency\[1\]",
+            r"moves the slosh mass and changes the frequency: give tank\[1\]\.frequency\[1\]",
         lambda: craft.review(GAINS, PERIOD, ["50%"], uncertain={f"{name}.hinge[1]": "5%"}):
-            r"moves the bob: give tank\[1\]\.frequency\[1\]",
+            r"moves the slosh mass: give tank\[1\]\.frequency\[1\]",
     }.items():  # fmt: skip
         with pytest.raises(FmuError, match=words):
             call()

@@ -244,12 +244,12 @@ def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
         read_recording(tmp_path / "c.mf4")
     (tmp_path / "d.bin").write_bytes(b"\1\0\2\0" * 99)
     with pytest.raises(
-        FmuError, match=r"the file is of no known kind .allowed: text in columns, a \.mat"
+        FmuError, match=r"the format of the file is not known .allowed: text in columns, a \.mat"
     ):
         read_recording(tmp_path / "d.bin")
     with pytest.raises(FmuError, match="cannot be opened"):
         read_recording(tmp_path / "none.csv")
-    with pytest.raises(FmuError, match="a recording is a file, not int"):
+    with pytest.raises(FmuError, match="path must be the path of a file, not int"):
         read_recording(3)  # type: ignore[arg-type]
 
 

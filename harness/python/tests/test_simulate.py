@@ -164,7 +164,7 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
         "theta is computed by the FMU (output)",
         "slosh.model expects one of frozen (1), linear (2), planar (3), spherical (4), liquid (5)",
         "no variable omga; did you mean omega",
-        "omega is wanted twice",
+        "omega is named twice",
         "step must be a positive number of seconds, not -1.0",
     ):
         assert words in str(told.value)
@@ -173,7 +173,7 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ({"inputs": pd.DataFrame({"tau_cmd": [0.0, 1.0]})}, "inputs has no column time"),
+        ({"inputs": pd.DataFrame({"tau_cmd": [0.0, 1.0]})}, "inputs has no column named time"),
         ({"inputs": TABLE[:1]}, "two rows or more, not 1"),
         ({"inputs": TABLE.assign(tau_cmd=np.nan)}, "tau_cmd of inputs is not finite in row 0"),
         ({"inputs": TABLE, "parameters": {"tau_cmd": 1.0}}, "tau_cmd is given twice"),

@@ -119,7 +119,7 @@ def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
     original = file.read_bytes()
     value = draw(RANGES, 7, 3)["tank.h"]
     edited(file, lambda stored: stored["drawn"].update({"tank.h": 0.08}))
-    said = rf"re-running run 7: tank.h is 0.08, the seed gives {value}"
+    said = rf"re-running run 7: tank.h is 0.08, but the seed gives {value}"
     forged = file.read_bytes()
     with pytest.warns(FmuWarning, match=said):
         assert cells(study(tmp_path)) == cells(whole)
@@ -395,7 +395,7 @@ def killed(folder: str, seed: int) -> None:
             with pytest.warns(FmuWarning) as warned, pytest.raises(AssertionError):
                 study(folder, RUNS, outcome=not_called)
             (text,) = {str(warning.message) for warning in warned}
-            assert f"re-running run {int(file.stem)}: tank.h is 0.1, the seed gives" in text, text
+            assert f"re-running run {int(file.stem)}: tank.h is 0.1, but the seed gives" in text, text
             file.unlink()
     print(stored())
 

@@ -89,7 +89,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
         "give the fill": lambda: tank(SPHERE),
         r'a height in m, or a text such as "60%"': lambda: tank(SPHERE, fill="60"),
         "modes must be a number, not 'two'": lambda: tank(SPHERE, fill=0.3, modes="two"),
-        "a tank is a tank file, or a dict": lambda: tank(3, fill=0.3),
+        "a tank must be a tank file, or a dict": lambda: tank(3, fill=0.3),
         "^density is missing": lambda: tank({"shape": {"sphere": {"radius": 1}}}, fill=0.3),
         "3 m.*0.7": lambda: tank(SPHERE, fill=3.0),
         "no_such.toml": lambda: tank("no_such.toml", fill=0.3),
@@ -98,10 +98,10 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
         "position is for Spacecraft and SloshTank": lambda: full.parameters(
             "HubSlosh", position=(0, 0, 0)
         ),
-        "number is 1 to 4, not 5": lambda: full.parameters("Spacecraft", 5),
-        "no parameters of a tank for 'Craft'": lambda: full.parameters("Craft"),
+        "number must be 1 to 4, the number of a tank, not 5": lambda: full.parameters("Spacecraft", 5),
+        "must be Spacecraft, SloshTank or HubSlosh, not 'Craft'": lambda: full.parameters("Craft"),
         "must end in .svg": lambda: full.save("tank.png"),
-        "is no value for a TOML file": lambda: tank({"density": object()}, fill=0.3),
+        "cannot be written to TOML": lambda: tank({"density": object()}, fill=0.3),
     }
     for sentence, call in wrong.items():
         with pytest.raises(FmuError, match=sentence):

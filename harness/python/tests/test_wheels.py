@@ -315,7 +315,7 @@ def test_wrong_wheels_are_named(rigid: Craft, fmu: Path) -> None:
     for command, what in (
         ("e.torque", "the command e.torque is not an input"),
         (["wheels", "a.torque"], "the command a.torque is given twice"),
-        (["wheels", "h_wheels[1]"], "what the wheels set"),
+        (["wheels", "h_wheels[1]"], "is set by the reaction wheels"),
     ):
         loop = rigid.loop(lambda t, y: 0.0, 0.1, 0, command=command)
         with pytest.raises(FmuError) as error:
@@ -324,9 +324,9 @@ def test_wrong_wheels_are_named(rigid: Craft, fmu: Path) -> None:
     assert rigid.loop(GAINS, 0.1, 0, command="wheels").problems()  # four wheels, three gains
     loop = rigid.loop(lambda t, y: np.zeros(4), 0.1, 0, command="wheels")
     table = pd.DataFrame({"time": [0.0, 1.0], "h_wheels[1]": 0.0})
-    with pytest.raises(FmuError, match="which the wheels set"):
+    with pytest.raises(FmuError, match="which the reaction wheels set"):
         loop.simulate(1, inputs=table)
-    with pytest.raises(FmuError, match="which the wheels set"):
+    with pytest.raises(FmuError, match="which the reaction wheels set"):
         rigid.simulate(0, table.assign(**{"a.torque": 0.1}))
     table = pd.DataFrame({"time": [0.0, 1.0], "a.torque": [0.1, np.nan]})
     with pytest.raises(FmuError, match="not finite in row 1"):
