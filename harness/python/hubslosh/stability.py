@@ -559,7 +559,7 @@ def _delay_margin(
 def _exact_delay(
     delayed: Callable[[float], LinearModel], gain: LinearModel, delay: float, w: float
 ) -> float:
-    """Refine the estimates of the delay (s) and the frequency w (rad/s) at which det(I + L) is 0."""
+    """Refine an estimate of the delay (s) and the frequency w (rad/s) at which det(I + L) is 0."""
     period = gain.period or 0.0
 
     def refined_delay(delay: float) -> float:

@@ -1,17 +1,20 @@
 r"""Uncertain models of Spacecraft for robust control: a linear fractional transformation (M, Δ).
 
-Derivation, in body axes. X = [a; w']: specific force at O and angular acceleration. h_w is the
-wheels' momentum, w the angular velocity, W = w× its matrix. A tank has its origin at d, the axis e
-and E = (x, y) across it; e × E = E S with S = [0 -1; 1 0]. A mode has the mass m, natural frequency
-ω (tank held, under the specific force that acts), damping ratio ζ, and its bob at rest in the tank
-at r = d + b e. At the point the specific force at the bob is A = a + w' × r + W W r, with
-X = γ X_f + X_c: X_c is the acceleration that the rotation alone gives, and γ a factor of the rest.
+Derivation, in body axes. X = [a; w'] has the specific force a at O and the angular acceleration w'.
+h_w is the angular momentum of the wheels, w the angular velocity, and W = w× its matrix. A tank has
+its origin at d, its axis along e, and the axes E = (x, y) across e; e × E = E S with
+S = [0 -1; 1 0]. A slosh mode has the mass m, the natural frequency ω (in a fixed tank under the
+present specific force) and the damping ratio ζ. Its slosh mass, the bob, is at rest in the tank at
+r = d + b e. At the operating point, the specific force at the bob is A = a + w' × r + W W r with
+X = γ X_f + X_c, where X_c is the acceleration that rotation alone causes, and γ is a factor of the
+other accelerations.
 
     g = e·A = γ g_f + g_c - b |w_E|²        β = E^T A       w_E = E^T w,  w_e = e·w,  w_e' = e·w'
     κ = S^T E^T w'                          G_r = -(W r)× - W r×   change of W W r by δw
 
-The liquid's mass, centre and inertia are known: a mass m that sloshes is one that the rigid liquid
-lacks at the bob (SP-106). Compared with rigid liquid a mode is then, with s = m · displacement:
+Mass, centre and inertia of the whole liquid are known, so that a slosh mass m at the bob reduces
+the rigid liquid by the same mass there (SP-106). The equations of a mode, relative to rigid liquid
+and with s = m · displacement, are:
 
     α   = E^T (δa + δw' × r + G_r δw)                   acceleration of the bob across e
     s'' = -R - w_e' S s - (w_E w_E^T - |w|² 1) s - 2 w_e S s'
@@ -19,25 +22,26 @@ lacks at the bob (SP-106). Compared with rigid liquid a mode is then, with s = m
     p   = β·s/l + (κ - w_e w_E)·s + 2 S^T w_E·s'        from the rod's tension m g
     M_tot δX = [δf; δτ - δw × h_w] - gyroscopic terms + Σ [E R + e p; r × (E R + e p) + g E S s]
     1/l = (1 - ρ) ω²/g                                  ρ = k/(m ω²): share of a centring stiffness,
-                                                        which a change of ω leaves as it is
+                                                        which does not change with ω
 
-In liquid that turns at the rate V with its tank a mode with the gyroscopic coefficient C and the
+In liquid that turns with its tank at the rate V, a mode with the gyroscopic coefficient C and the
 stiffness ε has n = [2 (1 - C) V w_e + ε V²] s - (1 - C) (V' S s + 2 V S s'); otherwise n = 0. The
-liquid's own momentum L follows spin.rs, with no uncertain parameter.
+angular momentum L of the liquid follows the equations of spin.rs, without uncertain parameters.
 
-A mode of an appendage has the participation u = [p; l] about O and the displacement η_0 at the
-point, with y = p η and D, the derivative of the inertia about O by η:
+A mode of an appendage has the participation u = [p; l] about O and, at the operating point, the
+displacement η_0. With y = p η and D, the derivative of the inertia about O by η:
 
     η'' = -u·δX + w·D δw - ω (ω η + 2 ζ η')    M_tot has the first moment p η_0, inertia D η_0
     M_tot δX = … - u η'' - [w' × y + W W y; y × a + D w' η + W D w η] - [2 W p; W l + D w] η'
 
-The tanks' equations are Newton's law of the bob with the rod eliminated, linearised (book,
-Spacecraft: equations); m scales the state, so it multiplies α alone. M_tot X = m_b [A; r_b × A] +
-[0; J w'] + liquid, with A = a + w' × r_b. The products give the repetitions in a craft that does
-not spin: m 2, ζ 2, ω 4, b 4 of each mode, γ 2 for each mode, dry mass 3, a moment of inertia 1, a
-product of inertia 2, a coordinate of r_b 4. With a surface that is not at rest ω and b may have 1
-or 2 more, in a craft that spins b and inertias 1 or 2 more. What the loop does not need goes: each
-repeated block is reduced to its controllable and observable part, exactly.
+The equations of the tanks are Newton's law of the bob, linearised after the force of the rod is
+eliminated (book, Spacecraft: equations). Because m scales the state s, m multiplies only α.
+M_tot X = m_b [A; r_b × A] + [0; J w'] + liquid, with A = a + w' × r_b. The number of products with
+an uncertain parameter is the number of its repetitions in Δ. In a craft that does not spin these
+are: m 2, ζ 2, ω 4, b 4 and γ 2 for each mode; dry mass 3; a moment of inertia 1; a product of
+inertia 2; a coordinate of r_b 4. If a free surface is not at rest, ω and b may have 1 or 2 more; in
+a craft that spins, b and inertias may have 1 or 2 more. Finally, each repeated block is reduced to
+its controllable and observable part, which does not change the model.
 """
 
 import json
@@ -82,13 +86,14 @@ S = np.array([[0.0, -1.0], [1.0, 0.0]])
 OUTPUTS = (*(f"q[{i}]" for i in (2, 3, 4)), *(f"omega[{i}]" for i in (1, 2, 3)))
 INPUTS = (*(f"force[{i}]" for i in (1, 2, 3)), *(f"torque[{i}]" for i in (1, 2, 3)))
 AXES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-FACTOR = "acceleration"  # Factor of the acceleration at the point; 1 is that of the parameters
+FACTOR = "acceleration"  # Factor of the craft's acceleration; 1 is the acceleration as given
 UNITS = {"frequency": "Hz", "zeta": "1", "mass": "kg", "bob": "m", FACTOR: "1"}
-# Least values of quantities over those in the middle of their ranges; 0 may round to below 0.
+# Smallest values of quantities, relative to the middle of their ranges. The values are above 0,
+# because rounding could turn 0 into a negative number.
 _LEAST = {"zeta": 1e-9} | dict.fromkeys(
     ("frequency", "mass", FACTOR, "craft.mass", "craft.Jxx", "craft.Jyy", "craft.Jzz"), 0.01
 )  # fmt: skip
-ALONE = 1e-12  # A coefficient below this, relative to others of its kind, is rounding
+ALONE = 1e-12  # Relative size below which a coefficient is a rounding error and counts as 0
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ class _Bob:
     length: float
     stiffness: float
     swirl: tuple[float, float, float]
-    """In liquid that spins 2 (1 - C) V w_e + ε V², (1 - C) V' and 2 (1 - C) V."""
+    """2 (1 - C) V w_e + ε V², (1 - C) V' and 2 (1 - C) V of liquid that spins; otherwise 0."""
 
     def name(self, kind: str) -> str:
         return f"tank[{self.tank}].{kind}[{self.mode}]"
@@ -108,7 +113,7 @@ class _Bob:
 
 @dataclass(frozen=True)
 class _Tank:
-    """A tank: origin, axes (columns x, y, e), rigid liquid, and ``g_ref`` of its damping ratios."""
+    """A tank: origin, axes (columns x, y, e), rigid liquid, and ``g_ref`` for damping ratios."""
 
     number: int
     origin: Matrix
@@ -117,13 +122,13 @@ class _Tank:
     H_0: float
     I_0: float
     more_y: float
-    """dI_y"""
+    """Parameter ``dI_y`` of the tank."""
     g_ref: float
 
 
 @dataclass(frozen=True)
 class _Spin:
-    """Liquid that spins: I⁻¹, Γ and K as matrices, and momentum L, tank axes (spin.rs)."""
+    """Liquid that spins: matrices I⁻¹, Γ and K of spin.rs, and angular momentum L, tank axes."""
 
     inverse: Matrix
     coupling: Matrix
@@ -131,20 +136,20 @@ class _Spin:
     momentum: Matrix
 
     def rate(self, w: Matrix) -> Matrix:
-        """Return L' at the angular velocity w, tank axes."""
+        """Return the derivative of L if the tank has the angular velocity ``w``, tank axes."""
         slip = self.slip(w)
         found: Matrix = _cross(slip) @ self.momentum - self.friction @ slip
         return found
 
     def slip(self, w: Matrix) -> Matrix:
-        """Return the rotation of the liquid against the tank."""
+        """Return the angular velocity of the liquid relative to the tank, tank axes, rad/s."""
         found: Matrix = self.inverse @ self.momentum - self.coupling @ w
         return found
 
 
 @dataclass(frozen=True)
 class _Mode:
-    """A mode of an appendage: participation u, mass matrix per displacement, displacement."""
+    """A mode of an appendage: participation u, change of the mass matrix per η, displacement η."""
 
     number: int
     u: Matrix
@@ -157,13 +162,13 @@ class _Mode:
 
 @dataclass(frozen=True)
 class _Craft:
-    """Spacecraft at its point: values that may be uncertain, and constants of the equations."""
+    """Spacecraft at its operating point: values that may be uncertain, and constants."""
 
     values: dict[str, float]
     tanks: dict[int, _Tank]
     bobs: tuple[_Bob, ...]
     liquid: Matrix
-    """Mass matrix of all liquid, rigid, about O."""
+    """Mass matrix about O of all liquid as rigid bodies."""
     wrench: Matrix
     wheels: Matrix
     omega: Matrix
@@ -171,18 +176,18 @@ class _Craft:
     modes: tuple[_Mode, ...]
 
     def deformed(self) -> Matrix:
-        """Return the change of the 6 × 6 mass matrix by the deflection of the appendages."""
+        """Return the change of the 6 × 6 mass matrix due to the deflection of the appendages."""
         return sum((mode.eta * mode.body for mode in self.modes), np.zeros((6, 6)))
 
     def pull(self, values: Mapping[str, float]) -> Matrix:
-        """Return force and torque (6 numbers, about O) of deflected appendages on the craft."""
+        """Return force and torque about O (6 numbers) of the deflected appendages on the craft."""
         pulls = (
             (TURN * values[mode.name("frequency")]) ** 2 * mode.eta * mode.u for mode in self.modes
         )
         return sum(pulls, np.zeros(6))
 
     def dry(self, values: Mapping[str, float]) -> tuple[float, Matrix, Matrix]:
-        """Return mass, centre of mass and inertia of the dry craft."""
+        """Return mass, centre of mass and inertia of the dry craft from uncertain parameters."""
         J = np.zeros((3, 3))
         for name, (i, j) in AXES.items():
             J[i, j] = J[j, i] = values[f"craft.J{name}"]
@@ -193,9 +198,9 @@ class _Craft:
         return _rigid(*self.dry(self.values)) + self.liquid
 
     def load(self, values: Mapping[str, float], *, moving: bool = True) -> Matrix:
-        """Return force and torque (6 numbers, about O) that the craft's rotation takes at X = 0.
+        """Return the gyroscopic force and torque about O (6 numbers), which act also at X = 0.
 
-        ``moving`` is False for the craft and its liquid as one rigid body.
+        If ``moving`` is False, craft and liquid count as one rigid body.
         """
         w = self.omega
         rigid = _rigid(*self.dry(values)) + self.liquid
@@ -214,26 +219,26 @@ class _Craft:
         return load
 
     def accelerations(self) -> tuple[Matrix, Matrix]:
-        """Return the craft's acceleration (6 numbers) twice: with rigid liquid and with slosh."""
+        """Return X of the craft with rigid liquid, and X with sloshing liquid."""
         whole = np.linalg.solve(self.rigid(), self.wrench - self.load(self.values, moving=False))
         load = self.wrench + self.pull(self.values) - self.load(self.values)
         return whole, np.linalg.solve(self.mass_matrix(self.values), load)
 
     def specific(self, X: Matrix, place: Matrix) -> Matrix:
-        """Return the specific force (m/s²) at a place of the craft."""
+        """Return the specific force (m/s²) at the position ``place`` of the craft."""
         found: Matrix = (
             X[:3] + np.cross(X[3:], place) + np.cross(self.omega, np.cross(self.omega, place))
         )
         return found
 
     def place(self, bob: _Bob, values: Mapping[str, float]) -> Matrix:
-        """Return the position of a bob at rest."""
+        """Return the position of a slosh mass at rest."""
         tank = self.tanks[bob.tank]
         found: Matrix = tank.origin + values[bob.name("bob")] * tank.axes[:, 2]
         return found
 
     def arm(self, bob: _Bob, values: Mapping[str, float]) -> Matrix:
-        """Return the matrix (6 × 2) whose transpose takes X to the bob's acceleration across e."""
+        """Return the matrix (6 × 2) whose transpose maps X to the bob's acceleration across e."""
         E = self.tanks[bob.tank].axes[:, :2]
         return np.vstack([E, _cross(self.place(bob, values)) @ E])
 
@@ -255,18 +260,18 @@ def _cross(v: ArrayLike) -> Matrix:
 
 
 def _twice(w: Matrix) -> Matrix:
-    """Return the matrix (6 × 6) that takes each half of six numbers to its product w × with w."""
+    """Return the matrix (6 × 6) that maps six numbers [u; v] to [w × u; w × v]."""
     return np.kron(np.eye(2), _cross(w))
 
 
 def _gyroscopic(M: Matrix, w: Matrix) -> Matrix:
-    """Return force and torque about O that turn a rigid body with the mass matrix M at w."""
+    """Return the gyroscopic force and torque about O of a rigid body with mass matrix M."""
     found: Matrix = _twice(w) @ M[:, 3:] @ w
     return found
 
 
 def _gyroscopic_slope(M: Matrix, w: Matrix) -> Matrix:
-    """Return the derivative of `_gyroscopic` by w."""
+    """Return the derivative of `_gyroscopic` with respect to w."""
     momentum = (M[:, 3:] @ w).reshape(2, 3)
     found: Matrix = _twice(w) @ M[:, 3:] - np.vstack([_cross(of) for of in momentum])
     return found
@@ -281,9 +286,10 @@ def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
 def _read(
     model: str | Path, parameters: Parameters, held: tuple[Matrix, Matrix] | None = None
 ) -> _Craft:
-    """Return the craft as its FMU has it; under the accelerations of another one if they are held.
+    """Read the craft and its liquid from the FMU with the given parameters.
 
-    They are those of craft and liquid as one rigid body, and with moving bobs.
+    ``held`` has accelerations as `_Craft.accelerations` returns them, which replace the craft's own
+    accelerations in the computation of damping ratios and frequencies.
     """
     with Plant(model, parameters) as plant:
 
@@ -386,11 +392,13 @@ def _read(
         wrench = np.concatenate([vector("force"), vector("torque")])
         found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"), omega, spins,
                        tuple(modes))  # fmt: skip
-    # the drag follows the acceleration of craft and liquid as one rigid body (damping.rs)
+    # in damping.rs, the damping force depends on the acceleration of craft and liquid as one rigid
+    # body
     whole, moving = held or found.accelerations()
     for bob, zeta, floor, law in drags:
         tank = tanks[bob.tank]
-        # the drag takes the hinge, the frequency the bob; they differ only if the craft spins
+        # The damping force depends on the specific force at the hinge, the frequency on the
+        # specific force at the bob. The two differ only if the craft spins.
         at, e = found.place(bob, values), tank.axes[:, 2]
         hinge = at + bob.length * e
         rest, g = (float(e @ found.specific(*of)) for of in ((whole, hinge), (moving, at)))
@@ -410,7 +418,7 @@ def _read(
 
 
 def _slope(ends: tuple[Matrix, Matrix], size: Matrix, step: float) -> Matrix:
-    """Return a difference quotient; a difference by rounding is 0."""
+    """Return a difference quotient, in which differences due to rounding are set to 0."""
     rise = ends[1] - ends[0]
     rise[np.abs(rise) <= ALONE * size] = 0.0
     found: Matrix = rise / step
@@ -418,10 +426,10 @@ def _slope(ends: tuple[Matrix, Matrix], size: Matrix, step: float) -> Matrix:
 
 
 def _derivative(craft: _Craft, step: float, ends: tuple[_Craft, _Craft]) -> dict[str, float]:
-    """Return the derivatives of uncertain parameters by one of a tank, from both ends of a step.
+    """Return the derivatives of all uncertain parameters by one FMU parameter of a tank.
 
-    A rigid change of the liquid is one of the dry craft: mass, centre and inertia of both together
-    are those of the FMU.
+    ``ends`` has the craft at both ends of a step of this FMU parameter. A change of the rigid
+    liquid counts as a change of the dry craft, because only the sum of both acts.
     """
     of_bobs = [bob.name(kind) for bob in craft.bobs for kind in KINDS]
     values, *at = (np.array([c.values[of] for of in of_bobs]) for c in (craft, *ends))
@@ -442,7 +450,7 @@ def _derivative(craft: _Craft, step: float, ends: tuple[_Craft, _Craft]) -> dict
 
 
 def _root(matrix: Matrix) -> Matrix:
-    """Return L of L L^T, a column for each principal axis of the correlations.
+    """Return L with L L^T = matrix, with a column for each principal axis of the correlations.
 
     Raises ValueError if the matrix is not a covariance.
     """
@@ -458,14 +466,14 @@ def _root(matrix: Matrix) -> Matrix:
     return found
 
 
-# The FMU's parameters of tanks that uncertain parameters replace, to first order.
+# Tank parameters of the FMU that can be converted to uncertain parameters, to first order.
 OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge|zeta)\[\d\])")
 
 
 def _converted(
     model: str | Path, given: Parameters, craft: _Craft, table: "pd.DataFrame"
 ) -> tuple["pd.DataFrame", list[str]]:
-    """Return derivatives of uncertain parameters by FMU parameters, and errors that forbid them."""
+    """Return the derivatives of uncertain parameters by FMU parameters, and error messages."""
     import pandas as pd
 
     slopes: dict[str, dict[str, float]] = {}
@@ -476,16 +484,16 @@ def _converted(
             continue
         if not OF_TANK.fullmatch(name):
             problems.append(
-                f"no uncertain parameter replaces {name} (allowed: those of craft, and "
-                "of a tank m_0, H_0, I_0, I_z, mass, length, frequency, hinge, zeta)"
+                f"{name} cannot be converted to an uncertain parameter (allowed: parameters of "
+                "craft, and of a tank m_0, H_0, I_0, I_z, mass, length, frequency, hinge, zeta)"
             )
             continue
         with Plant(model, given) as plant:
             value = float(plant.get([name])[0])
         step = max(1e-4 * abs(value), 1e-7)
-        # most must not be below 0
+        # step only upwards if a step downwards would make a positive value negative
         points = value - step if value > step or value < 0 else value, value + step
-        # a frequency of 0 leaves it to the length
+        # frequency = 0 means that the frequency follows from the length, so it is skipped
         if not (value == 0 and ".frequency[" in name):
             low, high = (_read(model, {**given, name: x}, held) for x in points)
             slopes[name] = _derivative(craft, points[1] - points[0], (low, high))
@@ -496,7 +504,10 @@ def _converted(
 
 
 class _Equations:
-    """Signals as rows over states, inputs, X and the channels of Δ; products by parameters."""
+    """Linear equations in which products with uncertain parameters become channels of Δ.
+
+    A signal is a row of coefficients of states, inputs, X and channels.
+    """
 
     def __init__(self, width: int, values: Mapping[str, float], spread: "pd.DataFrame") -> None:
         self.values, self.spread = values, spread.to_numpy()
@@ -526,10 +537,10 @@ class _Equations:
 def _partitioned(
     craft: _Craft, values: Mapping[str, float], spread: "pd.DataFrame", X_f: Matrix, X_c: Matrix
 ) -> tuple[Matrix, list[int], tuple[str, ...]]:
-    """Return M from (states, channels, all inputs) to (rates, channels, all outputs).
+    """Return M from (states, channels, all inputs) to (derivatives, channels, all outputs).
 
-    Also how many channels each column of ``spread`` has, and the states' names. The point has the
-    accelerations X_f, which the factor of the acceleration multiplies, and X_c.
+    Also return the number of channels of each column of ``spread``, and the names of the states.
+    At the operating point the acceleration is γ X_f + X_c.
     """
     states = [*OUTPUTS, *(
         f"tank[{bob.tank}].{of}[{bob.mode},{i}]"
@@ -543,11 +554,11 @@ def _partitioned(
     W = _cross(omega)
 
     def inwards(place: Matrix) -> Matrix:
-        """Return the change of w × (w × place) with w."""
+        """Return the derivative of w × (w × place) with respect to w."""
         return -_cross(W @ place) - W @ _cross(place)
 
     def grown(signal: Matrix) -> Matrix:
-        """Return γ times signals; only in craft that spin, because β/g is without γ in others."""
+        """Return γ times signals. If the craft does not spin, β/g does not depend on γ."""
         return eq.times(FACTOR, signal) if omega.any() or X_c.any() else values[FACTOR] * signal
 
     rates = [(w - W @ x[:3]) / 2, w_d]
@@ -573,7 +584,7 @@ def _partitioned(
         turning = (e @ X_c[3:]) * S + np.outer(w_E, w_E) - omega @ omega * flat
         rates += [s_d, -R - (e @ X_f[3:]) * S @ scaled - turning @ s - 2 * w_e * S @ s_d]
         pull = kappa_f @ scaled + (kappa_c - w_e * w_E) @ s + 2 * (S.T @ w_E) @ s_d
-        # β = γ by_γ + β_c + b by_b; the rod is not along e if it is not 0
+        # β = γ by_γ + β_c + b by_b; if β is not 0, the rod of the pendulum is not along e
         b, factor, by_b = values[height], values[FACTOR], kappa_c + w_e * w_E
         g = factor * g_f + g_c - b * (w_E @ w_E)
         size = ALONE * (np.abs(at).sum() + abs(b) * (omega @ omega))
@@ -617,7 +628,7 @@ def _partitioned(
         load[3:] -= axes @ (turned + _cross(axes.T @ omega) @ spin.coupling @ L)
     known = craft.liquid + craft.deformed()
     wet = known @ X + _gyroscopic_slope(known, omega) @ w
-    # the dry craft: one product for each way in which a parameter acts
+    # dry craft: one product with a parameter for each term in which it appears
     accelerated = a.copy()
     turn = [_cross(np.eye(3)[i]) for i in range(3)]
     for i in range(3):
@@ -631,7 +642,7 @@ def _partitioned(
         J = np.zeros((6, 6))
         J[3 + i, 3 + j] = J[3 + j, 3 + i] = 1.0
         wet += eq.times(f"craft.J{axes}", J @ X + _gyroscopic_slope(J, omega) @ w)
-    # X and y from their equations
+    # solve the equations for X and y, and eliminate both
     balance = np.vstack([load - wet, *quotients])
     at = slice(n + m, n + m + unknown)
     solved = np.linalg.solve(-balance[:, at], balance)
@@ -645,7 +656,7 @@ def _partitioned(
 
 
 def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
-    """Return which of the first ``inside`` signals are both controllable and observable."""
+    """Return a mask of those of the first ``inside`` signals that inputs reach and outputs show."""
     size = np.abs(M).max(axis=1, keepdims=True)
     joined = np.abs(M) > 1e-14 * size
     reached = joined[:inside, inside:].any(axis=1)
@@ -658,9 +669,10 @@ def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
 
 
 def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int]]:
-    """Return M with each block of channels in the least number of copies that it alone needs.
+    """Return M in which each repeated block of channels has its smallest number of copies.
 
-    A repeated real block is like an integrator: what the rest does not move or see of it goes.
+    A repeated real block is like a block of integrators, so that it can be reduced to its
+    controllable and observable part. Each block is reduced with the others unchanged.
     """
     counts = list(counts)
     for k in range(len(counts)):
@@ -683,9 +695,9 @@ def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int
 class UncertainModel:
     """Spacecraft with uncertain parameters as a linear fractional transformation y = F_u(M, Δ) u.
 
-    `uncertain` and `Craft.uncertain` return an instance. Δ is real and diagonal. Each δ of
-    ``deltas`` has ``|δ| ≤ 1`` and occurs on the diagonal of Δ as often as ``counts`` states. The
-    parameters are ``center`` + ``spread`` · δ.
+    `uncertain` and `Craft.uncertain` return an instance. Δ is real and diagonal. Each δ named in
+    ``deltas`` has ``|δ| ≤ 1``, and ``counts`` has the number of its copies on the diagonal of Δ.
+    The parameters are ``center`` + ``spread`` · δ.
 
     Attributes
     ----------
@@ -772,7 +784,7 @@ class UncertainModel:
         return sum(self.counts)
 
     def __repr__(self) -> str:
-        """Return the sizes of the model, then one line for each block of Δ."""
+        """Return the sizes of the model, the blocks of Δ, and the names of inputs and outputs."""
         M, width = self.M, self.order
         copies = names([
             f"{short_name(n, self.tanks)} × {c}"
@@ -863,7 +875,10 @@ class UncertainModel:
         )  # fmt: skip
 
     def _scale(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
-        """Return the factors from the FMU's states to those of M: mass times pendulum length."""
+        """Return the ratios of the states of M to the states of the FMU.
+
+        For a slosh mode the ratio is the slosh mass times the pendulum length.
+        """
         values = self._values | self.values(delta)
         sizes = {
             (bob.tank, bob.mode): values[bob.name("mass")] * self._length(bob, values)
@@ -874,21 +889,21 @@ class UncertainModel:
         return np.array([sizes[int(of[1]), int(of[2])] if of else 1.0 for of in found])
 
     def _ratio(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return the ratio of a mode's frequency to its value in the craft as given."""
+        """Return the ratio of a mode's frequency to its nominal value."""
         return values[bob.name("frequency")] / self._craft.values[bob.name("frequency")]
 
     def _acceleration(self, values: Mapping[str, float]) -> Matrix:
-        """Return the craft's acceleration (6 numbers) at the point."""
+        """Return X at the operating point."""
         return values[FACTOR] * self._X_f + self._X_c
 
     def _length(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return the pendulum length (m) at which gravity's share of ω² is unchanged."""
+        """Return the pendulum length (m) with which gravity keeps its share of ω²."""
         craft, axis = self._craft, self._craft.tanks[bob.tank].axes[:, 2]
         before, now = (
             axis @ craft.specific(self._acceleration(of), craft.place(bob, of))
             for of in (craft.values, values)
         )
-        # without gravity the length has no effect
+        # without a specific force the length has no effect
         grown = now / before if before > ALONE * craft.tanks[bob.tank].g_ref else 1.0
         return float(bob.length * grown / self._ratio(bob, values) ** 2)
 
@@ -897,10 +912,10 @@ class UncertainModel:
     ) -> "dict[str, Quantity]":
         """Return the parameters of Spacecraft at Δ, for `linearize` and `simulate`.
 
-        Force and torque are set to hold the acceleration of the operating point, and the damping
-        forces keep their value there. The rigid liquid changes with the slosh masses and their
-        heights; if its own inertia would become negative, as in a sphere, the inertia of the dry
-        craft is reduced instead.
+        Force and torque are set so that the acceleration at the operating point does not change;
+        the damping forces do not change, either. The rigid liquid changes with the slosh masses and
+        their heights; if its own inertia would become negative, as in a sphere, the inertia of the
+        dry craft is reduced instead.
 
         Parameters
         ----------
@@ -950,12 +965,12 @@ class UncertainModel:
         return new
 
     def _controller(self, loop: Loop) -> LinearModel:
-        """Return the controller of a loop around this model, or raise FmuError."""
+        """Return the controller of a loop, or raise FmuError if the loop does not fit the model."""
         loop._must_be_linear()
         if loop._turned and self._craft.omega.any():
             raise FmuError(
-                "the momentum that wheels gain turns with a craft that spins, which the uncertain "
-                "model does not have: give the loop the command torque instead"
+                "in a craft that spins, the momentum that wheels gain turns with the craft, which "
+                "the uncertain model does not include: use torque as the command of the loop"
             )
         given, loop = loop, loop._without_wheels()
         K = loop._must_be_linear()
@@ -974,9 +989,9 @@ class UncertainModel:
     def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return the response N of the closed loop from the outputs to the inputs of Δ.
 
-        The hold also makes images of each frequency around multiples of the sampling rate. Their
-        part of the loop gain, 1e-6 at the slosh frequencies of the book's example, is taken at
-        Δ = 0.
+        The zero-order hold also produces images of each frequency around multiples of the sampling
+        rate. Their part of the loop gain is computed with Δ = 0, because it is small: 1e-6 at the
+        slosh frequencies of the book's example.
 
         Parameters
         ----------
@@ -1012,10 +1027,11 @@ class UncertainModel:
     def mu_upper(self, loop: Loop, frequency: ArrayLike) -> Matrix:
         """Return an upper bound of µ of the closed loop at each frequency.
 
-        The bound is 1 over the largest size at which D and G scalings with a full block for each
-        parameter (Fan, Tits and Doyle 1991) show that the loop has no pole at this frequency, 0.001
-        at least. Quantities such as damping ratios stay at 0 or above. The bound holds only at the
-        given frequencies, and not between them; use `certify` for all frequencies.
+        D and G scalings with a full block for each parameter (Fan, Tits and Doyle 1991) prove that
+        the loop has no pole at this frequency for all Δ up to a certain size. The bound is 1
+        divided by the largest such size, and at least 0.001. Quantities such as damping ratios stay
+        at 0 or above. The bound holds only at the given frequencies, and not between them; use
+        `certify` for all frequencies.
 
         Parameters
         ----------
@@ -1027,7 +1043,7 @@ class UncertainModel:
         Returns
         -------
         ndarray, shape (n,)
-            Upper bounds, at most 0.5 % above the smallest that these scalings give.
+            Upper bounds, at most 0.5 % above the smallest bounds that such scalings give.
 
         Raises
         ------
@@ -1054,10 +1070,10 @@ class UncertainModel:
     ) -> Certificate:
         """Prove that the loop is stable for all Δ up to a size close to the worst case.
 
-        The proof holds for all frequencies, not only for a grid: D and G scalings on intervals
-        of frequency, and on parts of the box of Δ where a pair of scalings for the whole box does
-        not exist. The certified size is the size of the worst case divided by ``gap``, or
-        ``largest`` if no worst case was found. If this size cannot be proved, a smaller size is
+        The proof holds for all frequencies, not only for a grid, because each pair of D and G
+        scalings is valid on an interval of frequency. Where no scalings exist for the whole box of
+        Δ, the box is divided. The certified size is the size of the worst case divided by ``gap``,
+        or ``largest`` if no worst case was found. If this size cannot be proved, a smaller size is
         tried. Needs the package clarabel: ``pip install 'hubslosh[robust]'``.
 
         Parameters
@@ -1069,12 +1085,11 @@ class UncertainModel:
         gap : float
             Ratio of the size of the worst case to the size to certify; above 1.
         most : int
-            Number of convex problems that may be solved for each size.
+            Largest number of convex problems to solve for each size.
         worst : WorstCase, optional
-            Result of `worst_case` for this loop, which is searched if it is not given.
+            Result of `worst_case` for this loop; by default `worst_case` is called.
         progress : bool or callable, optional
-            Shows a line on stderr, as for `worst_case`, and then the proved part of the box and of
-            the frequencies.
+            Shows a line on stderr, as for `worst_case`; during the proof it shows the proved share.
 
         Returns
         -------
@@ -1099,8 +1114,8 @@ class UncertainModel:
             worst = delta_search.worst(largest)
         elif worst.delta and not delta_search.is_limit(self.delta(worst.delta)):
             raise FmuError(
-                "worst is not a worst case of this loop, which is not at its limit of stability "
-                "there: give the result of worst_case of the same model and loop"
+                "worst is not a worst case of this loop, because the loop is not at the limit of "
+                "stability at its Δ: give the result of worst_case of the same model and loop"
             )
         data: dict[str, NDArray[Any]] = {}
         size, solved = 0.0, 0
@@ -1144,7 +1159,7 @@ class UncertainModel:
 
     @property
     def _least(self) -> Matrix:
-        """Return the least δ: there damping ratios are 0, and other quantities well above 0."""
+        """Lower bound of each δ: a damping ratio is 0 there, and other quantities are above 0."""
         found = np.full(len(self.deltas), -np.inf)
         for k, name in enumerate(self.deltas):
             if name in self.spread.index and (share := _LEAST.get(_kind(name))) is not None:
@@ -1156,14 +1171,13 @@ class UncertainModel:
     ) -> WorstCase:
         """Search for the smallest real Δ that brings the loop to the limit of stability.
 
-        The search uses the exact sampled loop, with its delay. Starting from each lightly damped
-        pole, it follows the sign of the derivatives of the pole's damping by each δ, up to ``|δ| =
-        largest``, until the signs repeat. It also tries the lines from 0 to each corner of the
-        ranges, or to 64 of the corners if there are more, random Δ in between, and Δ at which two
-        uncertain frequencies are equal. From the smallest unstable Δ it continues the search in
-        boxes that shrink. Damping ratios stay at 0 or above. If a Δ is found, 1 divided by its size
-        is a lower bound of µ. If no Δ is found, the loop may still be unstable for some Δ:
-        `certify` proves stability.
+        The search uses the exact sampled loop with its delay. For each lightly damped pole, it
+        moves each δ in the direction that reduces the damping of the pole, up to ``|δ| = largest``,
+        until these directions repeat. It also tries the lines from 0 to each corner of the ranges
+        (or to 64 corners if there are more), random Δ, and Δ at which two uncertain frequencies are
+        equal. Then it searches for smaller unstable Δ in boxes that shrink. Damping ratios stay at
+        0 or above. If an unstable Δ is found, 1 divided by its size is a lower bound of µ. If none
+        is found, the loop may still be unstable for some Δ: only `certify` proves stability.
 
         Parameters
         ----------
@@ -1190,7 +1204,7 @@ class UncertainModel:
         return DeltaSearch(self, loop, self._controller(loop), progress).worst(largest)
 
     def _of_kind(self, kind: str) -> list[int]:
-        """Return the places of the δ that are a quantity of one kind, such as "zeta"."""
+        """Return the indices of the δ of one kind of quantity, such as "zeta"."""
         return [k for k, name in enumerate(self.deltas) if _kind(name) == kind]
 
     def as_dict(self) -> "dict[str, Any]":
@@ -1229,7 +1243,7 @@ class UncertainModel:
         Parameters
         ----------
         path : str or Path
-            File, .mat (version 5).
+            File to write, .mat (version 5).
 
         Raises
         ------
@@ -1246,7 +1260,7 @@ class UncertainModel:
         Parameters
         ----------
         path : str or Path
-            File, .json.
+            File to write, .json.
 
         Raises
         ------
@@ -1279,15 +1293,15 @@ class UncertainModel:
 
 
 def _kind(name: str) -> str:
-    """Return a quantity without its tank and number: "zeta" of "tank[1].zeta[1]"."""
+    """Return the kind of a quantity without tank and number: "zeta" for "tank[1].zeta[1]"."""
     return re.sub(r"^(tank|appendage)\[\d\]\.|\[\d\]$", "", name)
 
 
 def _unknown(name: str, values: Mapping[str, float]) -> str:
-    """Return advice about a name that does not belong to an uncertain parameter."""
+    """Return an error message with advice for a name that is no uncertain parameter."""
     if instead := slosh_mass_error(name):
         return f"{name} {instead}"
-    return f"there is no uncertain {name}{did_you_mean(name, values)}"
+    return f"{name} is no uncertain parameter{did_you_mean(name, values)}"
 
 
 def uncertain(
@@ -1305,32 +1319,36 @@ def uncertain(
     The craft must be free and at rest, and its tanks axially symmetric. Warns with FmuWarning if
     its thrust turns the craft faster and faster; `Craft.uncertain` trims the craft first.
 
-    Uncertain parameters are ``tank[1].frequency[1]`` (Hz, for a tank that is held at rest, under
-    the present thrust; the height of the slosh mass and the share of a centring stiffness do not
-    change), ``tank[1].zeta[1]``, ``tank[1].mass[1]`` and ``tank[1].bob[1]`` (height of the slosh
-    mass on the axis; mass, centre and inertia of the whole liquid do not change), ``craft.mass``,
-    ``craft.Jxx``, …, ``craft.r[1]``, … of the dry craft, ``appendage[1].frequency`` (Hz, with the
-    interface held) and ``appendage[1].zeta``, and ``acceleration``, a factor of the acceleration
-    that force and torque give the craft. Mass and inertia change at constant acceleration.
+    Uncertain parameters are:
+
+    * ``tank[1].frequency[1]``, Hz, in a fixed tank under the present thrust; the height of the
+      slosh mass and the share of a centring stiffness do not change;
+    * ``tank[1].zeta[1]``;
+    * ``tank[1].mass[1]`` and ``tank[1].bob[1]``, the height of the slosh mass on the tank's axis;
+      mass, centre of mass and inertia of the whole liquid do not change;
+    * ``craft.mass``, ``craft.Jxx``, … and ``craft.r[1]``, … of the dry craft; the acceleration at
+      the operating point does not change;
+    * ``appendage[1].frequency``, Hz, with the interface fixed, and ``appendage[1].zeta``;
+    * ``acceleration``, a factor of the acceleration that force and torque give the craft.
 
     Parameters
     ----------
     parameters : mapping, str or Path, optional
         Parameters of Spacecraft, as for `linearize`: craft, tanks, force.
     ranges : mapping, optional
-        Range of each uncertain parameter by name: (low, high) in SI units, or a share such as
-        ``"5%"`` of the value on both sides.
+        Range of each uncertain parameter by name: (low, high) in SI units, or a share of the value
+        such as ``"5%"``, which means ± 5 %.
     inputs : str or sequence of str
         Inputs u: components of force and torque, or "force" and "torque" for all three.
     outputs : str or sequence of str
         Outputs y: components of q and omega.
     covariance : DataFrame or Identification, optional
-        Covariance with names of uncertain parameters as index and columns, SI units. Or a result
-        of `identify` with ``free=``, whose parameters (``tank[1].length[1]``, ``hinge``, ``m_0``,
-        …) are converted to first order; its biases and initial states are left out. Δ then has
-        the principal axes of the correlations.
+        Covariance with names of uncertain parameters as index and columns, SI units. Or a result of
+        `identify` with ``free=``, whose parameters (``tank[1].length[1]``, ``hinge``, ``m_0``, …)
+        are converted to first order, without biases and initial states. The δ of Δ are then
+        coordinates along the principal axes of the correlations.
     sigmas : float
-        Length of the axes of the covariance on both sides, standard deviations.
+        Number of standard deviations along a principal axis that ``δ = ±1`` means.
     model : str or Path
         Name of the FMU, or its file.
 
@@ -1342,7 +1360,8 @@ def uncertain(
     Raises
     ------
     FmuError
-        If the craft is not of this kind, or a name or a range is not allowed.
+        If the craft is not free and at rest, a tank is not axially symmetric, or a name or a range
+        is not allowed.
 
     Examples
     --------
@@ -1368,7 +1387,7 @@ def uncertain(
         table = covariance.covariance if is_fit else covariance
         try:
             if is_fit:
-                # a record's own biases and states at its start are not the craft's
+                # leave out biases and initial states, which belong to a recording, not to the craft
                 kept = [name for name in table.index if not re.search(r"[@(]|^init\.", name)]
                 table = table.loc[kept, kept]
             root = _root(table[list(table.index)].to_numpy(float))
@@ -1386,7 +1405,8 @@ def uncertain(
             problems += more
             if not problems:
                 root, of_axes = slopes.to_numpy() @ root, [str(name) for name in slopes.index]
-            # the liquid's rigid part moves the dry craft's properties, which may have ranges
+            # parameters of the rigid liquid change the dry craft's properties, which may also have
+            # ranges
             twice |= {name for name in of_axes if not name.startswith("craft.")}
         else:
             problems += [_unknown(name, values) for name in of_axes if name not in values]

@@ -1,4 +1,4 @@
-"""Shows runs: the page of ``hubslosh view``, in a notebook or a browser."""
+"""Display of runs: the page of ``hubslosh view`` in a notebook or a browser."""
 
 import html
 import os
@@ -32,7 +32,7 @@ class View:
     Attributes
     ----------
     html : str
-        The page. The page contains everything that it needs, so that it works without a network.
+        The page, which refers to no other files, so that it can be shown without a network.
     path : Path or None
         File of the page, if `view` was given ``out``.
 
@@ -88,11 +88,12 @@ def view(
 ) -> View:
     """Show a run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
 
-    Nothing is simulated: the page draws the columns of the run. A run of HubSlosh needs ``theta``
+    The page draws the columns of the run; nothing is simulated. A run of HubSlosh needs ``theta``
     or ``omega``, ``slosh_angle`` and ``slosh_angle_radial``; its second and later modes are drawn
     if the run has ``slosh.q_radial[n]`` and ``slosh.q_tangential[n]``. A run of Spacecraft needs
-    ``q[1]`` to ``q[4]``, and for each tank the slosh angles or the directions ``p``, for draining
-    tanks also ``liquid``. `simulate` and `closed_loop` record these columns by default.
+    ``q[1]`` to ``q[4]``, for each tank the slosh angles or the directions ``p`` of the pendulums,
+    and for each draining tank also ``liquid``. `simulate` and `closed_loop` record these columns by
+    default.
 
     Parameters
     ----------
@@ -101,16 +102,17 @@ def view(
     out : str or Path, optional
         Also write the page to this .html file.
     model : str or Path, optional
-        FMU of the run; by default the model in ``.attrs`` of the table, or in the file.
+        FMU of the run; by default the FMU that ``.attrs`` of the table or the file names.
     parameters : mapping, optional
-        Parameters of the run in addition to those in ``.attrs`` of the table, or in the file.
+        Parameters of the run in addition to the parameters in ``.attrs`` of the table or in the
+        file.
     tanks : sequence or mapping
         Tank files with the contours to draw, or dicts with their content, as for `tank`, in the
         order of the tanks, or by the number of the tank from 1.
     start, stop : float, optional
         First and last time to show, s.
     program : str or Path, optional
-        The program ``hubslosh``; by default the one that comes with this package.
+        The program ``hubslosh``; by default the program of this package.
 
     Returns
     -------
@@ -120,8 +122,7 @@ def view(
     Raises
     ------
     FmuError
-        If columns are missing; the message names the missing columns. If a file cannot be read or
-        written.
+        If columns are missing, which the message names, or a file cannot be read or written.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Reaction wheels of a craft: limits of torque and speed, and the momentum that turns the craft.
+"""Reaction wheels of a craft: limits of torque and speed, and angular momentum.
 
-A wheel turns the craft through the FMU's input ``h_wheels``, the angular momentum of the wheels
-relative to the body. Its derivative is minus the wheels' torque on the craft.
+The FMU has the input ``h_wheels``, the angular momentum of the wheels relative to the body. Its
+derivative is minus the torque of the wheels on the craft.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-MOMENTUM = tuple(f"h_wheels[{i}]" for i in (1, 2, 3))  # Input of the FMU, N·m·s
-TORQUE = tuple(f"torque[{i}]" for i in (1, 2, 3))  # Input of the FMU, N·m
+MOMENTUM = tuple(f"h_wheels[{i}]" for i in (1, 2, 3))  # Inputs: momentum of the wheels, N·m·s
+TORQUE = tuple(f"torque[{i}]" for i in (1, 2, 3))  # Inputs: torque on the craft, N·m
 
-# Column of a wheel's torque among commands, axis, inertia, largest torque and speed, and speed.
+# A wheel in `Feedback.wheels`: column of its torque, axis, inertia, largest torque, largest speed
+# and speed at the start.
 Row = tuple[int, list[float], float, float, float, float]
 
-ALL = "wheels"  # Name of the torques of all wheels, as "torque" is that of three components
+ALL = "wheels"  # Name for the torques of all wheels, as "torque" is the name of three components
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ class Wheel:
         Returns
         -------
         list of str
-            Sentences; none if all is right.
+            One sentence for each problem; empty if there is none.
 
         Examples
         --------
@@ -116,12 +117,12 @@ class Wheel:
         return self.inertia * self.speed * self.direction
 
     def describe(self) -> str:
-        """Return axis, limits and momentum in a few words.
+        """Return a text with axis, limits and momentum.
 
         Returns
         -------
         str
-            The words.
+            The text.
 
         Examples
         --------
@@ -135,7 +136,7 @@ class Wheel:
         return f"axis ({axis}), up to {self.max_torque:g} N·m and {most:.4g} N·m·s{bias}"
 
     def __repr__(self) -> str:
-        """Return the wheel in a line."""
+        """Return a one-line description of the wheel."""
         return f"Wheel({self.describe()})"
 
 
@@ -164,9 +165,10 @@ def speed_name(torque: str) -> str:
 
 
 def rows_of(wheels: Mapping[str, Wheel], command: Sequence[str]) -> list[Row]:
-    """Return the wheels for `Feedback.wheels`.
+    """Return rows for `Feedback.wheels`.
 
-    ``wheels`` are those whose torques are commands, by the names of the torques in ``command``.
+    ``wheels`` has the wheels whose torques are commands, by the names of the torques in
+    ``command``.
     """
     return [
         (command.index(name), of.direction.tolist(), of.inertia, of.max_torque, of.max_speed,
@@ -178,9 +180,10 @@ def rows_of(wheels: Mapping[str, Wheel], command: Sequence[str]) -> list[Row]:
 def follow(
     torques: Vector, wheels: Mapping[str, Wheel], start: tuple[float, float, float]
 ) -> Feedback:
-    """Return a controller that commands the torques of a table: a row per step, a column per wheel.
+    """Return a controller that commands given torques of wheels.
 
-    ``wheels`` are named by their torques; ``start`` is the momentum of all wheels, N·m·s.
+    ``torques`` has a row for each step and a column for each wheel, N·m. ``wheels`` has the wheels
+    by the names of their torques. ``start`` is the momentum of all wheels at the start, N·m·s.
     """
     rows, names = len(torques), list(wheels)
     law = Linear(*np.zeros((4, 0, 0)), np.zeros((rows, 0)), np.ascontiguousarray(torques))
@@ -192,7 +195,7 @@ def follow(
 
 
 def columns_of(wheels: Mapping[str, Wheel], feedback: Feedback) -> dict[str, Vector]:
-    """Return the torque that acts from each row on (N·m), and the speed (rad/s), by name."""
+    """Return histories of the torque of each wheel after each row (N·m) and its speed (rad/s)."""
     torque = feedback.commands
     torque[-1] = torque[-2]
     found = {name: torque[:, feedback.command.index(name)] for name in wheels}
@@ -202,8 +205,8 @@ def columns_of(wheels: Mapping[str, Wheel], feedback: Feedback) -> dict[str, Vec
 def saturated(wheels: Mapping[str, Wheel], feedback: Feedback, time: Vector) -> list[str]:
     """Return a warning for each wheel that is at its largest speed in the last rows of a run.
 
-    ``wheels`` are named by their torques, in the order of ``feedback``; ``time`` has a number for
-    each row, s.
+    ``wheels`` has the wheels by the names of their torques, in the order of ``feedback``; ``time``
+    is the time of each row, s.
     """
     found = []
     for (name, wheel), speed in zip(wheels.items(), feedback.speeds.T, strict=True):
@@ -234,7 +237,8 @@ def torques_of(
     """
     found = {name: of for name, of in torque_names(wheels).items() if name in inputs}
     problems += [
-        f"inputs has {name}, which the wheels set: leave it out, or the torques of the wheels"
+        f"inputs has {name}, which the reaction wheels set: leave out either {name} or the torques "
+        "of the wheels"
         for name in MOMENTUM
         if found and name in inputs
     ]

@@ -1,4 +1,4 @@
-"""The worst point of a design review: found by search, confirmed by simulation."""
+"""Worst operating point of a design review: its search, and its confirmation by simulation."""
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,13 +24,13 @@ Evaluate = Callable[[Iterable[tuple[int, Vector]]], "list[Point]"]
 
 STARTS = 2  # Number of points from which the search starts, at different fills
 
-SMALLEST = 0.25  # Least step of the search; the whole range of a quantity is 2
+SMALLEST = 0.25  # Smallest step of the search, in units in which the range of a quantity is -1 to 1
 
-ASIDE = 0.01  # Part by which the gain is simulated below and above the margin
+ASIDE = 0.01  # Relative distance of the simulated gains from the gain margin, on both sides
 
-RATE = 1e-8  # Angular velocity about each axis at the start of a simulation, rad/s
+RATE = 1e-8  # Disturbance at the start of a simulation: angular velocity about each axis, rad/s
 
-GROWTH = 9.0  # Logarithm of the largest growth in a simulation, which stays within small motions
+GROWTH = 9.0  # Logarithm of the largest growth in a simulation, so that motions stay small
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,30 +38,30 @@ class Confirmation:
     """Simulation of the nonlinear FMU at the worst point, compared with the linear prediction."""
 
     command: str | None
-    """Command whose gain is scaled to the limit; None if the loop is unstable as it is."""
+    """Command whose gain is scaled up to the limit; None if the loop is unstable without this."""
     factor: float
-    """Predicted factor at the limit of stability; 1 if the loop is unstable as it is."""
+    """Predicted factor of the gain at the limit of stability; 1 if the loop is unstable."""
     simulated_factor: float
-    """Factor at which the simulated oscillation neither grows nor decays."""
+    """Factor of the gain at which the simulated oscillation neither grows nor decays."""
     frequency: float
     """Predicted frequency of the critical oscillation, Hz."""
     simulated_frequency: float
-    """Its frequency in the simulation, Hz."""
+    """Frequency of the oscillation in the simulation, Hz."""
     growth: float
     """Predicted growth rate in the last run, 1/s."""
     simulated_growth: float
-    """Growth rate in that simulation, 1/s."""
+    """Growth rate in the simulation of the last run, 1/s."""
     runs: dict[float, Run]
-    """Simulated runs by their factor."""
+    """Simulated runs by the factor of the gain."""
 
     @property
     def agrees(self) -> bool:
-        """True if factor (growth rate, if unstable) and frequency agree to 1 %."""
+        """True if frequency and factor, or growth rate of an unstable loop, agree to 1 %."""
         if abs(self.simulated_frequency - self.frequency) > 0.01 * self.frequency:
             return False
         if self.command is not None:
             return abs(self.simulated_factor - self.factor) <= 0.01 * abs(self.factor)
-        # 1 % of a change by a factor e within the run counts as none
+        # compare slow growth with a growth by the factor e within the run
         duration = max(float(run["time"].iloc[-1]) for run in self.runs.values())
         return abs(self.simulated_growth - self.growth) <= 0.01 * max(
             abs(self.growth), 1 / duration
@@ -69,7 +69,7 @@ class Confirmation:
 
     @property
     def out_of_range(self) -> list[str]:
-        """Sentences about the tanks that left the range of their model in one of the runs."""
+        """One sentence for each tank that left the range of its model in one of the runs."""
         found = [
             (f"with gain × {factor:.4g} " if self.command else "", text)
             for factor, run in self.runs.items()
@@ -79,12 +79,12 @@ class Confirmation:
 
     @property
     def summary(self) -> str:
-        """Sentences on the agreement with the prediction, and on tanks that left their range."""
+        """Comparison with the prediction, and a note if a tank left the range of its model."""
         left = "; the simulation left the range of its model (confirmation.out_of_range)"
         return self._comparison() + (left if self.out_of_range else "")
 
     def __str__(self) -> str:
-        """Return the comparison in a sentence, and how the runs left the range of their model."""
+        """Return the comparison with the prediction, and how tanks left their model's range."""
         text = "; the simulation left the range of its model: " if self.out_of_range else ""
         return self._comparison() + text + "; ".join(self.out_of_range)
 
@@ -116,11 +116,11 @@ def _decibel(factor: float) -> str:
 
 
 def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
-    """Search the operating point with the smallest modulus margin; return all points tried.
+    """Search for the operating point with the smallest `distance`; return all points tried.
 
-    The search starts at the corner to which the effects of single ranges point, and at the worst
-    points so far. The search changes one coordinate at a time, by a step that is halved when no
-    change makes the point worse, and so finds a local minimum.
+    The search starts at the worst points so far, and at the corner of the ranges at which each
+    quantity has its worse end. It changes one quantity at a time; if no change makes the point
+    worse, the step is halved. Therefore it finds a local minimum.
     """
     found: list[Point] = list(points)
     count = len(points[0].shares)
@@ -150,7 +150,7 @@ def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
 
 
 def _corners(points: "Sequence[Point]") -> list[tuple[int, Vector]]:
-    """Return for each of the worst fills the corner where each quantity has its worse end."""
+    """Return for each of the worst fills the corner at which each quantity has its worse end."""
     estimates = []
     for fill in {point.fill for point in points}:
         here = [point for point in points if point.fill == fill]
@@ -176,7 +176,7 @@ def confirm(point: "Point") -> Confirmation:
     the prediction.
     """
     rows = point.margins.crossings.query("crossing == 'phase' and frequency > 0")
-    if not point.margins.stable or rows.empty:  # without a gain margin, compare the slowest pole
+    if not point.margins.stable or rows.empty:  # there is no gain margin
         command, factor, factors = None, 1.0, [1.0]
     else:
         row = rows.loc[rows["gain_margin"].abs().idxmin()]
@@ -202,7 +202,10 @@ def confirm(point: "Point") -> Confirmation:
 
 
 def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, complex, complex]:
-    """Return a run, and the predicted and the simulated pole that decides stability (1/s)."""
+    """Simulate a point with a factor of one command's gain.
+
+    Return the run, and the predicted and the simulated pole that decides stability, 1/s.
+    """
     loop = point.loop
     _, commands = loop.names
     law = loop.linear()
@@ -226,25 +229,26 @@ def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, c
     stop = int(cycles) * T
     given, fmu = parameters_of(loop.parameters), Fmu.open(loop.model)
     rates = {name: float(fmu.convert(name, given.get(name, 0.0))) for name in OMEGA}
-    # the controller of a craft that spins is to hold its rates
+    # the reference of a craft that spins is its angular velocity at the start
     held = {name.removeprefix("init."): rate for name, rate in rates.items() if any(rates.values())}
     held = {name: rate for name, rate in held.items() if name in loop.names[0]}
     reference = pd.DataFrame({"time": [0.0, stop], **held}) if held else None
     start = {name: rate + RATE for name, rate in rates.items()}
     run = loop.simulate(stop, start, reference=reference, outputs=[])
-    # not those in which it hardly shows: their own poles may be almost the same
+    # use only commands in which the pole is prominent; others may show a similar pole
     shown = [command] if command else _showing(gain, critical)
     constants = loop._constants(parameters_of(loop.parameters))
-    # the last row repeats the command before
+    # leave out the last row, which repeats the command of the row before
     signals = run[shown].to_numpy()[:-1] - [constants[name] for name in shown]
-    # axes with the same inertia have the same pole, which a run of this length does not separate
+    # leave out poles that a run of this length cannot separate from the critical pole, for example
+    # poles of axes with the same inertia
     apart = np.minimum(np.abs(poles - critical), np.abs(poles - critical.conjugate()))
     rest = poles[apart * len(run) > 1]
     return run, complex(s), complex(np.log(_fit(signals, rest, critical)) / T)
 
 
 def _showing(gain: LinearModel, pole: complex) -> list[str]:
-    """Return the commands in which a pole of the closed loop shows, by its eigenvector."""
+    """Return the commands in which a closed-loop pole is prominent according to its eigenvector."""
     A, B, C, D = gain
     closing = np.linalg.solve(np.eye(len(D)) + D, C)
     values, vectors = np.linalg.eig(A - B @ closing)
@@ -253,10 +257,10 @@ def _showing(gain: LinearModel, pole: complex) -> list[str]:
 
 
 def _critical(poles: NDArray[np.complex128], *, at_limit: bool) -> complex:
-    """Return the pole of a closed loop that grows fastest, or decays slowest (z plane).
+    """Return the pole of a closed loop that grows fastest or decays slowest (z plane).
 
-    At a gain margin (``at_limit``) and in a stable loop it is an oscillating pole, if the loop has
-    one; a negative pole oscillates with half the sampling rate.
+    At a gain margin (``at_limit``) and in a stable loop, only oscillating poles are considered if
+    the loop has any. A negative real pole oscillates at half the sampling rate.
     """
     moving = poles[(poles.imag > 0) | (poles.real < 0) & (poles.imag == 0)]
     unstable = np.abs(poles).max() >= 1 and not at_limit
@@ -265,9 +269,10 @@ def _critical(poles: NDArray[np.complex128], *, at_limit: bool) -> complex:
 
 
 def _fit(signals: Vector, known: NDArray[np.complex128], start: complex) -> complex:
-    """Return the pole that fits signals as a sum of powers of it and of known poles (z plane).
+    """Fit signals by a sum of powers of one unknown pole and of known poles (z plane).
 
-    Variable projection: the amplitudes follow from linear least squares at each try of the pole.
+    The unknown pole is returned. The method is variable projection: for each trial value of the
+    pole, the amplitudes follow from linear least squares.
     """
     from scipy.optimize import least_squares
 
@@ -278,7 +283,7 @@ def _fit(signals: Vector, known: NDArray[np.complex128], start: complex) -> comp
     def powers(poles: Any) -> Vector:
         z = np.atleast_1d(poles)
         table = np.exp(np.outer(k, np.log(z)))
-        # one that grows begins small
+        # scale each column, because powers of a growing pole become large
         table /= np.abs(table).max(axis=0)
         return np.hstack([table.real, table.imag[:, z.imag != 0]])
 
@@ -297,7 +302,7 @@ def _fit(signals: Vector, known: NDArray[np.complex128], start: complex) -> comp
         basis = basis - Q @ (Q.T @ basis)
         return (y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]).ravel()
 
-    # it changes growth over the whole run by e^10, or the phase by 10 rad, at most
+    # the fit may change the growth over the whole run by at most e^10, and the phase by 10 rad
     first = [0.0, 0.0] if start.imag else [0.0]
     found = least_squares(residual, first, bounds=(-10, 10), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return pole(found.x)

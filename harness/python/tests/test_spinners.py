@@ -174,7 +174,7 @@ def test_wheels_of_a_spinner_are_refused(spinner: Craft) -> None:
     wheeled = replace(spinner, wheels=wheels)
     loop = wheeled.loop(np.ones((1, 3)), 0.1, "50%", measured="omega", command="wheels")
     model = wheeled.uncertain("50%", {"craft.Jxx": "5%"}, outputs=RATES)
-    with pytest.raises(FmuError, match=r"momentum that wheels gain .* command torque instead"):
+    with pytest.raises(FmuError, match=r"momentum that wheels gain .* torque as the command"):
         model.worst_case(loop)
 
 

@@ -395,7 +395,7 @@ def killed(folder: str, seed: int) -> None:
             with pytest.warns(FmuWarning) as warned, pytest.raises(AssertionError):
                 study(folder, RUNS, outcome=not_called)
             (text,) = {str(warning.message) for warning in warned}
-            assert f"re-running run {int(file.stem)}: tank.h is 0.1, but the seed gives" in text, text
+            assert f"re-running run {int(file.stem)}: tank.h is 0.1, but the seed" in text, text
             file.unlink()
     print(stored())
 

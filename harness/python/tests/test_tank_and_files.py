@@ -87,7 +87,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
     full = tank(SPHERE, fill=0.3, modes=1)
     wrong = {
         "give the fill": lambda: tank(SPHERE),
-        r'a height in m, or a text such as "60%"': lambda: tank(SPHERE, fill="60"),
+        r'a height in m, or a share such as "60%"': lambda: tank(SPHERE, fill="60"),
         "modes must be a number, not 'two'": lambda: tank(SPHERE, fill=0.3, modes="two"),
         "a tank must be a tank file, or a dict": lambda: tank(3, fill=0.3),
         "^density is missing": lambda: tank({"shape": {"sphere": {"radius": 1}}}, fill=0.3),
@@ -98,7 +98,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
         "position is for Spacecraft and SloshTank": lambda: full.parameters(
             "HubSlosh", position=(0, 0, 0)
         ),
-        "number must be 1 to 4, the number of a tank, not 5": lambda: full.parameters("Spacecraft", 5),
+        "number must be 1 to 4": lambda: full.parameters("Spacecraft", 5),
         "must be Spacecraft, SloshTank or HubSlosh, not 'Craft'": lambda: full.parameters("Craft"),
         "must end in .svg": lambda: full.save("tank.png"),
         "cannot be written to TOML": lambda: tank({"density": object()}, fill=0.3),
