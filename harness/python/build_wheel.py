@@ -8,12 +8,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def build_wheel(wheel_directory: str, *_: Any, **__: Any) -> str:
-    """Pack the wheel for this platform; return its name."""
+    """Build the wheel for this platform, and return the name of its file."""
     return _pack("--python", wheel_directory)
 
 
 def build_sdist(sdist_directory: str, *_: Any, **__: Any) -> str:
-    """Pack the source; return the archive's name."""
+    """Build the source archive, and return the name of its file."""
     return _pack("--sdist", sdist_directory)
 
 
@@ -29,5 +29,5 @@ def _pack(what: str, directory: str) -> str:
         ) from None
     if done.returncode:
         raise SystemExit(done.returncode)
-    # "packed DIRECTORY/NAME (… bytes)"
+    # the last line is "packed DIRECTORY/NAME (… bytes)"
     return Path(done.stdout.splitlines()[-1].removeprefix("packed ").rpartition(" (")[0]).name

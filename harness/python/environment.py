@@ -1,11 +1,12 @@
-"""Makes a virtual environment, or finds it as it should be; needs nothing but Python.
+"""Creates a virtual environment, or reuses it if it is up to date; needs only Python.
 
 As a program: ``python3 environment.py DIRECTORY REQUIREMENTS`` prints the interpreter's path.
 
-``requirements*.in`` list the packages that the project's scripts need. ``requirements*.txt`` follow
-from them: all packages with version and SHA-256, for other systems and Pythons too. An index
-therefore cannot deliver anything else. After a change of the former run the command that stands in
-the first lines of the latter (PyPI's uv), from the project's root.
+``requirements*.in`` list the packages that the project's scripts need. ``requirements*.txt``, which
+are made from them, list all packages with version and SHA-256, also for other systems and versions
+of Python, so that a package index cannot deliver other files. After a change of a
+``requirements*.in``, run the uv command in the first lines of the ``requirements*.txt``, from the
+project's root.
 """
 
 import contextlib
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import NoReturn
 
 OLDEST = (3, 11)
-"""Oldest Python that the project's scripts run on."""
+"""Oldest version of Python on which the project's scripts run."""
 
 
 def target() -> Path:
@@ -31,12 +32,10 @@ def target() -> Path:
 def ensure(directory: Path, requirements: Path, *, hashes: bool = True) -> Path:
     """Return the interpreter of the virtual environment in ``directory``.
 
-    Packages are installed only with the SHA-256 that ``requirements`` has of them, unless
-    ``hashes`` is false.
-
-    The environment is made anew when the requirements file or the Python that makes it is not
-    the one it was made with. One process makes it; others that want it meanwhile wait. Leaves
-    the program with a sentence when it cannot be made.
+    Packages must have the SHA-256 that ``requirements`` lists, unless ``hashes`` is false. The
+    environment is created again if the requirements file or the version of Python has changed. One
+    process creates the environment, and other processes wait for it. If it cannot be created, the
+    program exits with an error message.
     """
     with _alone(directory.with_name(directory.name + ".lock")):
         return _ensure(directory, requirements, hashes)
@@ -45,8 +44,8 @@ def ensure(directory: Path, requirements: Path, *, hashes: bool = True) -> Path:
 def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
     """Run this program again in the environment of the ``requirements-<name>.txt`` next to it.
 
-    ``missing`` is the package that could not be imported. If the program runs in that environment
-    already, the environment is damaged, and the program ends with a message that says so.
+    ``missing`` is the error of the import of a package. If the program already runs in that
+    environment, the environment is damaged, and the program exits with an error message.
     """
     here = target() / "python" / name
     if Path(sys.prefix) == here:
@@ -67,7 +66,7 @@ def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
     shutil.rmtree(directory, ignore_errors=True)
     _run(
         [sys.executable, "-m", "venv", str(directory)],
-        f"the virtual environment {directory} could not be made; "
+        f"the virtual environment {directory} could not be created; "
         "is Python's module venv installed (Debian: python3-venv)?",
     )
     _run(
@@ -77,7 +76,7 @@ def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
             "pip",
             "install",
             "--disable-pip-version-check",
-            "--no-compile",  # most modules are never imported; Python compiles what is
+            "--no-compile",  # most modules are never imported; Python compiles a module on import
             *(["--require-hashes"] if hashes else []),
             "-r",
             str(requirements),
@@ -90,9 +89,9 @@ def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
 
 @contextlib.contextmanager
 def _alone(lock: Path) -> Iterator[None]:
-    """Wait until no other process is between here and the end of its ``with``.
+    """Lock the environment for a ``with`` statement, after waiting for other processes.
 
-    The operating system releases the lock when the process ends, however it ends.
+    The operating system also releases the lock if the process is killed.
     """
     lock.parent.mkdir(parents=True, exist_ok=True)
     with lock.open("a") as file:

@@ -14,7 +14,7 @@ if ~isempty(which('ss'))
     craft = ss(A, B, C, D);
 end
 
-% Ports have the order of the FMU's variables.
+% The ports of the block have the order of the FMU's variables.
 unpacked = tempname();
 unzip(fullfile(folder, 'craft.fmu'), unpacked);
 xml = fileread(fullfile(unpacked, 'modelDescription.xml'));
@@ -30,7 +30,7 @@ assert(all(known), 'outputs: %s', strjoin(results, ', '));
 fprintf('inputs: %s\n', strjoin(ports, ', '));
 fprintf('output %d: %s\n', [num2cell(places); results(places)]{:});
 if isempty(which('new_system'))
-    fprintf('Simulink is not here: no model is built\n');
+    fprintf('Simulink is not installed: no model is built\n');
     return
 end
 
@@ -42,8 +42,8 @@ end
 new_system(model);
 add_block('simulink_extras/FMU Import/FMU', [model '/craft'], 'FMUName', ...
     fullfile(folder, 'craft.fmu'));
-% The FMU offers both interfaces. If your release has taken Model Exchange, choose Co-Simulation in
-% the block's dialog.
+% The FMU has both interfaces. If your release of Simulink selects Model Exchange, choose
+% Co-Simulation in the dialog of the block.
 for k = 1:numel(ports)
     name = regexprep(ports{k}, '\W', '_');
     add_block('simulink/Sources/Constant', [model '/' name], 'Value', ...

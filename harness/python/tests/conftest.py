@@ -1,11 +1,11 @@
-r"""Fixtures: the packed FMU and the harness's binary.
+r"""Fixtures of all tests, such as the packed FMU. To run the tests by hand:
 
     cargo run --release -- pack
     cargo run --release -- pack --python
     pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh \
         --wheel dist/hubslosh-0.7.0-cp311-abi3-….whl
 
-``cargo test --release`` calls it so, with FMU and wheel that it packs itself.
+``cargo test --release`` runs the last command with an FMU and a wheel that it packs itself.
 """
 
 import os
@@ -31,7 +31,7 @@ Harness = Callable[..., dict[str, np.ndarray]]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options for the paths of the FMU and of the harness."""
+    """Add options for the paths of FMU, wheel and program, and for the choice of tests."""
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     wheels = sorted((ROOT / "dist").glob("hubslosh-*.whl"))
@@ -48,7 +48,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what needs Octave, and keep either the long tests or the others."""
+    """Deselect tests that need Octave unless it is wanted, and either long or short tests."""
     if not config.getoption("--octave"):
         items[:] = [item for item in items if item.get_closest_marker("octave") is None]
     long = config.getoption("--long")
@@ -76,7 +76,7 @@ def wheel(request: pytest.FixtureRequest) -> Path:
 
 
 def run_with_wheel(arguments: list[str | Path], wheel: Path, folder: Path, request) -> str:
-    """Run Python in a folder with the wheel, matplotlib and the harness's binary."""
+    """Run Python in a folder with the wheel, matplotlib and the program, and return its output."""
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "wheel")
     surroundings = os.environ | {
@@ -115,7 +115,7 @@ def drive(
     fmu: Path, time: Sequence, torque: Sequence, settings: dict | None = None, *,
     slope: Sequence | None = None, columns: Sequence[str] = COLUMNS, **options,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Return a record of HubSlosh under a torque history, with the options of `simulate`."""
+    """Simulate HubSlosh under a torque history, and return the time histories by name."""
     inputs = pd.DataFrame({"time": np.asarray(time), TORQUE: np.asarray(torque)})
     if slope is not None:
         inputs["tau_slope"] = np.asarray(slope)

@@ -1,4 +1,4 @@
-"""Flexible appendages of a craft: margins, names, uncertainty, files."""
+"""Flexible appendages of a craft: effect on margins, names of quantities, uncertainty, files."""
 
 import sys
 from dataclasses import replace
@@ -22,7 +22,7 @@ ARRAY = pd.DataFrame({
     "frequency": [0.31, 0.9], "x": [0.0, 3.1], "y": [0.2, -0.1], "z": [5.2, 0.3],
     "rx": [11.0, 0.4], "ry": [0.3, 0.1], "rz": [-0.2, -6.5], "zeta": [0.004, 0.006],
 })  # fmt: skip
-"""Modes of an array of 40 kg: out of its plane, which is across the thrust, and within."""
+"""Modes of a solar array of 40 kg: one bends it out of its plane, the other within its plane."""
 
 pytestmark = pytest.mark.filterwarnings("ignore:tank.*outside the measured")
 
@@ -51,10 +51,11 @@ def crossed(v: np.ndarray) -> np.ndarray:
 
 
 def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
-    """Return the linear craft under thrust from torque to `MEASURED`, by Lagrange's equations.
+    """Return the linear model of the craft under thrust, by Lagrange's equations.
 
-    Coordinates are the rotation, the bobs' displacements across z and the modal displacements. of:
-    parameters of the FMU, whose tanks stand along z. damping: c/m of each bob, 1/s.
+    The model is from torque to `MEASURED`. Its coordinates are the rotation, the displacements of
+    the slosh masses across z, and the modal displacements. ``of`` has the parameters of the FMU,
+    whose tanks stand along z; ``damping`` is c/m of each slosh mass, 1/s.
     """
 
     def vector(name: str, n: int = 3) -> np.ndarray:
@@ -83,7 +84,7 @@ def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
         name = f"appendage[{j}]"
         at, part = vector(f"{name}.position"), vector(f"{name}.participation", 6)
         p, w = part[:3], 2 * np.pi * of[f"{name}.frequency"]
-        # as the thrust deforms it
+        # displacements under the steady thrust
         eta = -(p @ a) / w**2
         y = p * eta
         both = crossed(at) @ crossed(y) + crossed(y) @ crossed(at)
@@ -120,7 +121,7 @@ def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
 
 @pytest.mark.parametrize("fill", ["10%", "30%", "50%", "70%", "90%"])
 def test_margins_equal_those_of_a_lagrange_model_in_python_control(craft: Craft, fill: str) -> None:
-    """All margins agree within 0.02 dB and 0.02°, each loop opened while the others are closed."""
+    """All margins agree within 0.02 dB and 0.02°; one loop is opened, and the others are closed."""
     loop = craft.loop(GAINS, PERIOD, fill, delay=2 * PERIOD)
     found = hubslosh.margins(loop)
     point = craft.trim(fill).parameters
@@ -128,7 +129,7 @@ def test_margins_equal_those_of_a_lagrange_model_in_python_control(craft: Craft,
     g, damping = 400.0 / craft.mass_properties(fill).mass, []
     for i in (1, 2):
         for n in range(1, int(of[f"tank[{i}].modes"]) + 1):
-            # laminar: zeta ~ w^-1/2 from g_ref on
+            # in laminar flow zeta is proportional to w^-1/2
             at_ref = np.sqrt(of[f"tank[{i}].g_ref"] / of[f"tank[{i}].length[{n}]"])
             here = np.sqrt(g / of[f"tank[{i}].length[{n}]"])
             damping.append(2 * of[f"tank[{i}].zeta[{n}]"] * np.sqrt(at_ref * here))
@@ -160,8 +161,8 @@ def test_margins_equal_those_of_a_lagrange_model_in_python_control(craft: Craft,
     assert abs(found.delay_margin / without.delay_margin - 1) > 1e-3
 
 
-def test_modes_of_the_free_craft_are_above_those_of_the_held_appendage(craft: Craft) -> None:
-    """Frequencies of a craft without tanks equal those of matrices that are set up by hand."""
+def test_modes_of_the_free_craft_equal_modes_of_matrices_set_up_by_hand(craft: Craft) -> None:
+    """The craft has no tanks; all its frequencies are above those of the fixed appendages."""
     dry = replace(craft, tanks={}, thrust=0.0)
     u = []
     for of in dry.appendages.values():
@@ -290,10 +291,10 @@ def test_reduced_matrices_give_the_modes_that_move_the_craft_most() -> None:
             Appendage.from_craig_bampton(change(mass, stiffness), (0, 0, 0))
 
 
-def test_a_file_of_matrices_is_read_by_pyyeti(
+def test_an_output_4_file_is_read_by_pyyeti(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A substitute reads in place of pyyeti; without it the error says how to install pyyeti."""
+    """A substitute module stands for pyyeti; without pyyeti the error says how to install it."""
     mass, stiffness = np.diag([40.0, 40, 40, 30, 9, 39, 1]), np.zeros((7, 7))
     mass[2, 6] = mass[6, 2] = 5.0
     stiffness[6, 6] = 4.0

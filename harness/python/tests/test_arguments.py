@@ -1,4 +1,4 @@
-"""Arguments of the wrong kind: said in our words, never by a TypeError from deep inside."""
+"""Arguments of a wrong type raise errors of this package, and no TypeError of another package."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +17,7 @@ TABLE = pd.DataFrame({"run": [0, 1], "x": [1.0, 2.0]})
 RESPONSE = pd.DataFrame({"frequency": np.arange(1, 50.0), "real": 1.0, "imag": np.arange(49.0)})
 SWEEP = pd.DataFrame({"time": np.arange(100) * 0.02, "tau_cmd": np.sin(np.arange(100))})
 
-# each a function of what the fixture gives: the FMU's file, a run, a linear model
+# Calls with one mistake each. The argument is the result of the fixture `given`.
 WRONG = [
     lambda g: hubslosh.simulate(g.fmu, parameters=5),
     lambda g: hubslosh.simulate(g.fmu, parameters=[1]),
@@ -118,23 +118,23 @@ WRONG = [
 
 @pytest.fixture(scope="module")
 def given(fmu: Path) -> SimpleNamespace:
-    """Return the arguments that some of the calls need."""
+    """Return an FMU's file, a run and a linear model, which some of the calls need."""
     model = hubslosh.linearize(fmu, VISCOUS, "tau_cmd", "omega")
     return SimpleNamespace(run=hubslosh.simulate(fmu, VISCOUS, SWEEP), model=model, fmu=fmu)
 
 
 def test_wrong_arguments_are_reported_by_messages_of_the_package(given: SimpleNamespace) -> None:
-    """Each call in the list `WRONG` makes one mistake and raises `FmuError`, never NumPy's."""
+    """Each call in the list `WRONG` has one mistake and raises `FmuError`, no error of NumPy."""
     for call in WRONG:
         with pytest.raises(FmuError) as error:
             call(given)
-        assert "there is no FMU" not in str(error.value)  # it would hide what is looked for
+        assert "there is no FMU" not in str(error.value)  # would hide the error that is tested
 
 
 def test_a_single_name_and_a_file_of_parameters_are_accepted(
     given: SimpleNamespace, tmp_path: Path
 ) -> None:
-    """A name gives the bits of a list with this name, a file the bits of a mapping."""
+    """A name gives the same bits as a list with this name, a file the same bits as a mapping."""
     file = tmp_path / "bench.toml"
     file.write_text('"friction.model" = "viscous"\n"hub.I" = 0.5\n')
     values = VISCOUS | {"hub.I": 0.5}
@@ -170,6 +170,6 @@ def test_masked_arrays_are_refused(given: SimpleNamespace) -> None:
     for k, call in enumerate(calls):
         with pytest.raises(FmuError, match="a masked array has no value at"):
             pytest.fail(f"call {k} returned {call()!r}")
-    # a mask that hides nothing is an array
+    # a masked array without masked values is accepted
     free = np.ma.array([0.1, 0.2], mask=False)
     assert given.model.response(free) == pytest.approx(given.model.response([0.1, 0.2]))

@@ -1,4 +1,4 @@
-"""Angles and quaternions, held against matrices and against Spacecraft.fmu."""
+"""Euler angles and quaternions, compared with rotation matrices and with Spacecraft.fmu."""
 
 from pathlib import Path
 
@@ -55,7 +55,8 @@ def test_the_attitude_error_is_the_remaining_rotation_in_body_axes() -> None:
     for a, b, e in zip(q, wanted, left, strict=True):
         a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
         step = attitude.axis_angle(e, np.linalg.norm(e))
-        assert np.abs(matrix(a) @ matrix(step) - matrix(b)).max() < 1e-7  # sqrt of rounding near π
+        # near π the error is the square root of the rounding error
+        assert np.abs(matrix(a) @ matrix(step) - matrix(b)).max() < 1e-7
     assert (np.linalg.norm(left, axis=1) <= np.pi + 1e-12).all()
     assert attitude.error([1, 0, 0, 0], attitude.axis_angle((0, 0, 1), 0.3)) == pytest.approx(
         [0, 0, 0.3]
@@ -65,10 +66,10 @@ def test_the_attitude_error_is_the_remaining_rotation_in_body_axes() -> None:
 
 
 def test_a_rigid_craft_follows_the_slew_under_its_torque(fmu: Path) -> None:
-    """Spacecraft.fmu without liquid is driven by the slew's torque, about no principal axis.
+    """Spacecraft.fmu without liquid is driven by the torque of a slew about no principal axis.
 
-    The torque is linear between rows 0.05 s apart. For a sine with a period of 20 s such lines
-    differ from the curve by (0.05 · 2π/20)²/8 = 3e-5 of the torque.
+    The torque is interpolated linearly between rows 0.05 s apart. For a sine with a period of 20 s,
+    the interpolation errors are (0.05 · 2π/20)²/8 = 3e-5 of the torque.
     """
     J = np.array([[100.0, -5, 2], [-5, 120, 0], [2, 0, 90]])
     slew = attitude.slew(0.5, 20, (1, 1, 0.5), inertia=J, start=1, step=0.05, stop=25)

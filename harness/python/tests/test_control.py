@@ -1,4 +1,4 @@
-"""Linear controllers: compiled as in Python, any delay, margins that simulation confirms."""
+"""Linear controllers: compiled code, delays of any length, and margins confirmed by simulation."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,7 +25,7 @@ def spacecraft(fmu: Path) -> Path:
 
 
 def craft() -> dict[str, float]:
-    """Return a craft under thrust with two tanks, about 0.1 Hz."""
+    """Return parameters of a craft under thrust with two tanks and slosh modes at about 0.1 Hz."""
     values = {"craft.mass": 650.0, "craft.Jxx": 180.0, "craft.Jyy": 150.0, "craft.Jzz": 160.0}
     values |= {"craft.Jxy": 4.0, "craft.Jxz": -3.0, "craft.r[3]": 0.0, "tanks": 2, "force[3]": 88.0}
     for tank, side in (("tank[1]", 0.7), ("tank[2]", -0.7)):
@@ -39,9 +39,9 @@ def craft() -> dict[str, float]:
 
 
 def three_axes(model: Path) -> Loop:
-    """Return a PD controller on quaternion and rate of that craft.
+    """Return the loop of that craft with a PD controller of quaternion and rate.
 
-    It has a filter and a delay of 0.13 s.
+    The loop has a filter and a delay of 0.13 s.
     """
     w, J = 2 * np.pi * 0.03, np.diag([300.0, 170.0, 260.0])
     gains = np.hstack([2 * w**2 * J, 1.4 * w * J])
@@ -54,7 +54,7 @@ def three_axes(model: Path) -> Loop:
 
 
 def law_of(linear: Linear) -> Callable[[int, float, list[float]], list[float]]:
-    """Return a linear controller as a function, with a state of its own."""
+    """Return a linear controller as a Python function that stores its state."""
     A, B, C, D = (m.tolist() for m in (linear.A, linear.B, linear.C, linear.D))
     x = [0.0] * len(A)
 
@@ -81,7 +81,7 @@ def law_of(linear: Linear) -> Callable[[int, float, list[float]], list[float]]:
     return command
 
 
-def test_the_compiled_loop_has_the_bits_of_the_loop_in_python(
+def test_a_compiled_controller_is_bit_identical_to_the_controller_in_python(
     spacecraft: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A linear controller runs in compiled code; the same controller as a Python function agrees.
@@ -103,7 +103,8 @@ def test_the_compiled_loop_has_the_bits_of_the_loop_in_python(
     assert len(compiled) == 801 and compiled["time"].iloc[-1] == 40
     left = attitude.error(compiled, slew[[f"q[{i}]" for i in range(1, 5)]].to_numpy()[-1])
     assert np.degrees(np.linalg.norm(left.iloc[0])) == pytest.approx(30, abs=1e-6)
-    assert np.degrees(np.linalg.norm(left.iloc[-1])) < 1  # the liquid goes on; it holds in the mean
+    # the liquid still moves, so that the attitude is reached only on average
+    assert np.degrees(np.linalg.norm(left.iloc[-1])) < 1
 
 
 def test_a_matrix_of_gains_acts_bit_identically_to_a_function(fmu: Path) -> None:
@@ -120,7 +121,7 @@ def test_a_matrix_of_gains_acts_bit_identically_to_a_function(fmu: Path) -> None
     by_function = closed_loop(law, PERIOD, 20, fmu, start, outputs=OUTPUTS)
     pd.testing.assert_frame_equal(by_matrix, by_function, check_exact=True)
 
-    # x' = 0.5 x + e, u = 0.3 x + 0.2 e of the rate, as three kinds of the same thing
+    # the filter x' = 0.5 x + e, u = 0.3 x + 0.2 e of the rate, given in three forms
     parts = [np.array([[v]]) for v in (0.5, 1.0, 0.3, 0.2)]
     model = LinearModel(*parts, ("x",), ("e",), ("u",), PERIOD)
     x = 0.0
@@ -140,16 +141,16 @@ def test_a_matrix_of_gains_acts_bit_identically_to_a_function(fmu: Path) -> None
 
 
 def test_a_continuous_controller_is_discretised_by_tustins_rule(fmu: Path) -> None:
-    """The discrete controller equals python-control's, for transfer function and state space."""
+    """The discrete controller equals the result of python-control, also for a state-space model."""
     lead = control.tf([0.6, 0.4], [0.05, 1])
     start = VISCOUS | {"init.slosh_angle": (5, "deg")}
     runs = [
         closed_loop(c, PERIOD, 20, fmu, start, measured=["theta"], outputs=OUTPUTS)
         for c in (lead, control.ss(lead), control.sample_system(lead, PERIOD, "tustin"))
     ]
-    for run in runs[1:]:  # their states have other coordinates
+    for run in runs[1:]:  # not bit-identical, because the states have other coordinates
         assert np.abs(run - runs[0]).max().max() < 1e-12
-    # at the frequency that Tustin's rule moves it to, the gain is that of the continuous one
+    # Tustin's rule moves a frequency; the discrete gain there equals the continuous gain
     loop = Loop(lead, PERIOD, fmu, VISCOUS, ["theta"])
     f = 2.0
     moved = np.arctan(np.pi * f * PERIOD) / (np.pi * PERIOD)
@@ -261,9 +262,9 @@ def test_errors_of_a_loop_are_reported_in_words(fmu: Path, spacecraft: Path) -> 
     for sentence, call in wrong.items():
         with pytest.raises(FmuError, match=sentence):
             call()
-    with pytest.raises(ZeroDivisionError):  # a mistake in the law is told as Python tells it
+    with pytest.raises(ZeroDivisionError):  # an exception of the controller is passed on
         closed_loop(lambda t, y: 1 / 0, *loop[1:])
-    # one name is a list of one
+    # a name means a list with this name
     assert list(closed_loop(*loop, outputs="omega")) == ["time", "tau_cmd", "omega"]
 
 

@@ -1,4 +1,4 @@
-"""A craft's mass properties, parameters and loops against sums by hand and against the FMU."""
+"""Mass properties, parameters and loops of a craft, compared with sums by hand and with the FMU."""
 
 import pickle
 import signal
@@ -21,7 +21,7 @@ CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.
 J = [[1150.0, -14.0, 22.0], [-14.0, 980.0, 9.0], [22.0, 9.0, 870.0]]
 TURNED = (np.sin(0.1), 0.0, np.cos(0.1))
 
-# Wheels about the body axes with a momentum of 1, 2 and 3 N·m·s.
+# Wheels about the body axes with angular momenta of 1, 2 and 3 N·m·s.
 WHEELS = {
     name: Wheel(axis, 0.01, 0.2, 400, speed)
     for name, axis, speed in zip("xyz", np.eye(3), (100.0, 200.0, 300.0), strict=True)
@@ -30,7 +30,7 @@ WHEELS = {
 
 @pytest.fixture
 def craft(fmu: Path) -> Craft:
-    """Return a craft with a sphere, and a cylinder whose axis leans."""
+    """Return a craft with a spherical tank, and a cylindrical tank whose axis is tilted."""
     tanks = {
         "ox": MountedTank(SPHERE, (0.1, 0.5, -0.3)),
         "fuel": MountedTank(CYLINDER, (-0.2, -0.6, 0.1), TURNED, modes=1),
@@ -50,10 +50,11 @@ def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
     )  # fmt: skip
 
 
-def test_monte_carlo_reads_the_ranges_of_an_uncertain_model(craft: Craft) -> None:
-    """Shares are of the value at the fill, by the tank's name or its number.
+def test_monte_carlo_accepts_the_ranges_of_an_uncertain_model(craft: Craft) -> None:
+    """Shares refer to the value at the fill; a tank has its name or its number.
 
-    The ends are those of `Craft.uncertain`; names of the study's own have ends only.
+    The ranges have the same ends as in `Craft.uncertain`. Names that are no parameters of the craft
+    need the form (low, high).
     """
     tanks = {"ox": replace(craft.tanks["ox"], nu=3e-6)}
     tanks["fuel"] = replace(craft.tanks["fuel"], axis=(0, 0, 1))
@@ -78,8 +79,8 @@ def test_monte_carlo_reads_the_ranges_of_an_uncertain_model(craft: Craft) -> Non
             craft.monte_carlo("50%", dict([given]), 3)
 
 
-def test_fmpy_with_the_parameters_of_a_craft_gives_the_bits_of_simulate(craft: Craft) -> None:
-    """FMPy and `simulate` agree bit by bit: `Craft.parameters` has all that a host must set."""
+def test_fmpy_with_the_parameters_of_a_craft_is_bit_identical_to_simulate(craft: Craft) -> None:
+    """`Craft.parameters` therefore returns all values that a host must set."""
     values = craft.parameters("50%")
     names = [f"{name}[{i}]" for name in ("omega", "velocity", "slosh_torque") for i in (1, 2, 3)]
     steps = {"stop_time": 5.0, "output_interval": 0.05, "step_size": 0.05}
@@ -91,13 +92,14 @@ def test_fmpy_with_the_parameters_of_a_craft_gives_the_bits_of_simulate(craft: C
     assert ours["omega[1]"].any()
 
 
-def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
-    """Liquid of half a sphere and half a cylinder, by textbook formulas, is turned and shifted."""
+def test_rigid_mass_properties_equal_sums_of_textbook_formulas(craft: Craft) -> None:
+    """The liquid is half a sphere and half a cylinder, each rotated and shifted to its tank."""
     found = craft.mass_properties("50%", "rigid")
     R, r, h = 0.5, 0.4, 0.55
     ox = 1440 * 2 / 3 * np.pi * R**3
     fuel = 875 * np.pi * r**2 * h
-    # half a ball: centre 3 R/8 below the sphere's; 2/5 m R² about each axis through that centre
+    # half a ball: its centre is 3 R/8 below the centre of the sphere, about which its inertia is
+    # 2/5 m R²
     across = ox * R**2 * (2 / 5 - 9 / 64)
     of_ox = np.diag([across, across, 2 / 5 * ox * R**2])
     c, s = TURNED[2], TURNED[0]
@@ -115,13 +117,13 @@ def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
     inertia += sum(shifted(m, p - center) for m, p in zip(masses, places, strict=True))
     assert found.mass == pytest.approx(sum(masses), rel=1e-12)
     assert found.center_of_mass == pytest.approx(center, abs=1e-12)
-    # the program integrates the contour's inertia
+    # the tolerance is that of the program's integration over the contour
     assert found.inertia == pytest.approx(inertia, abs=1e-9 * inertia.max())
 
 
 @pytest.mark.parametrize("fill", ["3%", {"ox": (120.0, "kg"), "fuel": 0.7}, ("100%", 0)])
-def test_effective_mass_properties_equal_the_fmus(craft: Craft, fill) -> None:
-    """Mass, centre of mass and inertia equal the FMU's at rest, with sloshing and rigid liquid."""
+def test_effective_mass_properties_equal_those_of_the_fmu(craft: Craft, fill) -> None:
+    """Mass, centre of mass and inertia at rest agree, with sloshing and with rigid liquid."""
     mine = craft.mass_properties(fill)
     shift = craft.trim(fill).shift
     for rigid in (False, True):
@@ -136,7 +138,7 @@ def test_effective_mass_properties_equal_the_fmus(craft: Craft, fill) -> None:
 
 
 def test_loop_and_linear_model_of_a_craft_equal_a_calculation_by_hand(craft: Craft) -> None:
-    """Margins and matrices equal a calculation with parameters put together by hand from `tank`."""
+    """In the calculation, the parameters are composed by hand from the results of `tank`."""
     fill, gains = "60%", np.hstack([20 * np.eye(3), 300 * np.eye(3)])
     mass = craft.mass_properties(fill).mass
     hand = {"craft.mass": 1400.0, "tanks": 2, "force[3]": 400.0}
@@ -169,11 +171,11 @@ def test_loop_and_linear_model_of_a_craft_equal_a_calculation_by_hand(craft: Cra
     assert model.inputs == tuple(torques)
 
 
-def test_draining_tanks_lose_the_mass_that_flows(craft: Craft) -> None:
-    """The FMU receives a table over the fill with damping and third-order coefficients.
+def test_a_draining_craft_loses_the_mass_that_flows_out(craft: Craft) -> None:
+    """In 10 s with 2 kg/s the mass falls by 20 kg.
 
-    In 10 s with 2 kg/s the mass falls by 20 kg. Coefficients of fills between 56 and 71 % are not
-    used, because the formulas have poles there.
+    The FMU receives a table over the fill with damping and third-order coefficients. Third-order
+    coefficients of fills between 56 and 71 % are not used, because the formulas have poles there.
     """
     on_axis = replace(craft.tanks["ox"], position=(0, 0, -0.3), modes=1, nu=3e-6)
     craft = replace(craft, center_of_mass=(0, 0, 1.05), gravity=0.25, tanks={"ox": on_axis})
@@ -194,29 +196,29 @@ def test_draining_tanks_lose_the_mass_that_flows(craft: Craft) -> None:
     assert lost == pytest.approx(20, rel=1e-9)
     now = craft.mass_properties((craft.tank_at("50%")["ox"].mass - 20, "kg"))
     assert run["center_of_mass[3]"].iloc[-1] == pytest.approx(now.center_of_mass[2], abs=2e-4)
-    # a loop around it
+    # a loop around the draining craft
     gains = np.hstack([20 * np.eye(3), 300 * np.eye(3)])
     loop = craft.loop(gains, 0.5, "50%", mass_flow={"ox": 2.0}, between=("20%", "70%"))
     end = loop.simulate(10, outputs="mass")["mass"].iloc[-1]
     assert end == pytest.approx(run["mass"].iloc[-1], rel=1e-9)
 
 
-def test_detached_liquid_travels_as_in_closed_forms(craft: Craft) -> None:
-    """In a sphere it travels twice the distance between the centres of sphere and liquid.
+def test_the_travel_of_detached_liquid_equals_closed_forms(craft: Craft) -> None:
+    """In a sphere the travel is twice the distance between the centres of sphere and liquid.
 
-    In a cylinder it travels the height of the gas.
+    In a cylinder the travel is the height of the gas.
     """
     ways = craft.travel({"ox": "50%", "fuel": "25%"})
     assert ways["ox"] == pytest.approx(2 * 3 / 8 * 0.5, rel=1e-8)
     assert ways["fuel"] == pytest.approx(0.75 * 1.1, rel=1e-8)
     values = craft.parameters({"ox": "50%", "fuel": "25%"}, detach=True)
     assert values["tank[2].ball.travel"] == ways["fuel"]
-    # the FMU lets liquid detach from pendulums only
+    # the FMU accepts the parameters of detached liquid
     hubslosh.simulate(craft.model, values, stop=1, outputs=["mass"])
     assert craft.travel("100%")["ox"] == pytest.approx(0, abs=1e-12)
 
 
-def test_the_viewer_draws_a_loop_with_the_craft_s_columns(
+def test_the_viewer_draws_a_loop_that_records_the_columns_of_the_craft(
     craft: Craft, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     """The viewer draws the tanks by their own contours."""
@@ -250,8 +252,8 @@ def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
     assert len(str(craft).splitlines()) <= 10
 
 
-def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
-    """A call with many fills uses all cores and gives the bits of a call for each fill.
+def test_many_fills_at_once_give_the_same_bits_as_single_fills(craft: Craft) -> None:
+    """A call with many fills uses all cores.
 
     This also holds after the craft was copied to another process.
     """
@@ -266,7 +268,7 @@ def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
     again = pickle.loads(pickle.dumps(one))
     assert again.all == one.all and again.picture == one.picture
     assert again.parameters() == one.parameters()
-    # the mass without solving for modes is that with them
+    # the mass is the same whether modes are computed or not
     for tank in (SPHERE, CYLINDER, {"density": 1.0, "box": [0.5, 0.8]}):
         for height in (0.1, 0.55, 1.0):
             mass = read_drawing(tank).mass(height)
@@ -275,7 +277,7 @@ def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
 
 def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
     """An interrupt ends a calculation of several minutes within a second."""
-    # a process in the background of a shell ignores the signal
+    # restore the default handler, because background processes of a shell ignore the signal
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))
     case = TankCase(SPHERE, "50%", 3, 1.0, 1e-6, None, None)
@@ -288,7 +290,7 @@ def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
 
 
 def test_the_liquid_of_a_spinning_tank_starts_with_the_spin_of_the_tank(craft: Craft) -> None:
-    """The start is the tank's rate times the inertia of the turning liquid."""
+    """Its angular momentum is the rate of the tank times the inertia of the turning liquid."""
     tank = MountedTank(CYLINDER, (0.0, 0.0, -0.5), modes=1, nu=1e-6, spin=0.4)
     spinner = replace(craft, tanks={"fuel": tank}, wheels={})
     values = spinner.parameters(0.4)

@@ -1,4 +1,4 @@
-"""Engines at a place: the operating point of their resultant, and pulses against the impulse."""
+"""Engines: operating points with their resultant force, and momentum from pulses."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,10 +22,10 @@ def craft(fmu: Path) -> Craft:
                  model=fmu.with_name("Spacecraft.fmu"))  # fmt: skip
 
 
-def test_an_engine_along_the_line_of_action_is_the_thrust(craft: Craft) -> None:
-    """Engines with the resultant of the field `thrust` give the same parameters and margins.
+def test_engines_with_the_same_resultant_as_thrust_give_the_same_craft(craft: Craft) -> None:
+    """Parameters and margins are equal.
 
-    The engine acts at O, or elsewhere on the thrust's line, or is split into two.
+    The engine is at O, elsewhere on the line of action of ``thrust``, or split into two engines.
     """
     plain = hubslosh.margins(craft.loop(GAINS, 0.05, "50%")).crossings
     for engines in (
@@ -43,7 +43,7 @@ def test_an_engine_along_the_line_of_action_is_the_thrust(craft: Craft) -> None:
         assert found["phase_margin"].to_numpy() == pytest.approx(
             plain["phase_margin"].to_numpy(), rel=1e-9, nan_ok=True
         )
-    # off the axis through O it is the same craft with all else moved the other way
+    # an engine off the axis equals an engine at O with all other parts moved the opposite way
     off_axis = replace(craft, thrust=0.0, engines={"main": Engine((0.2, -0.1, 0), (0, 0, 1), 400)})
     moved = replace(
         craft, center_of_mass=(-0.1, 0.12, 1.0),
@@ -71,8 +71,8 @@ def test_canted_engines_leave_a_torque_about_their_line_of_action(craft: Craft) 
     assert point.parameters["force[3]"] == pytest.approx(400 * np.cos(cant), rel=1e-12)
 
 
-def test_pulses_give_their_impulse_whatever_the_cycle(craft: Craft) -> None:
-    """A rigid craft gains the angular and linear momentum of the pulses, whatever the cycle is.
+def test_pulses_of_any_length_give_the_craft_their_impulse(craft: Craft) -> None:
+    """A rigid craft gains the linear and angular momentum of the pulses.
 
     Angular momentum about the centre of mass is compared with the integral of r × F.
     """
@@ -87,21 +87,21 @@ def test_pulses_give_their_impulse_whatever_the_cycle(craft: Craft) -> None:
     burnt = {"a": 0.012 + 0.005, "b": 0.0533 - 0.0171}
     total = sum(t * engines[n].wrench(np.array(free.center_of_mass)) for n, t in burnt.items())
     omega = run[[f"omega[{i}]" for i in (1, 2, 3)]].iloc[-1].to_numpy()
-    # products of small rates count in the eighth digit
+    # gyroscopic terms are products of small rates, and are far below the tolerance
     assert omega == pytest.approx(np.linalg.solve(INERTIA, total[3:]), rel=1e-3)
     both = table[["time", "force[1]", "force[3]"]].to_numpy()
     along = 22 / np.sqrt(1.09)
     wanted = [[0, 0, 0], [0.015, 0, along], [0.0171, 10, along], [0.02, 10, 0], [0.05, 10, along],
               [0.0533, 0, along], [0.062, 0, 0], [0.5, 0, 0]]  # fmt: skip
     assert both == pytest.approx(np.array(wanted), abs=1e-12)
-    # a main engine that is named burns in its pulses only
+    # a main engine that is named in `firing` burns only in its pulses
     main = replace(free, engines={"main": Engine((0.3, 0, 0), (0, 0, 1), 400)})
     off = main.pulses(0, {"main": [(0, 0.25)]}, stop=0.5)
     assert off["force[3]"].tolist() == [400.0, 0.0, 0.0]
     assert off[[f"torque[{i}]" for i in (1, 2, 3)]].abs().to_numpy().max() < 1e-10
 
 
-def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
+def test_errors_name_each_wrong_engine_and_pulse(craft: Craft) -> None:
     """One message lists every wrong engine and pulse, with the allowed values."""
     with pytest.raises(FmuError, match=r"engine a: direction must not be zero; engine a: thrust"):
         replace(craft, engines={"a": Engine((0, 0, 0), (0, 0, 0), -1)})
@@ -124,7 +124,7 @@ def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
 
 
 def test_a_printed_craft_lists_thrusters_apart_from_the_engines_that_burn(craft: Craft) -> None:
-    """The thrust is by the main engine only; thrusters have a line of their own."""
+    """The line of the thrust names only the main engine; thrusters are listed in another line."""
     main, side = Engine((0, 0, -1.5), (0, 0, 1), 400), Engine((1, 0, 0), (0, 1, 0), 22, burns=False)
     craft = replace(craft, thrust=0.0, engines={"main": main, "up": side, "down": side})
     lines = str(craft).splitlines()

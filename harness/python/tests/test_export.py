@@ -1,4 +1,4 @@
-"""A craft as files for other tools: each is read by a tool that reads such files."""
+"""Exported files of a craft: each is read by another tool that reads such files."""
 
 import subprocess
 import zipfile
@@ -17,7 +17,7 @@ SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 FILL = {"ox": "40%", "fuel": "70%"}
 TURNING = {"init.omega[1]": 0.02, "init.omega[2]": -0.01, "ox.zeta[1]": 0.01}
 
-# Wheels about the body axes with a momentum of 1, 2 and 3 N·m·s.
+# Wheels about the body axes with angular momenta of 1, 2 and 3 N·m·s.
 WHEELS = {
     name: Wheel(axis, 0.01, 0.2, 400, speed)
     for name, axis, speed in zip("xyz", np.eye(3), (100.0, 200.0, 300.0), strict=True)
@@ -37,7 +37,7 @@ def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
     )  # fmt: skip
 
 
-def test_the_fmu_starts_as_the_craft_in_a_tool_that_sets_nothing(
+def test_an_exported_fmu_simulates_the_craft_in_a_tool_that_sets_no_parameters(
     craft: Craft, tmp_path: Path
 ) -> None:
     """FMPy, which sets no parameter, gives the results of `Craft.simulate`, bit by bit.
@@ -63,7 +63,7 @@ def test_the_fmu_starts_as_the_craft_in_a_tool_that_sets_nothing(
         assert again[kind].read_bytes() == files[kind].read_bytes(), kind
 
 
-def test_the_system_has_the_craft_and_its_parameters(craft: Craft, tmp_path: Path) -> None:
+def test_an_exported_system_has_the_craft_and_its_parameters(craft: Craft, tmp_path: Path) -> None:
     """The SSP file is valid by FMPy's copy of the schemas of SSP 1.0; its .ssv has every value."""
     files = craft.export(tmp_path, FILL, parameters=TURNING)
     system = read_ssd(str(files["ssp"])).system
@@ -116,10 +116,10 @@ def test_octave_runs_the_script_up_to_simulink(craft: Craft, tmp_path: Path) -> 
     assert real.max() < 1e-4
 
 
-def test_a_folder_that_cannot_be_made_is_named(craft: Craft, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_named(craft: Craft, tmp_path: Path) -> None:
     """A wrong parameter is also named, before any file is written."""
     (tmp_path / "file").write_text("")
-    with pytest.raises(FmuError, match="file cannot be made"):
+    with pytest.raises(FmuError, match="file cannot be created"):
         craft.export(tmp_path / "file", FILL)
     with pytest.raises(FmuError, match=r"did you mean ox\.zeta"):
         craft.export(tmp_path / "none", FILL, parameters={"ox.zet[1]": 0.1})

@@ -1,4 +1,4 @@
-"""A table over the fill, from a drawing to the motion of SloshTank between the points."""
+"""Fill tables: SloshTank with a table is compared with a tank computed at the same fill."""
 
 import subprocess
 from pathlib import Path
@@ -20,10 +20,10 @@ G = 9.81  # m/s²
 
 
 @pytest.mark.parametrize("shape", ["cylinder", pytest.param("sphere", marks=pytest.mark.long)])
-def test_between_its_points_a_fill_table_gives_the_parameters_of_the_tank(
+def test_a_fill_table_gives_the_parameters_of_the_tank_between_its_points(
     shape: str, request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:
-    """Interpolated frequency and mass are within 0.5 % of a calculation for that fill.
+    """Interpolated frequency and slosh mass are within 0.5 % of a computation at the same fill.
 
     Forces and torques, which depend on the height of the hinge, are within 2 %.
     """
@@ -49,7 +49,7 @@ def test_between_its_points_a_fill_table_gives_the_parameters_of_the_tank(
         own = hubslosh.read_parameters(parameters("--fill", f"{fill}%"))
         tables = table
         if any(BEYOND_THIRD_ORDER.search(name) for name in own):
-            # a table has the third order alone, with which these coefficients do not compare
+            # leave out coefficients beyond third order, which a table does not have
             own = {n: value for n, value in own.items() if not BEYOND_THIRD_ORDER.search(n)}
             own, tables = (
                 {n: 1.0 if ".nonlinear_" in n else value for n, value in values.items()}
@@ -60,10 +60,10 @@ def test_between_its_points_a_fill_table_gives_the_parameters_of_the_tank(
         met = swing({**tables, "tank.liquid_0": exact["mass"][0]})
         stiffness = met["der(tank.p_dot[1,1])"][0] / exact["der(tank.p_dot[1,1])"][0]
         assert np.sqrt(stiffness) == pytest.approx(1, abs=5e-3), fill
-        # m l sin: the mass, and the length by the frequency
+        # m l sin(angle) compares the mass, because the frequency determines the length
         moment = met["center_of_mass[1]"][0] / exact["center_of_mass[1]"][0] * stiffness
         assert moment == pytest.approx(1, abs=5e-3), fill
-        # m g l sin about the hinge, and the hinge's height times the force
+        # torque: m g l sin(angle) about the hinge, and the height of the hinge times the force
         mass, force = exact["mass"][0], exact["force[1]"]
         assert np.abs(met["force[1]"] - force).max() < 0.02 * np.abs(force).max(), fill
         arm = np.abs(met["torque[2]"] - exact["torque[2]"]).max()

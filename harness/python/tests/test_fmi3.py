@@ -1,4 +1,4 @@
-"""FMUs 3.0 in the package's hands: what it does with those of FMI 2.0, to the last bit."""
+"""FMUs of FMI 3.0 give the same results as FMUs of FMI 2.0, mostly bit-identical ones."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ INPUTS = {
     "SloshTank": {
         "a[1]": 0.3 * np.sin(5.0 * TIME),
         "a[3]": 9.81 + 0.0 * TIME,
-        # in a step it follows from omega_dot, and is not set there
+        # within a step the FMU integrates omega_dot, so that the host need not set omega
         "omega[2]": 0.1 * np.sin(4.0 * TIME),
         "omega_dot[2]": 0.4 * np.cos(4.0 * TIME),
     },
@@ -42,12 +42,12 @@ PARAMETERS = {
 
 
 def three(fmu: Path, model: str = "HubSlosh") -> Path:
-    """Return the FMU 3.0 of a model, in the folder of the FMU 2.0."""
+    """Return the path of the FMI 3.0 version of a model, next to its FMI 2.0 version."""
     return fmu.with_name(f"{model}-fmi3.fmu")
 
 
 @pytest.mark.parametrize("model", INPUTS)
-def test_held_inputs_give_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
+def test_held_inputs_give_results_that_are_bit_identical_to_fmi_2(fmu: Path, model: str) -> None:
     """All outputs and local variables agree in 501 rows, with parameters of every type."""
     inputs = pd.DataFrame({"time": TIME} | INPUTS[model])
     two = fmu.with_name(f"{model}.fmu")
@@ -87,7 +87,7 @@ def _sizes(table: pd.DataFrame) -> list[tuple[str, float]]:
     return [(name, np.abs(table[name]).max()) for name in table if table[name].any()]
 
 
-def test_single_steps_and_saved_states_give_the_bits_of_fmi_2(fmu: Path) -> None:
+def test_single_steps_and_saved_states_are_bit_identical_to_fmi_2(fmu: Path) -> None:
     """A second instance restores the saved state of the first one and continues bit-identically."""
     rows = []
     names = Fmu.open(fmu).names("output", "local")
@@ -104,7 +104,7 @@ def test_single_steps_and_saved_states_give_the_bits_of_fmi_2(fmu: Path) -> None
     assert rows[0] == rows[1]
 
 
-def test_a_controller_in_the_loop_gives_the_bits_of_fmi_2(fmu: Path) -> None:
+def test_a_controller_in_the_loop_is_bit_identical_to_fmi_2(fmu: Path) -> None:
     """The loop has a latency of one cycle and a delay within a cycle."""
     first, second = (
         closed_loop(
@@ -118,7 +118,7 @@ def test_a_controller_in_the_loop_gives_the_bits_of_fmi_2(fmu: Path) -> None:
 
 
 def test_errors_of_an_fmu_3_are_passed_on(fmu: Path) -> None:
-    """A value out of range, a failed step and a model that cannot start raise errors of fmi3."""
+    """A value out of range, a failed step and a failed initialisation raise errors of fmi3."""
     with pytest.raises(FmuError, match=r"fmi3.*tank\.h"):
         simulate(three(fmu), {"tank.h": -1.0}, stop=0.1)
     inputs = pd.DataFrame({"time": [0.0, 0.1, 0.2], "g_axial": [9.81, -1e9, 9.81]})
@@ -129,7 +129,7 @@ def test_errors_of_an_fmu_3_are_passed_on(fmu: Path) -> None:
 
 
 @pytest.mark.parametrize("model", INPUTS)
-def test_a_linear_model_has_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
+def test_a_linear_model_is_bit_identical_to_fmi_2(fmu: Path, model: str) -> None:
     """All matrices and names agree, for a start in motion with parameters of every type.
 
     The functions for directional derivatives have different names in FMI 2.0 and 3.0, but the FMU
@@ -154,7 +154,7 @@ def test_a_linear_model_has_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
 
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", INPUTS)
-def test_one_compiled_call_gives_the_bits_of_single_calls(
+def test_one_compiled_call_is_bit_identical_to_single_calls(
     fmu: Path, model: str, hold: bool
 ) -> None:
     """A run in one compiled call equals a run that calls each function of the FMU from Python.
@@ -172,9 +172,9 @@ def test_one_compiled_call_gives_the_bits_of_single_calls(
 @pytest.mark.parametrize(
     ("torque", "hold", "sentence"),
     [
-        # a row is NaN: refused where it is set
+        # a held input is NaN in one row: refused when it is set
         (np.where(np.arange(501) == 300, np.nan, 0.0), True, "fmi3SetFloat64 returned fmi3Discard"),
-        # the line to it has no slope that is a number: refused within the step that leads there
+        # an interpolated input is NaN in one row: refused within the step that leads to this row
         (
             np.where(np.arange(501) == 301, np.nan, 0.0),
             False,

@@ -1,4 +1,4 @@
-"""The package as a program, and its errors."""
+"""``python -m hubslosh``, error messages of the package, and parameter files."""
 
 import os
 import subprocess
@@ -37,7 +37,7 @@ def test_the_module_runs_the_commands_of_the_program(
 
 
 def test_removed_names_say_what_to_use() -> None:
-    """The error of a removed name contains what does the same."""
+    """The error of a removed name contains its replacement."""
     with pytest.raises(AttributeError, match=r"'drive'; use hubslosh\.simulate instead"):
         _ = hubslosh.drive
 
@@ -71,7 +71,7 @@ def test_a_torque_that_is_not_a_number_is_refused(fmu: Path) -> None:
 
 
 def test_a_missing_fmu_raises_an_error_with_the_command_that_builds_it(tmp_path: Path) -> None:
-    """The message contains the command that makes the FMU."""
+    """The message contains the command that builds the FMU."""
     with pytest.raises(FmuError, match="pack makes it"):
         Plant(tmp_path / "none.fmu")
 

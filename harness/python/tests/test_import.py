@@ -1,4 +1,4 @@
-"""`import hubslosh` imports nothing large, and offers what its type checkers see."""
+"""`import hubslosh` imports no large package, and has the names that type checkers see."""
 
 import ast
 import inspect
@@ -17,7 +17,7 @@ import hubslosh
 LARGE = {"numpy", "pandas", "scipy", "fmpy", "lxml", "matplotlib", "control", "pyarrow"}
 
 
-def test_importing_the_package_imports_nothing_large() -> None:
+def test_importing_the_package_imports_no_large_packages() -> None:
     """Large packages are imported on first use, which saves about 1 s of CPU time at each start."""
     code = (
         "import sys, hubslosh\n"
@@ -31,8 +31,8 @@ def test_importing_the_package_imports_nothing_large() -> None:
     )  # fmt: skip
     before, after = (set(line.split()) for line in done.stdout.splitlines())
     assert not before & LARGE
-    # simulating needs tables, and pandas imports pyarrow where it is installed; transfer functions
-    # and figures are other functions' business
+    # `simulate` needs pandas, which imports pyarrow if it is installed, but no package for transfer
+    # functions or figures
     assert after & LARGE <= {"numpy", "pandas", "pyarrow"}
 
 
@@ -40,7 +40,7 @@ STUB = Path(hubslosh.__file__).with_name("__init__.pyi")
 
 
 def test_every_name_of_the_stub_is_imported_when_it_is_used() -> None:
-    """The package has the names of ``__init__.pyi``, sorted by module, and says its version."""
+    """The package has the names of ``__init__.pyi``, which are sorted by module, and a version."""
     lines = [line for line in STUB.read_text().splitlines() if line.startswith("from .")]
     assert lines == sorted(lines, key=lambda line: line.split()[1::2])
     assert len(hubslosh.__all__) == len(lines) == len(set(lines))
@@ -50,9 +50,9 @@ def test_every_name_of_the_stub_is_imported_when_it_is_used() -> None:
 
 
 def imports(path: Path) -> set[str]:
-    """Return the modules of the package that a module imports, those of functions too.
+    """Return the modules of the package that a module imports, also within functions.
 
-    Imports for type checkers are left out: no program runs them.
+    Imports for type checkers are left out, because they are not executed.
     """
     tree = ast.parse(path.read_text())
     typing = [
@@ -69,10 +69,9 @@ def imports(path: Path) -> set[str]:
 
 
 def test_imports_between_modules_have_no_cycles() -> None:
-    """No modules import each other in a circle.
+    """The test removes modules that import no other module until none is left.
 
-    The test removes modules that import no other one until none is left; a module that stays is in
-    a circle.
+    Modules that remain import each other in a cycle.
     """
     files = Path(hubslosh.__file__).parent.glob("*.py")
     left = {file.stem: imports(file) for file in files if file.stem != "__init__"}
@@ -82,14 +81,14 @@ def test_imports_between_modules_have_no_cycles() -> None:
 
 
 def test_every_name_is_in_the_books_reference() -> None:
-    """``book/python.md`` lists each public name once; Sphinx makes its page from the docstring."""
+    """``book/python.md`` lists each public name once; Sphinx makes a page from each docstring."""
     page = Path(__file__).parents[3] / "book" / "python.md"
     listed = re.findall(r"^(?:   |\.\. autodata:: hubslosh\.\w+\.)(\w+)$", page.read_text(), re.M)
     assert sorted(listed) == sorted(hubslosh.__all__)
 
 
 def public() -> Iterator[tuple[str, Any]]:
-    """Yield name and value of each public function and class, of `attitude` and `plot` too."""
+    """Yield name and value of each public function and class, also of `attitude` and `plot`."""
     for name in hubslosh.__all__:
         item = getattr(hubslosh, name)
         for part, value in vars(item).items() if inspect.ismodule(item) else ((name, item),):
@@ -102,7 +101,7 @@ def public() -> Iterator[tuple[str, Any]]:
 
 
 def own_methods(item: type) -> Iterator[tuple[str, Any]]:
-    """Yield the public methods of a class that is written in Python, and of its properties."""
+    """Yield name and function of each public method of a class that is written in Python."""
     for name, value in vars(item).items():
         value = getattr(value, "__func__", value)
         if inspect.isfunction(value) and not name.startswith("_"):
@@ -110,19 +109,19 @@ def own_methods(item: type) -> Iterator[tuple[str, Any]]:
 
 
 def section(text: str, title: str) -> str:
-    """Return a section of a docstring of numpydoc, or nothing."""
+    """Return a section of a numpydoc docstring, or an empty string."""
     found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n---|\Z)", text, re.DOTALL | re.MULTILINE)
     return found[1] if found else ""
 
 
 def entries(text: str, title: str) -> list[str]:
-    """Return the names in a section."""
+    """Return the names of the parameters or attributes in a section."""
     named = re.findall(r"^(\S.*?)(?: : .*)?$", section(text, title), re.MULTILINE)
     return [one.lstrip("*") for names in named for one in names.split(", ")]
 
 
 def check_function(path: str, function: Any) -> None:
-    """Check that the parameters are described in their order, and the result."""
+    """Check that the docstring describes all parameters in their order, and the result."""
     text = inspect.getdoc(function) or ""
     signature = inspect.signature(function)
     parameters = [name for name in signature.parameters if name not in ("self", "cls")]
@@ -132,7 +131,7 @@ def check_function(path: str, function: Any) -> None:
 
 
 def test_functions_have_docstrings_of_numpydoc_with_examples() -> None:
-    """Each docstring lists the parameters in order, the result, and an example.
+    """Each docstring describes the parameters in order and the result, and has an example.
 
     ``test_wheel.py`` runs the examples.
     """

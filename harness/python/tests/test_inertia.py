@@ -1,4 +1,4 @@
-"""Inertia of a hub from its parts."""
+"""Inertia of a hub as the sum over its parts."""
 
 from pathlib import Path
 
@@ -17,11 +17,11 @@ TABLE = {
 
 
 def total(parts: dict) -> float:
-    """Sum of the parts' inertias."""
+    """Return the sum of the inertias of all parts."""
     return float(bottom_up(parts)["inertia"].sum())
 
 
-def test_rows_of_the_thesis_do_not_add_up_to_its_total() -> None:
+def test_the_parts_in_table_5_6_of_the_thesis_do_not_add_up_to_its_total() -> None:
     """The parts in Rubaga's table add to 0.344316 kg·m²; the thesis prints 0.343 and 0.343268."""
     found = bottom_up({name: {"inertia": inertia} for name, inertia in TABLE.items()})
     assert found.attrs["parameters"]["hub.I"] == pytest.approx(0.344316, abs=1e-12)
@@ -37,12 +37,12 @@ def test_the_inertia_of_every_shape_equals_the_sum_over_its_points() -> None:
     n, mass, at = 60, 3.0, np.array([0.2, -0.1])
     u = (np.arange(n) + 0.5) / n - 0.5
     x, y = (grid.ravel() for grid in np.meshgrid(u, u))
-    r = np.sqrt((np.arange(n) + 0.5) / n)  # of equal areas
+    r = np.sqrt((np.arange(n) + 0.5) / n)  # radii of rings with equal areas
     angle = 2 * np.pi * np.arange(12) / 12
     ring = (np.outer(r, np.cos(angle)).ravel(), np.outer(r, np.sin(angle)).ravel())
     hollow = np.sqrt(0.25 + 0.75 * (np.arange(n) + 0.5) / n)
     tube = (np.outer(hollow, np.cos(angle)).ravel(), np.outer(hollow, np.sin(angle)).ravel())
-    # a rod along x: y from its section, whose discs are seen from the side
+    # a rod along x consists of discs; only the y coordinates of their points matter
     rod = (np.tile(u, 12 * n), np.repeat(ring[1], n))
     cases = [
         ({"box": (0.3, 0.2)}, (0.3 * x, 0.2 * y)),
@@ -70,7 +70,7 @@ def test_imbalance_gives_the_gravity_torque_of_a_tilted_bench(fmu: Path) -> None
     with hubslosh.Plant(fmu, settings) as plant:
         torque, inertia = plant.get(["tau_gravity", "hub.I"])
     assert inertia == found["hub.I"]
-    # gravity across the axis points to theta = 0: F = m g tan(tilt) (1, 0) on each part
+    # gravity across the bearing axis acts along theta = 0: F = m g tan(tilt) (1, 0) on each part
     across = 9.81 * np.tan(tilt)
     expected = 0.0
     for part in parts.values():
@@ -79,7 +79,7 @@ def test_imbalance_gives_the_gravity_torque_of_a_tilted_bench(fmu: Path) -> None
     assert torque == pytest.approx(expected, rel=1e-12)
 
 
-def test_all_faults_are_reported_at_once() -> None:
+def test_all_wrong_parts_of_a_hub_are_reported_at_once() -> None:
     """One message names each wrong part and the allowed values."""
     parts = {"a": {"mass": -1.0}, "b": {"mass": 1.0, "box": 0.3}, "c": {"mass": 1, "bx": 1}}
     with pytest.raises(FmuError) as said:

@@ -1,4 +1,4 @@
-"""Linear models and frequency responses, against closed forms and each other."""
+"""Linear models and frequency responses, compared with closed forms and with each other."""
 
 from pathlib import Path
 
@@ -14,18 +14,18 @@ VISCOUS = {"friction.model": "viscous"}
 FRICTION_B = 0.03793  # N·m·s/rad, the default of friction.b
 
 
-def test_antiresonance_and_gain_follow_from_the_masses(fmu: Path) -> None:
-    """Zeros from torque to rate are the slosh mode on a fixed hub.
+def test_antiresonance_and_static_gain_equal_closed_forms(fmu: Path) -> None:
+    """The zeros from torque to rate are the slosh mode on a fixed hub.
 
-    At 0 Hz the rate is the torque over the friction coefficient. Both sides are the same numbers
-    but for rounding, hence the tolerance 1e-12.
+    At 0 Hz the rate is the torque divided by the friction coefficient. The tolerance is 1e-12,
+    because only rounding errors differ.
     """
     model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
     assert model.states == ("omega", "slosh.q_tangential[1]", "slosh.v_tangential[1]")
     with Plant(fmu, VISCOUS) as plant:
         frequency, zeta = plant.get(["slosh.frequency[1]", "slosh.damping[1]"])
     A, B, C, _ = model  # noqa: N806
-    # D = 0 and C B ≠ 0: the zeros are the poles of A (1 − B C A' / C B A) without that at 0
+    # for D = 0 and C B ≠ 0, the zeros are the eigenvalues of A − B C A/(C B), without one at 0
     zeros = np.linalg.eigvals(A - B @ C @ A / (C @ B))
     zeros = zeros[np.abs(zeros) > 1e-6]
     assert np.abs(zeros) == pytest.approx([2 * np.pi * frequency] * 2, rel=1e-12)
@@ -34,7 +34,7 @@ def test_antiresonance_and_gain_follow_from_the_masses(fmu: Path) -> None:
 
 
 def test_unused_states_do_not_appear_in_linear_models(fmu: Path) -> None:
-    """By default the model has only states that an output depends on.
+    """By default the model has only states on which an output depends.
 
     With all states the frequency response is the same.
     """
@@ -45,7 +45,7 @@ def test_unused_states_do_not_appear_in_linear_models(fmu: Path) -> None:
     assert np.allclose(few.response(frequency), every.response(frequency), rtol=1e-9, atol=1e-12)
 
 
-def test_the_exponential_equals_that_of_scipy() -> None:
+def test_the_matrix_exponential_equals_that_of_scipy() -> None:
     """Stiff, large and defective matrices agree to 1e-12 of the largest element."""
     random = np.random.default_rng(5)
     cases = [random.normal(size=(n, n)) * size for n in (1, 6, 25) for size in (1e-6, 0.3, 8.0)]
@@ -63,8 +63,8 @@ def test_linear_models_convert_to_python_control(fmu: Path) -> None:
     assert np.sort_complex(system.poles()) == pytest.approx(np.sort_complex(model.poles))
 
 
-def test_linearising_a_stuck_hub_brings_a_warning(fmu: Path) -> None:
-    """Dry friction holds the hub at rest, so that no small torque moves it."""
+def test_linearising_a_stuck_hub_raises_a_warning(fmu: Path) -> None:
+    """Dry friction holds the hub at rest, so that small torques have no effect."""
     with pytest.warns(UserWarning, match="does dry friction hold the hub"):
         model = linearize(fmu, {"friction.model": "stribeck"}, ["tau_cmd"], ["omega"])
     assert not model.B.any()
@@ -80,7 +80,7 @@ def test_wrong_names_raise_errors_with_suggestions(fmu: Path) -> None:
 
 @pytest.fixture(scope="module")
 def sweep(fmu: Path) -> pd.DataFrame:
-    """Return a sweep from 2 to 2.8 Hz in 900 s; it begins at rest."""
+    """Return a simulated sweep from 2 to 2.8 Hz in 900 s that begins at rest."""
     time = np.arange(45001) * 0.02
     rate = np.log(2.8 / 2.0) / 900
     torque = 0.05 * np.sin(2 * np.pi * 2.0 * np.expm1(rate * time) / rate)
@@ -92,10 +92,10 @@ def sweep(fmu: Path) -> pd.DataFrame:
 def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bool) -> None:
     """Antiresonance and resonance agree to one line of the spectrum, 1/900 Hz.
 
-    In between the estimate is off by what the record cuts off at its end, some thousandths, and by
-    what the smoothing takes from the resonance's top, 2 %. A held torque drives the hub at the
-    images 50 Hz ± f, 100 Hz ± f, … too, and samples show their answer at f: 0.01 of it, 0.12 at the
-    antiresonance. Lines between the rows have the square of that.
+    Between them, the estimate has an error of some thousandths, because the time history ends
+    before the motion, and of 2 % at the resonance because of smoothing. A held torque also excites
+    the images 50 Hz ± f, 100 Hz ± f, …, whose response is aliased to f: 0.01 of the response, and
+    0.12 at the antiresonance. With linear interpolation this error is the square of these numbers.
     """
     if hold:
         sweep = simulate(fmu, VISCOUS, sweep[["time", "tau_cmd"]], outputs=["omega"], hold=True)
@@ -105,7 +105,7 @@ def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bo
     if hold:
 
         def part(g: np.ndarray) -> np.ndarray:
-            """Return the response at g times the share of a held torque there."""
+            """Return the response at frequencies g times the spectrum of a held torque there."""
             share = np.sinc(g * 0.02) * np.exp(-1j * np.pi * g * 0.02)
             return model.response(g)[:, 0, 0] * share
 
@@ -137,7 +137,7 @@ def test_impossible_estimates_raise_errors(sweep, change, arguments: dict, sente
     assert sentence in str(told.value)
 
 
-def test_a_fit_of_the_exact_response_has_the_models_poles_and_zeros(fmu: Path) -> None:
+def test_a_fit_of_the_exact_response_has_the_poles_and_zeros_of_the_model(fmu: Path) -> None:
     """The tolerance is 1e-6, because the real pole, 0.09 rad/s, is far below the fitted band."""
     model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
     frequency = np.geomspace(1.25, 3.5, 400)
@@ -154,7 +154,7 @@ def test_a_fit_of_the_exact_response_has_the_models_poles_and_zeros(fmu: Path) -
 
 
 def test_a_fit_of_a_sweep_finds_antiresonance_and_resonance(fmu: Path) -> None:
-    """A sweep of 50 mN·m in 15 minutes, on a viscous bearing, resolves frequencies to 2 mHz."""
+    """With a sweep of 50 mN·m in 15 minutes on a viscous bearing, both agree to 2 mHz."""
     time = np.arange(45001) * 0.02
     rate = np.log(2.8 / 2.0) / time[-1]
     torque = 0.05 * np.sin(2 * np.pi * 2.0 * np.expm1(rate * time) / rate)
@@ -168,7 +168,7 @@ def test_a_fit_of_a_sweep_finds_antiresonance_and_resonance(fmu: Path) -> None:
     assert hertz[1] == pytest.approx(hertz[2], abs=2e-3)
 
 
-def test_a_wrong_fit_raises_errors_with_the_reason(fmu: Path) -> None:
+def test_wrong_arguments_of_fit_are_reported_in_one_error(fmu: Path) -> None:
     """One message lists all wrong arguments."""
     with pytest.raises(FmuError, match="no column real, imag; poles must be"):
         fit(pd.DataFrame({"frequency": [1.0]}), poles=1, zeros=2)

@@ -1,4 +1,4 @@
-"""Slosh modes in three dimensions against closed forms, the axisymmetric solver, another method."""
+"""Slosh modes in three dimensions, compared with closed forms and with two other methods."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -22,29 +22,30 @@ def lambdas(found: LiquidModes) -> np.ndarray:
 
 
 def error(found: LiquidModes, mode: int = 0) -> float:
-    """Return the stated relative error of λ, which is twice that of the frequency."""
+    """Return the estimated relative error of λ, which is twice the error of the frequency."""
     return 2 * float(found.error["frequency"][mode])
 
 
 def line(a: complex, b: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points, derivative and weights of a straight line of a boundary, with x + i z."""
+    """Return points x + i z, derivatives and quadrature weights of a straight boundary."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
     return a + (b - a) * (nodes + 1) / 2, np.full_like(nodes, b - a, complex), weights / 2
 
 
 def arc(radius: float, start: float, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points, derivative and weights of a circular arc about the origin, x + i z."""
+    """Return points x + i z, derivatives and quadrature weights of an arc about the origin."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
     w = radius * np.exp(1j * (start + (end - start) * (nodes + 1) / 2))
     return w, 1j * (end - start) * w, weights / 2
 
 
 def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -> np.ndarray:
-    """Return λ of a plane liquid by Ritz's method, from above and without a mesh.
+    """Return upper bounds of λ of a plane liquid by Ritz's method, which needs no mesh.
 
-    Trial functions are Re f and Im f, f = w^k, w = x + i z, k = 1..22: they solve Laplace's
-    equation, so ∫(∇φ)² = ∮ φ ∂φ/∂n ds, and by Cauchy and Riemann ∂/∂n Re f ds = d Im f on the way
-    counter-clockwise. wall: its pieces in that sense, from the surface's left end to its right.
+    Trial functions are Re f and Im f with f = w^k, w = x + i z, k = 1..22. They solve Laplace's
+    equation, so that ∫(∇φ)² = ∮ φ ∂φ/∂n ds. By the Cauchy–Riemann equations,
+    ∂/∂n Re f ds = d Im f along the boundary counter-clockwise. ``wall`` has the pieces of the wall
+    counter-clockwise, from the left end of the surface to its right end.
     """
     size = max(np.abs(w).max() for w, _, _ in wall)
 
@@ -59,7 +60,7 @@ def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -
     stiffness = sum(phi @ dn.T for phi, dn in map(trial, [*wall, top]))
     phi, _ = trial(top)
     width, weights = abs(right - left), top[2]
-    phi = phi - (phi @ weights)[:, None]  # modes have no mean
+    phi = phi - (phi @ weights)[:, None]  # the mean of a mode over the surface is 0
     mass = width * phi @ np.diag(weights) @ phi.T
     values, vectors = eigh((stiffness + stiffness.T) / 2)
     kept = values > 1e-11 * values.max()
@@ -81,20 +82,20 @@ def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -
         ({"sphere": {"radius": 0.5}}, lambda h: h * h * (3 - 2 * h)),
     ],
 )
-def test_a_fill_in_per_cent_equals_the_height_of_that_volume(
+def test_a_fill_in_per_cent_gives_the_height_with_this_volume(
     shape: dict, volume: Callable[[float], float]
 ) -> None:
-    """Heights are compared with closed forms of the volume below a height."""
+    """The volume below the computed height follows from a closed form."""
     found = liquid_modes(shape, "40%", modes=1, resolution=10)
-    # curved elements of a sixth of the diameter hold a volume to 1e-4
+    # curved elements of a sixth of the diameter represent a volume to 1e-4
     assert volume(found.surface) == pytest.approx(0.4, abs=1e-4)
 
 
 @pytest.mark.long
 def test_an_upright_cylinder_equals_its_closed_forms() -> None:
-    """Frequency, slosh mass, its height, wave and inertia agree to 1e-4.
+    """Frequency, slosh mass and its height, wave height and inertia agree to 1e-4.
 
-    This is the accuracy required; finer meshes are more accurate.
+    This accuracy is required of the default mesh; finer meshes are more accurate.
     """
     r, h, rho = 0.5, 0.6, 900.0
     found = liquid_modes({"cylinder": {"radius": r, "height": 2}}, h, density=rho, modes=2)
@@ -110,7 +111,8 @@ def test_an_upright_cylinder_equals_its_closed_forms() -> None:
         assert mode["wave"] == pytest.approx(2 * r / (XI**2 - 1), rel=3e-4)
         assert abs(mode["arm"]) < 1e-5 and mode["twist"] < 1e-7 * mass
     assert found.rest["m_0_x"] == pytest.approx(mass - m, rel=1e-4)
-    # inertia under a lid about its centre, NASA SP-106's series, and none about the axis
+    # inertia of liquid under a rigid lid: about its centre by a series of NASA SP-106, about the
+    # axis 0
     between = [1.0 + np.pi * i for i in range(40)]
     xi = np.array([brentq(lambda x: jvp(1, x), low, low + 2) for low in between])
     series = np.sum(np.tanh(xi * h / (2 * r)) / (xi**3 * (xi**2 - 1)))
@@ -122,18 +124,18 @@ def test_an_upright_cylinder_equals_its_closed_forms() -> None:
 def test_a_sphere_equals_the_axisymmetric_solver(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`tank` discretises the contour instead of the volume; the error of `tank` is 1e-9."""
+    """The axisymmetric solver is `tank`, which discretises the contour; its error is 1e-9."""
     monkeypatch.setenv("HUBSLOSH", str(option(request, "--hubslosh")))
     flat = tank({"density": 1000.0, "shape": {"sphere": {"radius": 1.0}}}, 0.8, modes=1)
     found = liquid_modes({"sphere": {"radius": 1}}, 0.8, modes=1, resolution=18)
     for name, bound in (("frequency", 1e-4), ("mass", 1e-4), ("wave", 3e-4)):
         assert found.modes[name][0] == pytest.approx(flat.modes[name][0], rel=bound), name
-    # the hinge of every mode is the centre
+    # the hinge of every mode is the centre of the sphere
     assert found.modes["hinge"][0] == pytest.approx(1.0, abs=1e-4)
 
 
 @pytest.mark.long
-def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() -> None:
+def test_a_half_full_horizontal_cylinder_has_lamb_s_mode_with_its_hinge_on_the_axis() -> None:
     """Lamb, Hydrodynamics, art. 259, gives λR = 1.3557 for the mode across the axis.
 
     Ritz's method gives two more digits.
@@ -144,7 +146,8 @@ def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() 
     [first, *_] = ritz((-1, 1), [arc(1, np.pi, 2 * np.pi)])
     assert first == pytest.approx(1.35573, abs=2e-5)
     assert 1 / across["length"] == pytest.approx(first, rel=1e-4)
-    assert across["hinge"] == pytest.approx(1.0, abs=1e-4)  # the wall's normals meet in the axis
+    # all normals of the wall meet on the axis, so that the hinge is there
+    assert across["hinge"] == pytest.approx(1.0, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -176,14 +179,14 @@ def test_upright_sectors_have_the_modes_of_bessel_s_functions(inner: float, angl
     size = {"inner_radius": inner, "radius": 1, "angle": angle, "height": 1}
     found = liquid_modes({"sector": size}, h, modes=2, resolution=12)
     assert lambdas(found) == pytest.approx(sorted(expected)[:2], rel=2e-4)
-    # across the angle the mass moves along y, off the axis: a sector that turns takes it along
+    # the slosh mass moves along y at a distance from the axis, so that rotation also excites it
     assert abs(found.modes["direction"][0]) == pytest.approx(90, abs=0.1)
     assert abs(found.modes["arm"][0]) > 0.5
 
 
 @pytest.mark.long
-def test_a_box_drags_liquid_about_its_vertical() -> None:
-    """Lamb's series for a square box about its vertical gives 0.1565 of the rigid inertia."""
+def test_the_inertia_of_liquid_in_a_box_about_the_vertical_equals_lamb_s_series() -> None:
+    """For a square box, Lamb's series gives 0.1565 of the inertia of a solid."""
     found = liquid_modes(
         {"box": {"length": 0.4, "width": 0.4, "height": 1}}, "30%", modes=2, resolution=12
     )
@@ -210,11 +213,11 @@ def test_a_box_drags_liquid_about_its_vertical() -> None:
 def test_spacecraft_has_slosh_modes_along_both_axes_and_their_moments_about_a_pivot(
     fmu: Path, shape: dict, fill: float | str
 ) -> None:
-    """The craft is on a pivot that turns only about a vertical off the liquid's centre.
+    """The craft is on a pivot that turns only about a vertical, at a distance from the liquid.
 
-    With the angle ψ, Lzz the liquid's inertia about the vertical through the pivot, arms a_n about
-    it: (J + Lzz) ψ'' + Σ m_n a_n η_n'' = 0, η_n'' + ω_n² η_n + a_n ψ'' = 0, from the potential
-    flow alone.
+    Let ψ be the angle of the pivot, Lzz the inertia of the liquid about the vertical through the
+    pivot, and a_n the arm of slosh mass n about it. Potential flow gives
+    (J + Lzz) ψ'' + Σ m_n a_n η_n'' = 0 and η_n'' + ω_n² η_n + a_n ψ'' = 0.
     """
     found = liquid_modes(shape, fill, modes=8, resolution=8)
     values = found.parameters(2)
@@ -245,9 +248,9 @@ def test_spacecraft_has_slosh_modes_along_both_axes_and_their_moments_about_a_pi
     poles = np.abs(model.poles.imag)
     for w in expected:
         assert np.abs(poles / w - 1).min() < 1e-6
-    # and every frequency is another than with the pivot held, by what the arms make of it
+    # the arms change every frequency relative to a fixed pivot
     assert np.abs(np.sort(omega) / expected - 1).max() > 0.02
-    # rigid liquid and bobs where they hang: the liquid's mass and centre
+    # rigid liquid and slosh masses at rest together have the mass and the centre of the liquid
     get = lambda name, n: float(values[f"tank[1].{name}[{n}]"])  # noqa: E731
     m = np.array([get("mass", n) for n in range(1, count + 1)] + [values["tank[1].m_0"]])
     z = [get("hinge", n) - get("length", n) for n in range(1, count + 1)]
@@ -257,8 +260,8 @@ def test_spacecraft_has_slosh_modes_along_both_axes_and_their_moments_about_a_pi
 
 @pytest.mark.long
 @pytest.mark.parametrize("degrees", [10.0, 40.0])
-def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> None:
-    """Modes that do not vary across the box equal Ritz's method on the tilted section."""
+def test_modes_of_a_tilted_box_equal_the_plane_problem_of_its_section(degrees: float) -> None:
+    """Modes that do not vary across the box are compared with Ritz's method for the section."""
     a, depth, t = 0.4, 0.5, np.radians(degrees)
     force = 9.81 * np.array([np.sin(t), 0, np.cos(t)])
     size = {"length": a, "width": 0.2, "height": 2}
@@ -288,15 +291,16 @@ def test_small_tilts_change_frequencies_by_their_square() -> None:
 
     upright, small, twice = (frequency(degrees) for degrees in (0, 4, 8))
     assert small < upright
-    # the fourth order is 5 % of the second at 8°; meshes scatter by 1e-5 of 5e-3
+    # the fourth order is 5 % of the second order at 8°; errors of the meshes are 1e-5 of 5e-3
     assert (upright - twice) / (upright - small) == pytest.approx(4, rel=0.1)
 
 
 @pytest.mark.long
-def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
-    """At h/R = 1 the frequencies agree to second order in the tilt with perturbation theory.
+def test_frequencies_of_a_tilted_cylinder_equal_perturbation_theory() -> None:
+    """At h/R = 1 the frequencies agree to second order in the tilt.
 
-    The meshes are good to 4e-4 of λ, upright and tilted alike to 1e-4; the fourth order is below.
+    The error of the meshes is 4e-4 of λ; its change between upright and tilted is 1e-4, and the
+    fourth order in the tilt is smaller.
     """
     slope = 0.15
     t = np.arctan(slope)
@@ -313,7 +317,7 @@ def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
 
 @pytest.mark.long
 def test_a_box_from_a_step_file_equals_the_box_given_by_dimensions(tmp_path: Path) -> None:
-    """A box given by its dimensions equals the same box read from a STEP file."""
+    """Frequency and slosh mass agree within the errors of the meshes."""
     import gmsh
 
     file = tmp_path / "tank.step"
@@ -327,13 +331,13 @@ def test_a_box_from_a_step_file_equals_the_box_given_by_dimensions(tmp_path: Pat
     drawn = liquid_modes({"step": file}, "50%", modes=1, resolution=6)
     size = {"length": 0.4, "width": 0.3, "height": 1}
     plain = liquid_modes({"box": size}, "50%", modes=1, resolution=6)
-    # two meshes of the same tank, each with its error
+    # the two boxes have different meshes, each with its own error
     assert drawn.modes["frequency"][0] == pytest.approx(plain.modes["frequency"][0], rel=1e-3)
 
 
 @pytest.mark.long
-def test_stated_errors_hold() -> None:
-    """The stated error, the difference of two meshes, exceeds the true error of the finer mesh."""
+def test_the_estimated_error_exceeds_the_true_error() -> None:
+    """The estimate is the difference of two meshes; the result is from the finer mesh."""
     k = np.pi / 0.4
     size = {"length": 0.4, "width": 0.3, "height": 1}
     for resolution in (6, 9):

@@ -1,4 +1,4 @@
-"""The sampled linear model and the closed loop: exact, and late by as much as they say."""
+"""The sampled linear model and the simulated closed loop: exactness and delay."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def command(time: float) -> float:
 
 
 def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
-    """Over 100 cycles with a torque two cycles late, the sampled model and the FMU agree.
+    """Over 100 cycles with a torque delayed by two cycles, the sampled model and the FMU agree.
 
     The FMU uses its linear slosh model and a tolerance of 1e-9.
     """
@@ -36,14 +36,14 @@ def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
         assert np.abs(C @ x - row).max() < 1e-9
         x = A @ x + B[:, 0] * command(k * PERIOD)
     assert not D.any() and np.abs(run["omega"]).max() > 0.01
-    # the same as from the powers of A, at a frequency; and control's, if it reads the period
+    # the frequency response equals the response of python-control, which must read the period
     f = np.array([0.5, 2.4])
     z = np.exp(2j * np.pi * f * PERIOD)
     assert np.allclose(model.to_control()(z)[1, 0], model.response(f)[:, 1, 0], rtol=1e-9)
 
 
-def test_a_loop_equals_a_drive_with_a_held_torque(fmu: Path) -> None:
-    """A run with the controller's torques as input is bit-identical to the loop, for each model."""
+def test_a_loop_equals_a_simulation_with_the_recorded_torques(fmu: Path) -> None:
+    """A run with the recorded, held torques as input is bit-identical, for each slosh model."""
     parameters = {"slosh.model": "spherical", "init.slosh_angle": (5, "deg")}
     seen = []
 
@@ -68,8 +68,8 @@ def test_a_loop_equals_a_drive_with_a_held_torque(fmu: Path) -> None:
     assert np.array_equal(run["tau_cmd"][1:-1], commands[:-2])
 
 
-def test_substeps_add_rows_and_inputs_run_along_their_lines(fmu: Path) -> None:
-    """Between cycles a ramp of g_axial and an external torque are linear; results agree to 1e-7."""
+def test_substeps_add_rows_and_other_inputs_are_interpolated_linearly(fmu: Path) -> None:
+    """The inputs are a ramp of g_axial and an external torque; results agree to 1e-7."""
     inputs = pd.DataFrame(
         {"time": [0, 1.0, 3, 5], "tau_ext": [0, 0.02, -0.02, 0], "g_axial": [9.81, 9.81, 5, 5]}
     )
@@ -90,7 +90,7 @@ def test_substeps_add_rows_and_inputs_run_along_their_lines(fmu: Path) -> None:
     assert coarse["omega"].abs().max() > 1e-3
 
 
-def test_all_faults_of_a_loop_are_reported_at_once(fmu: Path) -> None:
+def test_all_errors_in_the_arguments_of_a_loop_are_reported_at_once(fmu: Path) -> None:
     """One message lists wrong names, signs and values."""
     inputs = pd.DataFrame({"time": [0.0, 1.0], "tau_cmd": [0.0, 0.0]})
     with pytest.raises(FmuError) as error:
@@ -116,8 +116,8 @@ def test_all_faults_of_a_loop_are_reported_at_once(fmu: Path) -> None:
         model.sampled(0.1).sampled(0.1)
 
 
-def test_a_vector_s_name_is_all_its_components(fmu: Path) -> None:
-    """In loops, linear models and records, a vector's name stands for all its components."""
+def test_the_name_of_a_vector_stands_for_all_its_components(fmu: Path) -> None:
+    """This holds in loops, linear models and recorded outputs."""
     craft = fmu.with_name("Spacecraft.fmu")
     start = {"force[3]": 100.0, "init.omega[1]": 0.01}
     whole = Loop(np.eye(3), 0.1, craft, start, "omega", "torque")
@@ -138,8 +138,8 @@ def test_a_vector_s_name_is_all_its_components(fmu: Path) -> None:
 def test_a_command_is_added_to_the_constant_of_its_input(fmu: Path, *, is_linear: bool) -> None:
     """A run with the recorded inputs as histories is bit-identical, also before the first command.
 
-    The engine is gimballed: force[1], force[2] and torque[3] are commands, and the parameters have
-    a thrust along x and z, and a torque about z.
+    The case is a gimballed engine: force[1], force[2] and torque[3] are commands, and the
+    parameters contain a thrust along x and z and a torque about z.
     """
     craft = fmu.with_name("Spacecraft.fmu")
     start = {"force[1]": 12.0, "force[3]": 400.0, "torque[3]": 5.0, "init.omega[2]": 0.01}

@@ -1,4 +1,4 @@
-"""Crossings and margins of loops for which they are known, to 1e-6."""
+"""Crossings and margins of loops, compared with known values to 1e-6."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from hubslosh import Craft, FmuError, LinearModel, Loop, margins
 from hubslosh.stability import _broken_at, _closed, minimal
 
 EXACT = 1e-6
-"""The tolerance that is promised; what is found is better by orders of magnitude."""
+"""Tolerance of the tests; the actual errors are smaller by orders of magnitude."""
 
 S = control.tf("s")
 TURN = 2 * np.pi
@@ -46,7 +46,7 @@ def test_margins_of_an_integrator_with_two_lags_equal_the_closed_form() -> None:
     w = np.sqrt(square[square.real > 0].real[0])
     assert crossings(found, "gain") == pytest.approx([w], rel=EXACT)
     assert found.stable
-    # the delay that takes the phase margin
+    # the delay margin is the delay that uses up the phase margin
     assert found.delay_margin == pytest.approx(np.radians(found.phase_margin) / w, rel=EXACT)
 
 
@@ -55,9 +55,9 @@ def test_crossings_at_a_narrow_slosh_dipole_are_found(half: float) -> None:
     """All three gain crossings next to a narrow pair of pole and zero are found.
 
     k, a and b are chosen so that the loop gain k (s² + a²)/(s (s² + b²)) has the magnitude 1 at
-    2.5 - half, 2.5 and 2.5 + half rad/s. The narrower dipole is 1e-8 rad/s wide: no frequency grid
-    would show it. The three frequencies are roots of w³ - k w² - b² w + k a² = 0, the middle one
-    with the other sign.
+    2.5 - half, 2.5 and 2.5 + half rad/s. The narrower dipole is 1e-8 rad/s wide, so that no
+    frequency grid would show it. The frequencies are roots of w³ - k w² - b² w + k a² = 0, where
+    the middle frequency is minus a root.
     """
     r1, r2, r3 = 2.5 - half, 2.5 + half, 2.5
     k, b2 = r1 + r2 - r3, r3 * (r1 + r2) - r1 * r2
@@ -99,10 +99,10 @@ def test_a_conditionally_stable_loop_has_a_gain_margin_downwards() -> None:
 
 
 def test_each_of_two_loops_is_broken_with_the_other_closed() -> None:
-    """Of two integrators the first drives the second: L = [[a/s, 0], [c/s, b/s]].
+    """The first case is triangular, L = [[a/s, 0], [c/s, b/s]]: crossings are those of a/s and b/s.
 
-    Triangular: the loops have the crossings of a/s and b/s. With a full matrix the first, the
-    second closed, is a/s - d/s · c/s / (1 + b/s) = (a s + a b - c d)/(s (s + b)).
+    In the second case, d/s replaces 0, so that the first loop gain with the second loop closed is
+    a/s - d/s · c/s / (1 + b/s) = (a s + a b - c d)/(s (s + b)).
     """
     a, b, c, d = 2.0, 5.0, 3.0, 1.5
     none = np.zeros((2, 2))
@@ -127,8 +127,8 @@ def test_the_modulus_margin_is_the_least_distance_to_minus_one() -> None:
     assert margins(1 / (S * (S + 1))).modulus_margin == pytest.approx(least, rel=1e-8)
 
 
-def test_a_loop_gain_without_states_is_a_number() -> None:
-    """The gain 0.5 never has magnitude 1; its distance to -1 is 1.5."""
+def test_a_loop_gain_without_states_has_no_crossings() -> None:
+    """The constant gain 0.5 never has magnitude 1; its distance to -1 is 1.5."""
     none = np.zeros((0, 0))
     half = LinearModel(
         none, np.zeros((0, 1)), np.zeros((1, 0)), np.full((1, 1), 0.5), (), ("u",), ("y",)
@@ -138,11 +138,11 @@ def test_a_loop_gain_without_states_is_a_number() -> None:
     assert found.modulus_margin == 1.5
 
 
-def test_a_loop_without_crossings_says_so() -> None:
-    """1/(2 (s + 1)) has magnitude below 1 everywhere.
+def test_printed_margins_of_a_loop_without_crossings_say_so() -> None:
+    """The magnitude of 1/(2 (s + 1)) is below 1 at all frequencies.
 
-    Its distance to -1 tends to the least value, 1, at infinite frequency. A gain of 0 is the second
-    case.
+    Its distance to -1 has the limit 1, its smallest value, at infinite frequency. The second case
+    is a gain of 0.
     """
     for gain in (0.5, 0.0):
         found = margins(control.tf([gain], [1, 1]))
@@ -152,7 +152,7 @@ def test_a_loop_without_crossings_says_so() -> None:
 
 
 def test_loops_that_cannot_be_closed_are_refused() -> None:
-    """A feedthrough of -1 makes the loop singular; a gain that is not square has no loop."""
+    """A feedthrough of -1 makes I + D singular; a loop gain that is not square cannot be closed."""
     one, none = np.eye(1), np.zeros((1, 1))
     with pytest.raises(FmuError, match="I \\+ D is singular"):
         margins(LinearModel(-one, one, one, -one, ("x",), ("u",), ("y",)))
@@ -165,11 +165,11 @@ def test_loops_that_cannot_be_closed_are_refused() -> None:
 
 
 def by_pencils(gain: LinearModel) -> list[tuple[str, float]]:
-    """Return kind and frequency (rad/s) of the crossings of one loop, in another way.
+    """Return kind and frequency (rad/s) of the crossings of one loop, by generalised eigenvalues.
 
-    They are generalised eigenvalues, the roots of 1 - L(s) L(-s) and of L(s) - L(-s), with 1/z for
-    -s in discrete time. Rounding moves them, so that they only part the frequencies, with a grid
-    closer about the poles: between neighbours a sign changes once.
+    Crossings are the roots of 1 - L(s) L(-s) and of L(s) - L(-s), with 1/z in place of -s in
+    discrete time. Because rounding errors move these roots, they and a grid that is finer near the
+    poles only separate the crossings; each crossing is found by its change of sign.
     """
     A, B, C, D = gain
     n, T = len(A), gain.period
@@ -254,7 +254,7 @@ def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
     found = margins(gain)
     table = found.crossings
     table = table[(table["frequency"] > 1e-3 / TURN) & (table["frequency"] < 300 / TURN)]
-    if gain.period:  # there it is real in any case
+    if gain.period:  # at half the sampling rate the loop gain is always real
         table = table[table["frequency"] < (1 - 1e-7) / 2 / gain.period]
     for i, name in enumerate(names):
         mine = table[table["loop"] == name]
@@ -263,7 +263,7 @@ def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
         assert mine["frequency"].to_numpy() * TURN == pytest.approx(
             [w for _, w in expected], rel=1e-9
         )
-    # the least distance is at most that on any grid
+    # the modulus margin is at most the smallest distance on any grid
     w = np.geomspace(1e-3, 3 if gain.period is None else 31, 4000)
     for i in range(count):
         distance = np.abs(1 + _broken_at(gain, i).response(w / TURN)[:, 0, 0])
@@ -271,9 +271,10 @@ def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
 
 
 def test_the_delay_margin_puts_a_pole_on_the_unit_circle(fmu: Path) -> None:
-    """The loop is stable at each quarter cycle below the margin and unstable just above.
+    """A craft with two tanks and control about three axes is the case.
 
-    The case has three axes and two tanks.
+    It is stable with each delay of a multiple of a quarter cycle below the margin, and unstable
+    just above the margin.
     """
     craft = {"tanks": 2, "force[3]": 400.0, "tank[2].position[2]": 0.7, "craft.Jxy": 30.0}
     model = fmu.with_name("Spacecraft.fmu")
@@ -298,16 +299,17 @@ def test_the_delay_margin_puts_a_pole_on_the_unit_circle(fmu: Path) -> None:
 
 
 def test_a_loop_gain_that_is_only_rounding_has_no_crossing(fmu: Path) -> None:
-    """A filter by Tustin's rule is 0 at half the sampling rate, except for rounding."""
+    """A filter by Tustin's rule is 0 at half the sampling rate, except for rounding errors."""
     lag = control.ss(1 / (S / 3 + 1) ** 2)
     found = margins(Loop(5 * lag, 0.1, fmu, {"friction.model": "viscous"}, "theta"))
     assert found.crossings["gain_margin"].dropna().abs().max() < 200
 
 
 def test_a_pole_that_the_controller_does_not_move_is_neutral(fmu: Path) -> None:
-    """A rate controller leaves the attitude; a controller without gain about z leaves two poles.
+    """A rate controller has no effect on the attitude, which has one neutral pole for each axis.
 
-    The second case is a chain of two integrators, whose poles rounding moves by the root of ε.
+    A controller without gain about z leaves two neutral poles. They belong to a chain of two
+    integrators, whose poles rounding errors move by the root of ε.
     """
     model = fmu.with_name("Spacecraft.fmu")
     craft = Craft(900, (400, 380, 300), model=model)
@@ -325,14 +327,14 @@ def test_a_pole_that_the_controller_does_not_move_is_neutral(fmu: Path) -> None:
         assert ("neutral" in str(found)) == (count > 0)
         wrong = margins(craft.loop(-gains, 0.1, {}, delay=0.15))
         assert not wrong.stable and len(wrong.neutral) == count
-    # poles that the feedback moves to the limit of stability, and slow growth
+    # poles that feedback moves to the limit of stability, or that grow slowly, are not neutral
     assert not margins(1 / S**2).stable and not len(margins(1 / S**2).neutral)
     slow = margins(-1e-9 / S)
     assert not slow.stable and not len(slow.neutral)
 
 
 def test_undamped_oscillations_without_feedback_are_neutral() -> None:
-    """An undamped mode that the input does not move, and a decaying pole."""
+    """The system has an undamped mode that the input does not excite, and a decaying pole."""
     A = np.zeros((3, 3))
     A[:2, :2] = [[0.0, 2.0], [-2.0, 0.0]]
     B, C, D = np.array([[0.0], [0.0], [1.0]]), np.array([[1.0, 0.0, 3.0]]), np.zeros((1, 1))

@@ -1,4 +1,4 @@
-"""The force's error against the number of modes."""
+"""Error of the slosh force over the number of slosh modes."""
 
 from pathlib import Path
 
@@ -20,16 +20,16 @@ def test_the_impulse_response_equals_that_of_the_matrix_exponential() -> None:
     forces = modes.impulse(MASSES, OMEGAS, ZETAS, time)
     for force, m, w, z in zip(forces, MASSES, OMEGAS, ZETAS, strict=True):
         a = np.array([[0, 1], [-(w**2), -2 * z * w]])
-        # of x = l alpha: x'' = -2 zeta w x' - w^2 x - u
+        # the equation of x = l alpha is x'' = -2 zeta w x' - w^2 x - u
         exact = [
             (m * np.array([w**2, 2 * z * w]) @ scipy.linalg.expm(a * t) @ [0, -1]) for t in time
         ]
-        # rounding of exponentials of 30
+        # the tolerance allows rounding errors of exponentials with arguments up to 30
         np.testing.assert_allclose(force, exact, atol=1e-11 * m * w)
 
 
-def test_the_response_equals_that_of_the_fmu(fmu: Path) -> None:
-    """Force over the tank's acceleration equals the linearised FMU's with three modes."""
+def test_mode_responses_equal_the_linearised_fmu(fmu: Path) -> None:
+    """The response is from the acceleration of the tank to the force, with three modes."""
     settings = {"slosh.modes": 3, "friction.model": "none", "init.slosh_angle": 0.0}
     model = hubslosh.linearize(fmu, settings, "tau_cmd", ["F_tangential", "omega_dot"])
     with hubslosh.Plant(fmu, settings) as plant:
@@ -44,7 +44,7 @@ def test_the_response_equals_that_of_the_fmu(fmu: Path) -> None:
     np.testing.assert_allclose(force / (arm * acceleration), mine, rtol=1e-9)
 
 
-def test_four_modes_err_by_one_per_cent_and_one_mode_suffices_in_the_band(
+def test_four_modes_have_an_error_of_one_per_cent_and_one_mode_suffices_in_the_band(
     fmu: Path,
 ) -> None:
     """As in figure 4.4 of the thesis, four undamped modes deviate by less than 1 %.
@@ -54,13 +54,13 @@ def test_four_modes_err_by_one_per_cent_and_one_mode_suffices_in_the_band(
     undamped = {"slosh.zeta_from_correlation": False, "slosh.zeta": 0.0}
     assert hubslosh.mode_errors(undamped, 3.5, fmu)["impulse"][4] < 0.01
     errors = hubslosh.mode_errors({"tank.h": 0.1}, 3.5, fmu)
-    # the dampers' force at once, 2 zeta w m, adds to the springs'
+    # at the impulse, the forces of the dampers, 2 zeta w m, add to the forces of the springs
     assert 0.01 < errors["impulse"][4] < 0.0105
-    # errors fall with every mode and end at nothing
+    # errors decrease with every mode and end at 0
     assert (errors.diff().iloc[1:] < 0).all().all()
     assert (errors.iloc[-1] == 0).all()
     assert errors.attrs["needed"]["band"][0.05] == 1
-    # mode 2, the largest that is missing, after an impulse: m w against that of mode 1
+    # the force of a mode after an impulse is proportional to m w; mode 2 is the largest left out
     ratio = 0.0302 * 4.0318 / 2.3436
     assert ratio < errors["impulse"][1] < 2 * ratio
     with pytest.raises(hubslosh.FmuError, match="the liquid cannot slosh"):

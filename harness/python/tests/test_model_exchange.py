@@ -1,4 +1,4 @@
-"""fmpy integrates the FMU's equations itself: what comes out is what Co-Simulation gives."""
+"""Model Exchange, in which fmpy integrates the FMU's equations, agrees with Co-Simulation."""
 
 from pathlib import Path
 
@@ -19,19 +19,19 @@ SIGNALS = {
     "heat": 1e-6,
     "work": 1e-6,
 }
-"""Compared variables and their tolerances, SI.
+"""Compared variables and their tolerances, SI units.
 
-fmpy gives CVODE a tolerance of 1e-9 times the present value and 1e-9 times the nominal one
-(1e-11 to 1e-12 for the liquid) for each of the 1,000 to 10,000 steps of 20 s, and most errors of
-an oscillation that is hardly damped stay: a few hundred times as much comes together. On the
-bench's own motions that is below 1e-6 everywhere. A liquid that swings with 5 rad/s is given
-5e-9 rad/s at each step, and its rate is off by up to 7e-6.
+fmpy sets the tolerance of CVODE to 1e-9 of the present value plus 1e-9 of the nominal value
+(1e-11 to 1e-12 for the liquid) in each of the 1,000 to 10,000 steps of 20 s. Because the
+oscillations are hardly damped, most errors remain, and add up to a few hundred times the tolerance.
+In typical motions of the bench this is below 1e-6 for all variables. A liquid that swings with
+5 rad/s has a tolerance of 5e-9 rad/s in each step, and an error of its rate of up to 7e-6 rad/s.
 """
 MODELS = {"frozen": 1, "linear": 2, "planar": 3, "spherical": 4, "liquid": 5}
 
 
 def quickly(chosen: str) -> list:
-    """Return all models; the tests of all but one are long."""
+    """Return all slosh models; tests with any model but ``chosen`` are long tests."""
     long = pytest.mark.long
     return [name if name == chosen else pytest.param(name, marks=long) for name in MODELS]
 
@@ -43,12 +43,12 @@ def tau() -> np.ndarray:
 
 
 def bench_tau() -> np.ndarray:
-    """Return a sine in steps of 20 ms, 2 Hz, 0.1 N·m; the hub sticks four times a second."""
+    """Return a sine of 2 Hz and 0.1 N·m in steps of 20 ms; the hub sticks four times a second."""
     return 0.1 * np.sin(2 * np.pi * 2.0 * TIME)
 
 
 def steps_for_fmpy(torque: np.ndarray, held: int) -> np.ndarray:
-    """Return the torque as fmpy takes jumps: two rows at the same time. They are events."""
+    """Return the torque with each jump as two rows at one time, which fmpy treats as events."""
     rows = [(0.0, torque[0])]
     for k in range(held, len(TIME), held):
         rows += [(TIME[k], torque[k - 1]), (TIME[k], torque[k])]
@@ -88,7 +88,7 @@ def model_exchange(
         output=[*SIGNALS, "event_count"],
         **arguments,
     )
-    # Rows at events come besides; of rows at the same time the last is after the event.
+    # The result also has rows at events. The last of several rows at a time is after the event.
     here = np.searchsorted(result["time"], TIME + 1e-9) - 1
     assert np.abs(result["time"][here] - TIME).max() < 1e-9
     return {name: np.asarray(result[name])[here].astype(float) for name in result.dtype.names}
@@ -126,7 +126,7 @@ def test_cvode_finds_the_motion_of_co_simulation_through_stick_slip_and_torque_j
         assert difference(found, expected, name) <= allowed, name
 
 
-def test_the_difference_to_co_simulation_is_cvodes_error(fmu: Path) -> None:
+def test_the_difference_to_co_simulation_is_the_error_of_cvode(fmu: Path) -> None:
     """With a tolerance 100 times smaller the difference is at least 10 times smaller."""
     expected = co_simulation(fmu, start_values("spherical"), tau())
     coarse, fine = (
@@ -143,7 +143,7 @@ def test_euler_converges_to_co_simulation_with_first_order(fmu: Path) -> None:
     """A tenth of the step gives a tenth of the error, although events lie between the steps."""
     expected = co_simulation(fmu, start_values("frozen"), tau())
     coarse, fine = (
-        # fmpy's Euler makes one step of an output interval
+        # the Euler method of fmpy makes one step per output interval
         difference(
             model_exchange(
                 fmu,
@@ -158,5 +158,5 @@ def test_euler_converges_to_co_simulation_with_first_order(fmu: Path) -> None:
         )
         for step in (1e-2, 1e-3)
     )
-    # 10 but for what is of second order; how an event lies in its step changes it a little.
+    # the ratio is about 10; terms of second order and the places of events in steps change it
     assert 5 < coarse / fine < 20

@@ -1,4 +1,4 @@
-"""Draws that depend on nothing but seed and run; studies that go on; quantiles."""
+"""Monte Carlo studies: random draws, resumed studies, errors and quantiles."""
 
 import threading
 from concurrent import futures
@@ -19,7 +19,7 @@ RANGES = {
 
 
 def largest_rate(fmu: Path):
-    """Return an outcome: the largest rate of the hub in 2 s under a controller."""
+    """Return an outcome function: the largest rate of the hub in 2 s under a controller."""
 
     def outcome(values: dict) -> dict[str, float]:
         parameters = {"friction.model": "viscous", "init.slosh_angle": 0.05} | values
@@ -39,7 +39,7 @@ def test_a_draw_depends_only_on_seed_and_run() -> None:
     assert draw(RANGES, 5, 7) == table.iloc[5, 1:].to_dict()
     assert draw(RANGES | {"tank.r": (0, 1)}, 5, 7).items() > draw(RANGES, 5, 7).items()
     assert not monte_carlo(RANGES, 10, 8)["tank.h"].equals(table["tank.h"][:10])
-    # Kolmogorov and Smirnov's test of right draws fails once in a thousand seeds; this is one seed
+    # the Kolmogorov–Smirnov test of correct draws fails for one of a thousand seeds
     assert stats.kstest(table["tank.h"], stats.uniform(0.04, 0.1).cdf).pvalue > 1e-3
     assert stats.kstest(table["hub.I"], RANGES["hub.I"].cdf).pvalue > 1e-3
     assert stats.binomtest(int((table["slosh.model"] == "planar").sum()), 400).pvalue > 1e-3
@@ -48,7 +48,7 @@ def test_a_draw_depends_only_on_seed_and_run() -> None:
 def test_a_study_gives_the_results_of_single_runs_with_any_workers(
     fmu: Path, tmp_path: Path
 ) -> None:
-    """Threads, and a study that was stopped and resumed, give bit-identical results."""
+    """Studies with threads, and a study that was stopped and resumed, are bit-identical."""
     outcome = largest_rate(fmu)
     table = monte_carlo(RANGES, 12, 1, outcome)
     assert table["rate"][3] == outcome(draw(RANGES, 3, 1))["rate"]
@@ -68,9 +68,9 @@ def test_a_study_gives_the_results_of_single_runs_with_any_workers(
     with pytest.raises(StoppedError):
         monte_carlo(RANGES, 12, 1, stops, folder=tmp_path, workers=2)
     there = list((tmp_path / "runs").iterdir())
-    # Of the five calls before the one that raises, the other worker may have one under way.
+    # The other worker may not have finished one of the five calls before the call that raises.
     assert 4 <= len(there) <= 5
-    with (tmp_path / "manifest.sha256").open("a") as cut:  # as a kill leaves it
+    with (tmp_path / "manifest.sha256").open("a") as cut:  # as a killed process leaves the file
         cut.write("0123")
     called: list[dict] = []
 
@@ -91,7 +91,7 @@ def test_a_study_gives_the_results_of_single_runs_with_any_workers(
 
 @pytest.mark.long
 def test_a_study_on_dask_gives_the_results_of_single_runs(fmu: Path) -> None:
-    """The results are bit-identical."""
+    """The results of workers of a Dask cluster are bit-identical."""
     from distributed import Client
 
     outcome = largest_rate(fmu)
@@ -114,15 +114,15 @@ def test_a_programming_error_ends_a_study_after_the_finished_runs(
     monkeypatch.setattr(sampling, "wait", lambda runs, return_when: futures.wait(runs))
     with pytest.raises(ZeroDivisionError):
         monte_carlo({"a": (0, 1)}, 40, 1, outcome, folder=tmp_path, workers=4)
-    # Twice as many as workers are handed out at once.
+    # Twice as many runs as workers are in progress at once.
     stored = sorted(int(file.stem) for file in (tmp_path / "runs").iterdir())
     assert stored == [0, 1, 2, 4, 5, 6, 7]
 
 
-def test_threads_keep_the_working_directory_for_files(
+def test_a_study_with_threads_does_not_change_the_working_directory(
     fmu: Path, tmp_path: Path, monkeypatch
 ) -> None:
-    """Loading an FMU's library changes the process's working directory and must restore it."""
+    """Loading the library of an FMU changes the working directory, which must be restored."""
     monkeypatch.chdir(tmp_path)
     Path("mine.fmu").write_bytes(fmu.read_bytes())
     Path("bench.toml").write_text('"friction.model" = "viscous"\n')
@@ -168,7 +168,10 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
 
 
 def test_a_share_is_a_range_about_the_nominal_value(tmp_path: Path) -> None:
-    """Shares draw what (low, high) draws, store the same study, and need a nominal value."""
+    """A share gives the same draws and the same stored study as (low, high).
+
+    It needs a nominal value.
+    """
     ranges, nominal = {"a": "10%", "b": "± 5 %", "c": ["x", "y"]}, {"a": 2.0, "b": -4.0}
     ends = {"a": (1.8, 2.2), "b": (-4.2, -3.8), "c": ["x", "y"]}
     table = monte_carlo(ranges, 40, 3, nominal=nominal)

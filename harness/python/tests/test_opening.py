@@ -1,4 +1,4 @@
-"""Refused archives and descriptions: over budget, or with paths that lead outside."""
+"""Refused FMU archives: too large, incomplete, or with paths that lead out of the archive."""
 
 import re
 import stat
@@ -13,7 +13,7 @@ BROKEN = '<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g"/>'
 
 
 def packed(folder: Path, files: dict[str | zipfile.ZipInfo, bytes | str]) -> Path:
-    """Return an archive of these files."""
+    """Write an archive with these files, and return its path."""
     path = folder / "hostile.fmu"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -22,7 +22,7 @@ def packed(folder: Path, files: dict[str | zipfile.ZipInfo, bytes | str]) -> Pat
 
 
 def link() -> zipfile.ZipInfo:
-    """Return an entry that is a symbolic link."""
+    """Return an archive entry that is a symbolic link."""
     entry = zipfile.ZipInfo("resources/link")
     entry.external_attr = (stat.S_IFLNK | 0o777) << 16
     return entry
@@ -38,7 +38,7 @@ def link() -> zipfile.ZipInfo:
         ({"modelDescription.xml": "<a " + " b=''" * 700_001}, "attributes"),
     ],
 )
-def test_an_archive_beyond_the_budgets_is_refused(tmp_path, files, why) -> None:
+def test_an_archive_that_breaks_a_limit_of_the_host_is_refused(tmp_path, files, why) -> None:
     """Each limit of the Rust host on archives has a case here."""
     with pytest.raises(FmuError, match=re.escape(why)):
         Fmu(packed(tmp_path, files))

@@ -1,4 +1,4 @@
-"""One operating point and one set of names in every method of a craft."""
+"""All methods of a craft use the same operating point and the same names of quantities."""
 
 import pickle
 from dataclasses import replace
@@ -39,10 +39,9 @@ def numbers(found: hubslosh.Margins) -> np.ndarray:
 
 
 def test_loop_linearize_review_and_uncertain_linearise_at_one_trimmed_point(craft: Craft) -> None:
-    """With thrust 0.1 m off the centre of mass, four methods agree to 1e-9.
+    """With thrust 0.1 m off the centre of mass, the four methods agree to 1e-9.
 
-    They are `loop`, `review`, `linearize` and `uncertain`. Without trimming the delay margin
-    differs, and a warning says how fast the craft turns.
+    Without trimming the delay margin differs, and a warning states the angular acceleration.
     """
     by_loop = hubslosh.margins(loop := craft.loop(GAINS, PERIOD, "50%", delay=0.1))
     review = craft.review(GAINS, PERIOD, ["50%"], delay=0.1, damping="nominal", frequency="nominal")
@@ -53,7 +52,7 @@ def test_loop_linearize_review_and_uncertain_linearise_at_one_trimmed_point(craf
     plant = craft.linearize("50%", outputs=MEASURED).response(f)
     assert loop.plant().response(f) == pytest.approx(plant, rel=1e-12)
     model = craft.uncertain("50%", {"craft.Jxx": "5%"})
-    # an LFT has no states that only scale others: rounding
+    # the tolerance allows rounding errors, because the states of the LFT are scaled differently
     size = np.abs(plant).max()
     assert model.at([0.0]).response(f) == pytest.approx(plant, rel=1e-9, abs=1e-12 * size)
     with pytest.warns(FmuWarning, match="untrimmed, is no steady state"):
@@ -71,7 +70,7 @@ def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft:
     point = craft.trim("50%")
     at = craft.mass_properties("50%")
     assert point.shift == pytest.approx(at.center_of_mass * (1, 1, 0), abs=1e-12)
-    # liquid under a lid does not take part in the first moment of a rotation as rigid does
+    # the effective inertia is used, because liquid does not follow a rotation like a solid
     moment = np.cross(-at.center_of_mass, [0, 0, 400.0])
     rigid = craft.parameters("50%", rigid=True, trimmed=True)
     with hubslosh.Plant(craft.model, rigid | {
@@ -92,7 +91,7 @@ def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft:
     assert "rad/s² before" in str(point) and "rad/s² left" in str(point)
     run = hubslosh.simulate(craft.model, craft.parameters("50%"), stop=20, outputs=["omega"])
     assert run[["omega[1]", "omega[2]", "omega[3]"]].abs().to_numpy().max() < 1e-12
-    # what further parameters do is left, in numbers
+    # accelerations due to further parameters remain, and are printed
     pushed = craft.trim("50%", {"torque[1]": 3.0})
     assert np.linalg.norm(pushed.angular_acceleration) > 1e-3
     with pytest.warns(
@@ -101,7 +100,7 @@ def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft:
         craft.linearize("50%", parameters={"torque[1]": 3.0})
     leaning = replace(craft.tanks["NTO"], axis=(np.sin(0.1), 0, np.cos(0.1)))
     tilted = replace(craft, tanks={"NTO": leaning}).trim("50%")
-    # liquid on the axis of a tank that leans is not at rest, and turns the craft
+    # liquid on the axis of a tilted tank is not at rest, and turns the craft
     assert (
         tilted.lateral_acceleration["NTO"] > 0.02
         and np.linalg.norm(tilted.angular_acceleration) > 1e-4
@@ -163,7 +162,7 @@ WRONG = {
     "tank[1].bob[2]": "NTO.bob[2] does not exist: its tank has no such mode",
     "tank[3].mass[1]": "tank[3].mass[1] does not exist: its tank has no such mode",
 }
-"""Names that no quantity of the craft has, and what every method says."""
+"""Names that no quantity of the craft has, with the error message of every method."""
 
 
 @pytest.mark.parametrize("name", WRONG)
@@ -193,9 +192,9 @@ def test_uncertain_values_can_be_named_by_tanks(craft: Craft) -> None:
 
 
 def test_frequency_mass_and_height_of_a_mode_change_independently(craft: Craft) -> None:
-    """Frequency, slosh mass and its height can each be changed alone.
+    """A change of one of them leaves the other two, and the liquid at rest, unchanged.
 
-    The liquid at rest does not change, also with surface tension.
+    This also holds with surface tension.
     """
     nominal, of = craft.parameters("50%"), ModeQuantity(2, "frequency", 1)
     assert nominal[of.name("k")] > 0
@@ -226,7 +225,7 @@ def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
     assert [u.name for u in found.uncertain] == names
     ends = found.uncertain[0].ends[0]["tank[1].frequency[1]"]
     assert ends == pytest.approx((0.9 * ends[1], ends[1], 1.1 * ends[1]), rel=1e-12)
-    # a damping ratio that was given, or has a range, leaves the interval of its tank's correlation
+    # a damping ratio with a given value or range does not vary over the interval of its tank
     given = {"parameters": {"NTO.zeta[1]": 0.01}, "uncertain": {"MMH.zeta[2]": "5%"}}
     given["inertia"] = "nominal"
     found = craft.review(GAINS, PERIOD, ["50%"], draws=0, frequency="nominal", **given)
@@ -237,7 +236,7 @@ def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
 
 
 def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
-    """A study sends them to other processes; the copy computes the same numbers."""
+    """A study sends both to other processes; the copy computes the same numbers."""
     loop = craft.loop(GAINS, PERIOD, "50%", delay=0.1)
     review = craft.review(GAINS, PERIOD, ["50%"], damping="nominal", draws=0)
     craft.uncertain("50%", {"NTO.zeta[1]": "interval"})
@@ -248,9 +247,9 @@ def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
 
 
 def test_names_of_tanks_must_not_hide_parameters(craft: Craft) -> None:
-    """If one tank's name begins with another's, the longer name is taken.
+    """A name with which a parameter of the FMU begins is refused.
 
-    A name with which a parameter of the FMU begins is refused.
+    If the name of a tank begins with the name of another tank, the longer name counts.
     """
     tanks = {"A": craft.tanks["NTO"], "A.B": craft.tanks["MMH"]}
     both = replace(craft, tanks=tanks)
@@ -270,7 +269,7 @@ def test_the_cost_of_a_worst_case_search_is_limited(craft: Craft, largest: objec
 
 
 def test_a_quantity_that_cannot_be_given_names_the_parameter_to_leave_out(craft: Craft) -> None:
-    """A fill table comes from mass_flow; a diameter does not."""
+    """The values follow from the fill table of ``mass_flow``, or from the diameter of a tank."""
     frequency, given = ModeQuantity(1, "frequency", 1), craft.parameters("50%")
     drains = Modes(craft.model, given | {"tank[1].fill.points": 3}).problem(frequency)
     assert drains.endswith("cannot be given; leave out mass_flow, or vary the fill instead")

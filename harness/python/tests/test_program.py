@@ -37,7 +37,7 @@ def test_campaign_returns_a_table(fmu: Path, tmp_path: Path, request) -> None:
 
 
 def test_the_package_runs_commands_of_the_program(request) -> None:
-    """Output and exit code are the program's."""
+    """``python -m hubslosh`` prints the program's output and ends with the program's exit code."""
     python = [sys.executable, "-m", "hubslosh"]
     surroundings = os.environ | {
         "HUBSLOSH": str(option(request, "--hubslosh")),
@@ -57,7 +57,7 @@ def test_the_package_runs_commands_of_the_program(request) -> None:
 def test_analyse_returns_a_row_for_a_recording_and_for_the_model(
     fmu: Path, tmp_path: Path, request
 ) -> None:
-    """The recording is a logger's file with other names, milliseconds and decimal commas."""
+    """The recording is from a data logger with other names, milliseconds and decimal commas."""
     binary = option(request, "--hubslosh")
     profile = "exp-sweep:f0=1.25,f1=3.5,duration=60"
     time, growth = 0.02 * np.arange(3001), np.log(3.5 / 1.25) / 60
@@ -79,7 +79,7 @@ def test_analyse_returns_a_row_for_a_recording_and_for_the_model(
         program=binary,
     )
     assert list(found["model"]) == ["recording", "linear"]
-    # the recording is the model's run but for the sine's last digits and rounding of milliseconds
+    # recording and simulation differ only by last digits of the sine and rounding of milliseconds
     assert np.ptp(found["fit_freq_pct"]) < 1e-4
 
 
@@ -103,7 +103,7 @@ def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
 
 
 def test_errors_of_the_command_are_passed_on(fmu: Path, tmp_path: Path, request) -> None:
-    """A file that is no plan is given as a plan; the error is the command's."""
+    """A file that is no plan is given as a plan; the error is the message of the command."""
     binary = option(request, "--hubslosh")
     with pytest.raises(FmuError, match=r"(?s)hubslosh campaign: .*sewer"):
         hubslosh.campaign("sewer=1\n", tmp_path, model=fmu, program=binary)
@@ -122,15 +122,15 @@ def test_a_missing_command_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def with_binary(fmu: Path, binary: bytes, path: Path) -> Path:
-    """Write a copy of an FMU that has another binary."""
+    """Write a copy of an FMU with another binary, and return its path."""
     with zipfile.ZipFile(fmu) as packed, zipfile.ZipFile(path, "w") as new:
         for name in packed.namelist():
             new.writestr(name, binary if "binaries/" in name else packed.read(name))
     return path
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no compiler that is always there")
-def test_an_fmu_that_crashes_ends_no_python(fmu: Path, tmp_path: Path, request) -> None:
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no compiler by default")
+def test_an_fmu_that_crashes_does_not_end_python(fmu: Path, tmp_path: Path, request) -> None:
     """The FMU's library aborts while it is loaded.
 
     `identify` raises an error, and `check` reports a finding; the Python process goes on.
@@ -187,7 +187,7 @@ def test_ctrl_c_ends_an_identification_and_its_processes(
         assert sys.platform != "linux" or len(living()) == 2
         signal.raise_signal(signal.SIGINT)
 
-    # a shell starts its background jobs with SIGINT ignored, and Python keeps that
+    # restore the default handler, because background processes of a shell ignore SIGINT
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -199,8 +199,8 @@ def test_ctrl_c_ends_an_identification_and_its_processes(
     assert not living()
 
 
-def test_the_method_of_identify_is_an_argument() -> None:
-    """An unknown method raises an error that lists the known methods."""
+def test_an_unknown_method_of_identify_is_refused() -> None:
+    """The error lists the known methods; the flag --method is refused, too."""
     for flags in (["--method", "acceleration"], ["--method=friction"]):
         with pytest.raises(FmuError, match="method="):
             hubslosh.identify("data.csv", None, *flags)
@@ -219,7 +219,7 @@ def test_every_method_of_identify_returns_the_same_type(
     full = {"tank.h": 0.1}
     found = hubslosh.identify(run, method="friction", settings=full, fmu=fmu, program=program)
     inertia = found.parameters["hub.I"]
-    # how exact the method is, its own tests say (harness/identify/tests/all/friction.rs)
+    # harness/identify/tests/all/friction.rs tests the accuracy of the method
     assert abs(inertia.value / 0.322414 - 1) < 0.01 and inertia.std > 0 and found.fits
     assert found.model == "frozen" and found.all["condition"] > 1
 
@@ -231,7 +231,7 @@ def test_every_method_of_identification_is_in_the_package_and_in_the_book(
     command = [option(request, "--hubslosh"), "identify", "--help"]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     kinds = re.findall(r"^  (bench|fmu|decay|friction) ", text, re.M)
-    # fmu is for free=
+    # identify uses the method fmu if free= is given
     assert sorted([*get_args(Method), "fmu"]) == sorted(kinds), "Method in hubslosh/program.py"
     pages = (Path(__file__).parents[3] / "book").glob("*.md")
     book = "".join(page.read_text("utf-8") for page in pages)
@@ -247,7 +247,7 @@ def test_identification_gives_typed_estimates(
     """The recording is a sweep of three minutes, simulated by the FMU.
 
     The liquid is rigid, the friction is dry and the noise is white. The true inertia is within four
-    standard deviations of the estimate; one is 1/16,000 of the inertia.
+    standard deviations of the estimate; the standard deviation is 1/16,000 of the inertia.
     """
     time = np.arange(0, 180, 0.02)
     torque = 0.05 * np.sin(2 * np.pi * (0.3 * time + 0.008 * time**2))
@@ -269,7 +269,8 @@ def test_identification_gives_typed_estimates(
     viscous = found.parameters["friction.b"]
     assert viscous.unit == "N.m.s" and 0 < viscous.std < 0.05 * viscous.value
     assert abs(viscous.value - 0.03793) < 4 * viscous.std
-    # the file simulates the bench: what differs is far below one row's noise of 1e-4 rad/s
+    # a simulation with the file of results differs from the recording by far less than its noise,
+    # 1e-4 rad/s
     twin = hubslosh.simulate(fmu, tmp_path / "result.json", inputs, outputs=["omega"])
     assert np.std(twin["omega"] - clean["omega"]) < 3e-5
     (tmp_path / "other.json").write_text("[]")
@@ -321,7 +322,7 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
     spread = found.covariance
     deviations = dict(zip(spread.index, np.sqrt(np.diag(spread)), strict=True))
     for name, estimate in found.parameters.items():
-        # the search ends near the minimum, not at it
+        # widen the interval, because the optimisation ends near the minimum, not at it
         widened = np.hypot(1, found.all["decrement"])
         assert widened * deviations[name] == pytest.approx(estimate.std_noise, rel=1e-9)
     with pytest.raises(FmuError, match=r"friction\.z"):
@@ -342,7 +343,7 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
 
 
 def test_a_result_without_intervals_is_printed(fmu: Path, request: pytest.FixtureRequest) -> None:
-    """No output depends on the Stribeck speed of viscous friction: its interval is infinite."""
+    """With viscous friction no output depends on the Stribeck speed, whose interval is infinite."""
     bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
     run = hubslosh.simulate(fmu, bench, stop=4, step=0.05, outputs="omega")
     found = hubslosh.identify(
@@ -360,10 +361,10 @@ def test_a_result_without_intervals_is_printed(fmu: Path, request: pytest.Fixtur
 def test_the_posterior_has_the_intervals_that_the_fit_states(
     fmu: Path, request: pytest.FixtureRequest
 ) -> None:
-    """For a model that is nearly linear in its unknowns emcee samples a normal distribution.
+    """For a model that is nearly linear in its unknowns, the posterior is a normal distribution.
 
-    Means, deviations and ends of the intervals agree within the accuracy of 190 independent
-    samples.
+    Means, standard deviations and ends of the intervals agree within the accuracy of 190
+    independent samples.
     """
     tables, binary = spun_down(), option(request, "--hubslosh")
     found = hubslosh.identify(tables, fmu=fmu, **SPUN_DOWN, program=binary)
@@ -371,8 +372,9 @@ def test_the_posterior_has_the_intervals_that_the_fit_states(
         found, tables, fmu=fmu, **SPUN_DOWN, walkers=64, steps=40, burn=10, program=binary
     )
     assert len(samples) == 64 * 30
-    # 1920 samples over a correlation time of some ten steps are 190 independent ones: their mean is
-    # known to 0.07 σ, their deviation to 5 %, an end of the interval to some 0.2 σ; four of each
+    # 1920 samples with a correlation time of some ten steps count as 190 independent samples, whose
+    # mean is known to 0.07 σ, standard deviation to 5 %, and ends of the interval to some 0.2 σ.
+    # Four times these errors are allowed.
     for name, estimate in found.parameters.items():
         sample = samples[name]
         assert abs(sample.mean() - estimate.value) < 0.3 * estimate.std, name

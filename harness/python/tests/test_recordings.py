@@ -1,4 +1,4 @@
-"""Recordings of every kind of file are the same table, by the package and by the program."""
+"""Recordings in every file format give the same table, in the package and in the program."""
 
 import subprocess
 import sys
@@ -117,7 +117,7 @@ WRITERS: list[tuple[str, Write, str]] = [
 
 def _columns(name: str, prefix: str) -> str:
     columns = COLUMNS.format(prefix)
-    if name.endswith((".tdms", ".mf4")):  # their time is the file's own
+    if name.endswith((".tdms", ".mf4")):  # these formats have times without a column
         columns = columns.replace(f"time={prefix}t,", "")
     return columns
 
@@ -137,8 +137,8 @@ def test_every_file_format_gives_the_same_table(
     assert any(note.startswith("columns used: ") for note in table.attrs["notes"])
 
 
-def test_times_of_every_type_of_parquet_are_seconds() -> None:
-    """Types are timestamps, durations, times of day, Spark's dates, decimals and half floats."""
+def test_times_of_every_parquet_type_are_converted_to_seconds() -> None:
+    """The types are timestamps, durations, times of day, Spark dates, decimals and half floats."""
     files = sorted((ROOT / "harness" / "signals" / "tests" / "all" / "data").glob("*.parquet"))
     assert len(files) > 12
     for path in files:
@@ -197,7 +197,7 @@ def test_the_command_lets_the_package_read_other_file_formats(
 
 
 def test_signals_with_different_sampling_times_are_not_interpolated(tmp_path: Path) -> None:
-    """A slow torque and a fast gyro keep their own times; no values are interpolated."""
+    """A slowly sampled torque and a fast gyro keep their own times; missing values are NaN."""
     from asammdf import MDF, Signal
 
     with MDF(version="4.10") as file:
@@ -226,7 +226,7 @@ def test_a_signal_without_unit_is_announced_or_refused(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
-    """Files have a wrong type, or columns that are missing or differ in length."""
+    """The files have an unknown format, or columns that are missing or differ in length."""
     from scipy.io import savemat
 
     savemat(tmp_path / "a.mat", {"time": TIME, "omega": RATE[:4], "tau_cmd": TORQUE})
@@ -255,7 +255,7 @@ def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("copies", [1, pytest.param(6, marks=pytest.mark.long)])
 def test_damaged_files_are_read_or_refused_by_name(tmp_path: Path, copies: int) -> None:
-    """In a file of each format, bytes are changed or the end is cut off."""
+    """In a file of each format, bytes are changed or the end is cut off; errors name the file."""
     dice = np.random.default_rng(copies)
     for name, write, prefix in WRITERS[3:]:
         path = tmp_path / name
@@ -273,7 +273,7 @@ def test_damaged_files_are_read_or_refused_by_name(tmp_path: Path, copies: int) 
 
 
 def test_a_small_file_that_declares_a_huge_data_set_is_refused_at_once(tmp_path: Path) -> None:
-    """A file of some kilobytes declares a data set of 2^40 values."""
+    """A file of some kilobytes declares a data set of 2^40 values; the values are not read."""
     import h5py
 
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -1,4 +1,4 @@
-"""The design review against closed forms."""
+"""Design reviews: margins equal closed forms; the page, files and errors."""
 
 import html
 import re
@@ -19,13 +19,13 @@ SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 DRY, INERTIA = 1000.0, 900.0
 PERIOD = 0.05
 
-# large tanks in low gravity: the damping of smaller ones was measured
+# these tanks are larger, in lower gravity, than the tanks whose damping was measured
 pytestmark = pytest.mark.filterwarnings("ignore:tank.*outside the measured")
 
 
 @pytest.fixture
 def craft(fmu: Path) -> Craft:
-    """Return a craft with one sphere on the axis."""
+    """Return a craft with one spherical tank on the axis."""
     return Craft(
         DRY, (INERTIA, INERTIA, 700.0), (0, 0, 1.0),
         {"ox": MountedTank(SPHERE, (0, 0, 0.2), modes=1, nu=3e-7)}, 400.0,
@@ -61,9 +61,10 @@ def test_margins_of_a_rigid_craft_equal_those_of_a_double_integrator(craft: Craf
 
 
 def closed_form(craft: Craft, fill: str) -> tuple[float, float, float, float]:
-    """Return heights of hinge and bob over the rigid part's centre (m), pole and zero (Hz).
+    """Return heights of hinge and slosh mass (m), and pole and zero from torque to angle (Hz).
 
-    One pendulum on the thrust axis, torque to angle: equation (8.1) of the craft's equations,
+    Heights are measured from the centre of mass of craft and rigid liquid. For one pendulum on the
+    thrust axis, equation (8.1) of the craft's equations gives
     ω_p² = ω_0² (1 + m/M + m b²/I) + m b g/I and ω_z² = ω_0² (1 + m/M).
     """
     p = craft.parameters(fill)
@@ -87,12 +88,13 @@ def closed_form(craft: Craft, fill: str) -> tuple[float, float, float, float]:
         pytest.param(-0.3, "zero first", 0, marks=pytest.mark.long),
     ],
 )
-def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
+def test_the_kind_of_stabilisation_depends_on_the_height_of_the_tank(
     craft: Craft, height: float, order: str, phase: float
 ) -> None:
     """Hinge and slosh mass are both ahead of the centre of mass, on both sides, or both behind.
 
-    For a torque the pole moves by Kd (ω_z² - ω_p²)/(2 I ω_p²): phase-stable if the zero is lower.
+    The controller moves the pole by Kd (ω_z² - ω_p²)/(2 I ω_p²), so that the mode is stabilised by
+    phase if the zero has the lower frequency.
     """
     tank = replace(craft.tanks["ox"], position=(0, 0, height), nu=None)
     craft = replace(craft, tanks={"ox": tank})
@@ -108,7 +110,7 @@ def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
     assert (away < 60).all()
     expected = {"gain and phase", "phase"} if phase == 0 else {"unstable"}
     assert set(rows["stabilised"]) <= expected
-    # damping that the loop adds, to first order in its gains
+    # growth rate due to the loop, to first order in its gains
     growth = 40 * (zero**2 - pole**2) / (2 * INERTIA * pole**2)
     assert np.sign(rows["zeta_closed"]).to_numpy() == pytest.approx([-np.sign(growth)] * 2)
     assert found.points["stable"].all() == (phase == 0)
@@ -117,7 +119,7 @@ def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
 def test_the_linear_models_of_all_fills_have_equal_states_and_the_responses_of_the_craft(
     craft: Craft,
 ) -> None:
-    """A full tank has no slosh mode, but its model keeps the states of one."""
+    """A full tank has no slosh mode, but its model has the states of a mode."""
     fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
     found = craft.review(gains(), PERIOD, ["20%", "60%", "100%"], **fixed)
     assert {model.states for model in found.family} == {found.family[0].states}
@@ -129,10 +131,10 @@ def test_the_linear_models_of_all_fills_have_equal_states_and_the_responses_of_t
         assert (model.inputs, model.outputs) == (plant.inputs, plant.outputs)
 
 
-def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
-    """Points are the nominal ones, random draws, and both ends of each range at each fill.
+def test_bands_contain_all_points_and_points_include_the_ends_of_each_range(craft: Craft) -> None:
+    """Points are nominal points, random draws, and both ends of each range at each fill.
 
-    Four ranges at two fills make 16 such ends.
+    Four ranges at two fills give 16 ends.
     """
     uncertain = {"craft.Jxx": "10%", "delay": (0.0, 0.2)}
     found = craft.review(gains(), PERIOD, ["30%", "70%"], uncertain=uncertain, draws=6, delay=0.1)
@@ -150,8 +152,8 @@ def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
     assert len(str(found).splitlines()) <= 20
 
 
-def test_thrust_off_the_centre_of_mass_is_trimmed(craft: Craft) -> None:
-    """A torque that balances the thrust's moment gives the same margins, and no rotation."""
+def test_a_review_trims_a_thrust_off_the_centre_of_mass(craft: Craft) -> None:
+    """A torque that balances the moment of the thrust gives the same margins without trimming."""
     craft = replace(craft, center_of_mass=(0.02, -0.01, 1.0))
     fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
     found = craft.review(gains(), PERIOD, ["50%"], **fixed)
@@ -171,8 +173,8 @@ def test_thrust_off_the_centre_of_mass_is_trimmed(craft: Craft) -> None:
     assert run[["omega[1]", "omega[2]", "omega[3]"]].abs().to_numpy().max() < 1e-12
 
 
-def test_the_search_finds_the_worst_corner(craft: Craft) -> None:
-    """No corner of the ranges has a smaller margin; the simulation confirms it to 1 %."""
+def test_the_search_finds_the_worst_corner_of_the_ranges(craft: Craft) -> None:
+    """No corner has a smaller modulus margin; the simulation confirms the margin to 1 %."""
     craft = replace(craft, inertia=(INERTIA, INERTIA, 1200.0))
     uncertain = {"craft.Jxx": "20%", "craft.Jyy": "10%", "delay": (0.0, 0.3)}
     options = {"damping": "nominal", "frequency": "nominal", "delay": 0.1, "uncertain": uncertain}
@@ -191,8 +193,10 @@ def test_the_search_finds_the_worst_corner(craft: Craft) -> None:
     assert found.confirmation.simulated_factor == pytest.approx(found.confirmation.factor, rel=0.01)
 
 
-def test_a_simulation_that_leaves_the_range_of_its_model_says_so(craft: Craft) -> None:
-    """The worst case is a tank that spins fast; the message has the factor beyond the range."""
+def test_the_confirmation_reports_a_simulation_that_leaves_the_range_of_its_model(
+    craft: Craft,
+) -> None:
+    """The worst case is a tank that spins fast; the message has the factor of the gain."""
     loop = craft.loop(gains(), PERIOD, "50%")
     run = loop.simulate(5.0, {"init.omega[3]": 9.0}, outputs=[])
     (sentence,) = [text for text in run.out_of_range if "tank 1" in text]
@@ -205,7 +209,7 @@ def test_a_simulation_that_leaves_the_range_of_its_model_says_so(craft: Craft) -
 def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
     """Undamped slosh is unstable if the centre of mass is between slosh mass and hinge.
 
-    The growth in the simulation is the linear pole's to 1 %.
+    The growth rate in the simulation equals that of the linear pole to 1 %.
     """
     tank = replace(craft.tanks["ox"], position=(0, 0, 0.62), nu=None)
     craft = replace(craft, tanks={"ox": tank})
@@ -222,7 +226,7 @@ def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
 def test_the_page_begins_with_the_result_and_needs_no_network(
     craft: Craft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every figure has a question as its title, axes with units, and the page's colours."""
+    """Every figure has a question as its title, axes with units, and the colours of the page."""
     found = craft.review(gains(), PERIOD, ["30%", "70%"], draws=4, delay=0.1)
     path = tmp_path / "review.html"
     found.save(path)
@@ -237,7 +241,7 @@ def test_the_page_begins_with_the_result_and_needs_no_network(
         assert unit in text
     addresses = set(re.findall(r"https?://[^\"' <)]+", text))
     assert addresses <= {"http://www.w3.org/1999/xlink", "http://www.w3.org/2000/svg"}
-    # rounding fills no axis: matplotlib would print the offset "1e-13+9.356e-1"
+    # no axis magnifies rounding errors, for which matplotlib prints an offset "1e-13+9.356e-1"
     assert not re.search(r">[^<]*1e[-−]\d", text)
     assert "var(--ink)" in text and "<script" not in text and "NaN" not in text
     assert text == found.html()
@@ -262,11 +266,11 @@ def test_the_suggested_filter_raises_the_margin_as_stated(craft: Craft) -> None:
     loop = found.nominal[0].loop
     there = hubslosh.margins(replace(loop, controller=of.controller))
     assert there.stable and there.modulus_margin == pytest.approx(of.after, rel=0.01)
-    # phase of the filter at the rigid crossover
+    # phase of the filter at the rigid-body crossover
     rows = found.nominal[0].margins.crossings.query("crossing == 'gain' and near == ''")
     phases = np.degrees(np.angle(of.filter.response(rows["frequency"])[:, 0, 0]))
     assert of.cost == pytest.approx(-phases.min(), rel=1e-9) and 0 < of.cost <= 15
-    # no slosh, no filter
+    # without slosh no filter is suggested
     full = craft.review(gains(), PERIOD, ["100%"], damping="nominal").suggestion
     assert full.controller is None and full.before == full.after
 
@@ -295,10 +299,10 @@ nu = 3e-7
 
 
 @pytest.mark.long
-def test_a_plan_file_equals_the_call_in_python(
+def test_a_project_file_gives_the_same_review_as_the_call_in_python(
     craft: Craft, tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    """The plan contains gains, matrices or a Python function; the page has the plan's name."""
+    """The controller is gains, matrices or a Python function; the page has the name of the file."""
     (tmp_path / "ox.toml").write_text("density = 1440.0\nshape = { sphere = { radius = 0.5 } }\n")
     law = (
         "import numpy as np\ndef law():\n    return np.hstack([80 * np.eye(3), 400 * np.eye(3)])\n"
@@ -408,7 +412,7 @@ def test_a_project_is_unchanged_after_writing_and_reading(
 def test_two_designs_are_compared_on_one_page(
     craft: Craft, tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    """The worse design comes first and is marked; ``hubslosh review`` compares two files."""
+    """The worse design is listed first and marked; ``hubslosh review`` compares two files."""
     settings = {"period": PERIOD, "fills": ["30%", "60%"], "damping": "nominal", "draws": 2}
     for name, factor in {"good": 1, "wrong sign": -1}.items():
         Project(replace(craft, model=str(craft.model)), factor * gains(), settings).save(
@@ -440,7 +444,7 @@ def test_two_designs_are_compared_on_one_page(
 
 
 def test_a_review_refuses_wrong_fills_ranges_names_and_controllers(craft: Craft) -> None:
-    """The errors name wrong fills, ranges, names and controllers."""
+    """The error names the wrong argument and the allowed values."""
 
     def review(*, of: Craft = craft, law=None, fills=("50%",), **options) -> None:
         of.review(gains() if law is None else law, PERIOD, fills, **options)
@@ -479,7 +483,7 @@ def test_a_review_refuses_wrong_fills_ranges_names_and_controllers(craft: Craft)
 
 
 def test_a_lower_slosh_frequency_makes_the_loop_unstable(craft: Craft) -> None:
-    """The loop is stable at nominal frequencies and unstable at -10 %, the default range's end."""
+    """The loop is stable at nominal frequencies, and unstable at -10 %, the end of the range."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     options = {"damping": "nominal", "draws": 0, "parameters": {"ox.zeta[1]": 8e-4}}
     options["inertia"] = "nominal"
@@ -489,7 +493,7 @@ def test_a_lower_slosh_frequency_makes_the_loop_unstable(craft: Craft) -> None:
     assert "UNSTABLE at" in found.summary and "within the uncertainty" in found.summary
     low = found.points.query("kind == 'one at a time' and `frequency of ox` == -1").iloc[0]
     assert not low["stable"] and low["growth"] > 0
-    # an unstable point has no margins, and counts in no band
+    # an unstable point has no margins and does not count in bands
     assert np.isnan(low["phase_margin"]) and np.isnan(low["modulus_margin"])
     (band,) = found.bands().to_dict("records")
     stable = found.points[found.points["stable"]]
@@ -498,10 +502,10 @@ def test_a_lower_slosh_frequency_makes_the_loop_unstable(craft: Craft) -> None:
     assert found.confirmation.agrees and found.confirmation.growth > 0
 
 
-def test_inertia_varies_by_one_factor(craft: Craft) -> None:
-    """By default all components of the inertia vary together by 5 %.
+def test_all_components_of_the_inertia_vary_by_the_same_factor(craft: Craft) -> None:
+    """The default range is 5 %.
 
-    They do not if the argument is "nominal" or a component has its own range.
+    Inertia does not vary so if the argument is "nominal" or a component has a range of its own.
     """
     fixed = {"damping": "nominal", "frequency": "nominal", "draws": 0}
     inertia = [[900.0, -20.0, 5.0], [-20.0, 900.0, 0.0], [5.0, 0.0, 700.0]]
@@ -519,11 +523,8 @@ def test_inertia_varies_by_one_factor(craft: Craft) -> None:
     assert [u.name for u in own.uncertain] == ["craft.Jzz"]
 
 
-def test_requirements_pass_or_fail(craft: Craft) -> None:
-    """A requirement is checked at the nominal points or at all points.
-
-    An unstable point fails, and failures are listed first.
-    """
+def test_requirements_apply_to_the_nominal_points_or_to_all_points(craft: Craft) -> None:
+    """An unstable point fails, and failed requirements are listed first."""
     fills, fixed = ["30%", "50%"], {"damping": "nominal", "draws": 3}
     plain = craft.review(gains(), PERIOD, fills, **fixed)
     assert plain.requirements().empty and plain.passed and "requirement" not in plain.summary
@@ -577,7 +578,7 @@ def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
     assert compared.growth == pytest.approx(found.worst.growth, rel=1e-9)
     assert compared.simulated_growth == pytest.approx(compared.growth, rel=1e-3)
     assert "confirms its growth" in str(compared) and "without oscillation" in str(compared)
-    # the command that grows is drawn, not only the first
+    # the growing command is drawn, although it is not the first command
     page = found.html()
     drawn = page[page.index("Does the nonlinear craft agree") :]
     assert "torque[3]" in drawn[: drawn.index("</figure>")]
@@ -617,12 +618,12 @@ def test_the_page_of_a_review_lists_unstable_points_first(craft: Craft) -> None:
     first = margins[0]
     assert first[2].startswith("nominal, ") and not nominal[found.fills.index(first[1])]
     assert "nominal loop unstable" in page
-    # growth of the points: the fastest first
+    # unstable points are listed in order of growth, the fastest first
     growth = found.unstable()["growth"].to_numpy()
     assert (np.diff(growth) <= 0).all() and found.worst.growth == growth[0]
 
 
-def test_the_cost_of_a_review_is_limited(craft: Craft) -> None:
+def test_a_review_that_would_take_hours_is_refused(craft: Craft) -> None:
     """Times, counts and sizes outside their ranges are refused before anything is computed."""
     for (name, value), words in {
         ("period", 1e-9): "period must be a number of seconds from 1e-06 to 1e.06, not 1e-09",
@@ -643,11 +644,11 @@ def test_the_cost_of_a_review_is_limited(craft: Craft) -> None:
 
 
 def test_thrust_vector_control_is_confirmed_by_the_simulation(craft: Craft) -> None:
-    """A review commands the force of a gimballed engine, to which the thrust is added.
+    """The loop commands the lateral force of a gimballed engine, which is added to the thrust.
 
-    A force across the thrust, at the distance d below the centre of mass, is the torque d F. The
-    thrust is tilted, so that its component along x is a constant of the command force[1]; a full
-    tank does not slosh, so that the craft rests under a tilted thrust.
+    A force F across the thrust, at the distance d below the centre of mass, causes the torque d F.
+    The thrust is tilted, so that its component along x is a constant in the command force[1]. A
+    full tank does not slosh, so that the craft is at rest under a tilted thrust.
     """
     tilted = replace(craft, thrust=(20.0, 0.0, 400.0))
     place = tilted.trim("100%").shift
@@ -664,7 +665,7 @@ def test_thrust_vector_control_is_confirmed_by_the_simulation(craft: Craft) -> N
 
 
 def test_a_neutral_attitude_does_not_count_as_unstable(craft: Craft) -> None:
-    """A rate controller leaves the attitude where it is; the simulation confirms its margin."""
+    """A rate controller has no effect on the attitude; the simulation confirms its margin."""
     found = craft.review(
         gains(kp=0.0), PERIOD, ["100%"], draws=3, damping="nominal", delay=0.1,
         requirements={"phase_margin": 30},

@@ -1,4 +1,4 @@
-"""The package, fmpy and the harness give one FMU the same torque: the motion is the same."""
+"""The package, fmpy and the program simulate the same motion of an FMU under the same torque."""
 
 import itertools
 import subprocess
@@ -24,16 +24,16 @@ SWEEP = "exp-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300"
 
 
 STARTS = {"init.slosh_angle": 0.0}
-"""The package's start at rest."""
+"""Start values with which the FMU starts at rest, as in the package."""
 
 
 def by_fmpy(
     fmu: Path, folder: Path, time: np.ndarray, torque: np.ndarray, settings: dict,
     tolerance: float | None = None, hold: bool = False,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Simulate an FMU with fmpy, call by call.
+    """Simulate an FMU with single calls of fmpy.
 
-    Inputs are straight lines between the rows, or held.
+    The torque is interpolated linearly between the rows, or held.
     """
     description = read_model_description(str(fmu))
     variables = {v.name: v for v in description.modelVariables}
@@ -68,7 +68,7 @@ def by_fmpy(
 
 
 def shared(quick: set[tuple], *values: list) -> list:
-    """Return every combination of the values as test cases; cases that are not quick are long."""
+    """Return all combinations of values as test cases; cases outside ``quick`` are long tests."""
     long = pytest.mark.long
     return [
         case if case in quick else pytest.param(*case, marks=long)
@@ -87,7 +87,7 @@ def shared(quick: set[tuple], *values: list) -> list:
 def test_a_sweep_of_five_minutes_gives_the_same_rate(
     fmu: Path, harness: Harness, tmp_path: Path, model: str, friction: str
 ) -> None:
-    """Every host sets the same inputs in the FMU, so that a difference is a host's error.
+    """Every host sets the same inputs, so that any difference is an error of a host.
 
     The tolerance is 1e-12 rad/s, which is 1e-11 of the largest rate.
     """
@@ -107,10 +107,10 @@ def test_a_sweep_of_five_minutes_gives_the_same_rate(
 @pytest.mark.parametrize(
     "sweep", list(itertools.product([*MODELS, "liquid"], FILLS, AMPLITUDES)), ids=str
 )
-def test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness(
+def test_fmpy_and_the_program_agree_over_a_whole_sweep_of_the_thesis(
     fmu: Path, harness: Harness, tmp_path: Path, sweep: tuple[str, float, float]
 ) -> None:
-    """The sweep has 45 minutes at 50 Hz, with rotary slosh and breaking waves."""
+    """The sweep takes 45 minutes at 50 Hz, with rotary slosh and breaking waves."""
     model, fill, amplitude = sweep
     settings = {"slosh.model": model, "tank.h": fill}
     flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
@@ -142,10 +142,10 @@ def test_a_held_torque_and_a_tolerance_give_the_same_rate(
     assert np.abs(ours["omega"] - theirs["omega"]).max() <= 1e-12
 
 
-def test_a_written_torque_history_gives_the_same_run_by_the_harness(
+def test_a_torque_history_written_by_python_gives_the_same_run_of_the_program(
     fmu: Path, harness: Harness, tmp_path: Path
 ) -> None:
-    """The program reads each digit of a torque that Python has written."""
+    """The program reads all digits that Python has written."""
     time = np.arange(1001) * 0.02
     torque = 0.05 * np.sin(2 * np.pi * 2.4 * time)
     ours = drive(fmu, time, torque)
@@ -159,7 +159,7 @@ def test_a_written_torque_history_gives_the_same_run_by_the_harness(
 
 
 def pulses() -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return torques that 50 rows a second do not show: time (s) and N·m."""
+    """Return times (s) and torques (N·m) of pulses that rows every 20 ms would miss."""
     close, closer = np.arange(401) * 0.005, np.arange(2001) * 0.001
     return {
         "30 ms on rows of 5 ms": (close, np.where(np.arange(401) % 50 < 6, 0.2, 0.0)),
@@ -188,7 +188,7 @@ def test_an_input_history_acts_the_same_in_python_and_on_the_command_line(
     for column in ("time", TORQUE, *COLUMNS):
         assert np.array_equal(theirs[column], ours[column]), column
     assert np.abs(ours["omega"]).max() > 1e-4
-    # with the rows of the input as rows of the result the solver makes other steps
+    # if the result has the rows of the input, the solver makes other steps
     whole = simulate(fmu, inputs=table, hold=hold, outputs=["omega"], tolerance=1e-10)
     fine = simulate(fmu, inputs=table, step=step, hold=hold, outputs=["omega"], tolerance=1e-10)
     both = pd.merge_asof(fine, whole, on="time", tolerance=1e-9, direction="nearest").dropna()
@@ -215,7 +215,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
     theirs = harness("--profile", profile, "--step", step)
     ours = simulate(fmu, inputs=table, step=float(step), outputs=list(COLUMNS))
     assert np.array_equal(theirs["time"], ours["time"])
-    # rows of 0.02 s cut the lines elsewhere than those of 0.007 s
+    # with a step of 0.007 s, interpolation between rows gives other last digits
     exact = step == "0.02"
     for column in COLUMNS:
         off = np.abs(theirs[column] - ours[column]).max()
@@ -226,7 +226,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
 def test_python_and_the_command_refuse_slopes_for_an_fmu_that_cannot_interpolate(
     fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    """Python and the command give one reason, and each names its own option for held inputs."""
+    """Both give the same reason, and each names its own option for held inputs."""
     held = tmp_path / "held.fmu"
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as new:
         for name in old.namelist():

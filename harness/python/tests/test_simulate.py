@@ -1,4 +1,4 @@
-"""A simulation in one call: what fmpy finds, however it is called, and its errors."""
+"""`simulate`: results equal those of fmpy and of single calls; errors name what is wrong."""
 
 import _thread
 import re
@@ -56,7 +56,7 @@ def test_a_run_out_of_range_has_the_message_of_the_command(
     assert len(loop.simulate(1, started, outputs=[]).out_of_range) == 1
 
 
-def test_a_long_run_samples_the_range_of_its_tanks(fmu: Path) -> None:
+def test_a_long_run_estimates_the_time_out_of_range_from_some_rows(fmu: Path) -> None:
     """The share of the time agrees to 0.5 % with the share in a run that reads every row."""
     started = {"init.slosh_angle": 0.5}
     shares = []
@@ -66,7 +66,7 @@ def test_a_long_run_samples_the_range_of_its_tanks(fmu: Path) -> None:
     assert shares[0] == pytest.approx(shares[1], abs=0.5) and 0 < shares[1] < 100
 
 
-def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
+def test_a_held_torque_gives_results_that_are_bit_identical_to_fmpy(fmu: Path) -> None:
     """With the same times and calls, outputs of all types agree in each of 3001 rows."""
     theirs = simulate_fmu(
         str(fmu), stop_time=60, output_interval=STEP,
@@ -77,7 +77,7 @@ def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
     columns = list(theirs.dtype.names)[1:]
     ours = simulate(fmu, {"slosh.model": "spherical"}, TABLE, outputs=columns, hold=True)
     assert list(ours) == ["time", "tau_cmd", *columns]
-    # fmpy's steps end where 0.02 k or the table's time is, which differ in the last digit
+    # steps of fmpy end at 0.02 k or at a time of the table, which differ in the last digit
     assert np.abs(theirs["time"] - ours["time"]).max() < 1e-12
     assert ours["event_count"].iloc[-1] > 10 and ours["stuck"].dtype == bool
     for name in columns:
@@ -86,7 +86,7 @@ def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
 
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", ["linear", "spherical"])
-def test_one_compiled_call_gives_the_bits_of_single_calls(
+def test_one_compiled_call_is_bit_identical_to_single_calls(
     fmu: Path, model: str, hold: bool
 ) -> None:
     """Three inputs are held or linear; outputs of all types are listed in a mixed order."""
@@ -100,11 +100,10 @@ def test_one_compiled_call_gives_the_bits_of_single_calls(
     assert np.array_equal(whole.to_numpy(float), single.to_numpy(float))
 
 
-def test_steps_between_rows_and_rows_between_steps_do_not_change_results(fmu: Path) -> None:
-    """The torque is linear between its rows every 20 ms, whatever the communication step is.
+def test_a_step_that_does_not_fit_the_rows_of_the_input_does_not_change_results(fmu: Path) -> None:
+    """The torque is linear between its rows, which are 20 ms apart, with steps of 50 ms and 7 ms.
 
-    Steps of 50 ms and 7 ms do not fit the rows. The allowed difference, 1e-9, is ten times the
-    solver's tolerance.
+    The allowed difference, 1e-9, is ten times the tolerance of the solver.
     """
     rows = simulate(fmu, inputs=TABLE, tolerance=1e-10, outputs=["theta", "omega"])
     for step in (0.05, 0.007):
@@ -119,7 +118,7 @@ def test_steps_between_rows_and_rows_between_steps_do_not_change_results(fmu: Pa
 
 
 def test_two_rows_at_one_time_are_a_jump(fmu: Path) -> None:
-    """A pulse whose edges are two rows at one time equals a pulse of held rows."""
+    """A pulse whose edges are two rows at one time equals a pulse with held inputs."""
     jumps = pd.DataFrame(
         {"time": [0.0, 1.003, 1.003, 2.007, 2.007, 10.0], "tau_cmd": [0, 0, 0.05, 0.05, 0, 0]}
     )
@@ -131,8 +130,8 @@ def test_two_rows_at_one_time_are_a_jump(fmu: Path) -> None:
     assert np.array_equal(run["omega"], held[np.isin(time, run["time"])])
 
 
-def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
-    """Start, stop and step are in the DefaultExperiment; the columns are the FMU's outputs."""
+def test_without_inputs_a_run_follows_the_default_experiment_of_the_fmu(fmu: Path) -> None:
+    """Start, stop and step are those of DefaultExperiment; the columns are the outputs."""
     run = simulate(fmu, {"init.slosh_angle": (10, "deg"), "tank.h": (50, "mm")})
     assert run["time"].iloc[-1] == 20 and len(run) == 1001
     assert run["slosh_angle"][0] == pytest.approx(np.radians(10), rel=1e-15)
@@ -142,14 +141,14 @@ def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
 
 
 def test_the_slope_of_a_torque_history_is_used(fmu: Path) -> None:
-    """A file of ``hubslosh torque`` has the torque's slope, here different from the differences."""
+    """A file of ``hubslosh torque`` has slopes, which here differ from the differences of rows."""
     table = TABLE.assign(tau_slope=np.full(len(TIME), 0.25))[:501]
     ours = simulate(fmu, inputs=table, outputs=["omega"])
     theirs = drive(fmu, TIME[:501], TORQUE[:501], slope=table["tau_slope"], columns=["omega"])
     assert np.array_equal(ours["omega"], theirs["omega"])
 
 
-def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
+def test_all_wrong_arguments_of_simulate_are_reported_at_once(fmu: Path) -> None:
     """One message lists wrong columns, parameters, units, outputs and times."""
     inputs = pd.DataFrame({"time": [0.0, 2.0, 1.0], "tau": [0.0, 0.0, 0.0], "g_axial": [9.0] * 3})
     parameters = {"tank.height": 1, "tank.h": (5, "inch"), "theta": 1.0, "slosh.model": "conical"}
@@ -180,7 +179,7 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
         ({"stop": -1.0}, "stop must be later than start"),
         ({"tolerance": 0.0}, "tolerance must be a positive number"),
         ({"parameters": {"slosh.modes": 1.5}}, 'expects a whole number, not "1.5"'),
-        # C would take their last 32 bits: 1, and a seed
+        # as a C int, these numbers would lose all but their last 32 bits
         ({"parameters": {"slosh.modes": 2**32 + 1}}, "from -2147483648 to 2147483647"),
         ({"parameters": {"imu.seed": 2**31}}, "from -2147483648 to 2147483647"),
         (
@@ -210,7 +209,7 @@ def test_the_limit_of_rows_equals_that_of_the_command_line() -> None:
 
 
 def test_a_run_that_stops_reports_the_time_and_keeps_its_rows(fmu: Path) -> None:
-    """The FMU refuses a NaN in row 500; the 501 rows computed up to then are kept."""
+    """The FMU refuses a NaN in row 500; the 501 rows up to this row are kept."""
     torque = TORQUE.copy()
     torque[500] = np.nan
     with Plant(fmu, torque=0.0) as plant, pytest.raises(RunError) as told:
@@ -225,7 +224,7 @@ def test_a_run_that_stops_reports_the_time_and_keeps_its_rows(fmu: Path) -> None
 
 
 def test_an_unknown_model_raises_an_error_with_suggestions(tmp_path: Path) -> None:
-    """Opens an FMU by name and by file, and refuses a file that is not an FMU."""
+    """An FMU is opened by name and by file; a file that is not an FMU is refused."""
     with pytest.raises(FmuError, match='no FMU "HubSlush" here'):
         simulate("HubSlush")
     with pytest.raises(FmuError, match="pack makes it"):
@@ -244,7 +243,7 @@ def test_inputs_may_be_in_their_display_units(fmu: Path) -> None:
     scaled = short.assign(tau_cmd=1e3 * short["tau_cmd"], tau_slope=1e3 * short["tau_slope"])
     scaled.attrs["units"] = {"time": "s", "tau_cmd": "mN.m"}
     ours = simulate(fmu, inputs=short, outputs=["omega"])
-    # the division by 1000 rounds
+    # the tolerance allows the rounding error of the division by 1000
     assert (
         np.abs(simulate(fmu, inputs=scaled, outputs=["omega"])["omega"] - ours["omega"]).max()
         < 1e-14
@@ -259,13 +258,13 @@ def test_inputs_may_be_in_their_display_units(fmu: Path) -> None:
 
 
 LONG = np.arange(3_000_001) * STEP
-"""Rows of some seconds of computing."""
+"""Times of a run that takes some seconds of CPU time, s."""
 
 
 def test_an_interrupt_stops_a_running_simulation(fmu: Path) -> None:
-    """A hub without friction turns through the whole run, which would take long."""
+    """The case is a long run of a hub without friction, which never sticks."""
     turning = {"slosh.model": "frozen", "friction.model": "none", "init.omega": 1.0}
-    # a shell starts its background jobs with SIGINT ignored, and Python keeps that
+    # restore the default handler, because background processes of a shell ignore SIGINT
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with Plant(fmu, turning) as plant:
@@ -278,7 +277,7 @@ def test_an_interrupt_stops_a_running_simulation(fmu: Path) -> None:
 
 
 def test_other_python_threads_run_during_a_simulation(fmu: Path) -> None:
-    """While one thread simulates, the main thread counts."""
+    """While one thread simulates, the main thread counts, so that the GIL must be released."""
     with Plant(fmu) as plant:
         run = threading.Thread(target=plant.run, args=(LONG[:300_001], {}, None, ["theta"]))
         run.start()
@@ -291,7 +290,7 @@ def test_other_python_threads_run_during_a_simulation(fmu: Path) -> None:
 def test_an_unknown_fmu_name_is_refused_with_the_fmus_that_exist(
     fmu: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The message names the FMUs that exist and the command."""
+    """The message lists the FMUs that exist, and has the command that builds the FMU."""
     names = ("HubSlosh", "Spacecraft", "Spacecraft-fmi3")
     (tmp_path / "fmus").mkdir()
     for name in names:

@@ -1,4 +1,4 @@
-"""fmpy's own simulation loop, as a user calls it."""
+"""FMPy's function ``simulate_fmu``, as users call it."""
 
 import subprocess
 import sys
@@ -19,12 +19,12 @@ def tau(time: np.ndarray) -> np.ndarray:
 
 
 def table(time: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Return fmpy's input as its documentation shows it."""
+    """Return a torque history in the form that the documentation of fmpy shows."""
     return np.array(list(zip(time, torque, strict=True)), [("time", float), ("tau_cmd", float)])
 
 
 def simulate(fmu: Path, **arguments) -> np.ndarray:
-    """Return the rate over a minute from rest in steps of 20 ms, rad/s."""
+    """Simulate a minute from rest in steps of 20 ms, and return the rate, rad/s."""
     start = {"init.slosh_angle": 0} | arguments.pop("start_values", {})
     result = simulate_fmu(
         str(fmu),
@@ -59,9 +59,9 @@ def repaired(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_with_default_parameters_only_hubslosh_moves(fmu: Path) -> None:
-    """With default parameters the slosh angle of HubSlosh spans at least 0.06 rad within 20 s.
+    """A user's first simulation shows a slosh angle of HubSlosh that spans at least 0.06 rad.
 
-    SloshTank and Spacecraft stay at rest. This is what a user sees first in a simulation tool.
+    SloshTank and Spacecraft stay at rest.
     """
     result = simulate_fmu(str(fmu))
     assert np.isfinite([list(row) for row in result]).all()
@@ -73,23 +73,22 @@ def test_with_default_parameters_only_hubslosh_moves(fmu: Path) -> None:
 
 
 def test_held_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
-    """From a plain table, fmpy holds each value over the step.
+    """By default fmpy holds each value of a table over the step.
 
-    Results differ only by rounding.
+    Results differ only by rounding errors.
     """
     rate = drive(fmu, TIME, tau(TIME), hold=True)["omega"]
     assert difference(simulate(fmu, input=table(TIME, tau(TIME))), rate) <= 1e-9
 
 
 def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
-    """In harness/hosts/fmpy_example.py a held input that is set half a step early is not late.
+    """The method of harness/hosts/fmpy_example.py leaves only errors of second order.
 
     An input that FMPy holds over steps of length H acts half a step late, which at the frequency ω
-    is an error of ωH/2 = 0.15 of the torque. If each value is set half a step early, only errors
-    of second order are left. The fundamental of the torque is too small by (ωH)²/24 = 0.004.
-    Within a step the torque is wrong by up to ωH/2 in both directions; this changes the rate by
-    (ωH)²/8 = 0.011 of the rate of the hub alone, which is a few times the rate near the
-    antiresonance.
+    is an error of ωH/2 = 0.15 of the torque. If each value is set half a step early, the
+    fundamental of the torque is too small by (ωH)²/24 = 0.004. Within a step the torque is wrong by
+    up to ωH/2 in both directions; this changes the rate by (ωH)²/8 = 0.011 of the rate of the hub
+    alone, which is a few times the rate near the antiresonance.
     """
     fine = np.arange(60001) * 0.001
     exact = drive(fmu, fine, tau(fine))["omega"][::20]
@@ -100,10 +99,10 @@ def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
 
 
 def test_fmpy_still_allocates_nine_derivatives(fmu: Path) -> None:
-    """With fmpy 0.3.32, its latest, ``set_input_derivatives`` needs exactly nine inputs.
+    """In fmpy 0.3.32, the latest version, ``set_input_derivatives`` needs exactly nine inputs.
 
-    When this fails, fmpy has been repaired: drop the fixture `repaired`, and let fmpy_example.py
-    and README say ``set_input_derivatives=True``.
+    If this test fails, fmpy has been repaired: remove the fixture `repaired`, and recommend
+    ``set_input_derivatives=True`` in fmpy_example.py and README.
     """
     with pytest.raises(ValueError, match="same size"):
         simulate(fmu, input=table(TIME, tau(TIME)), set_input_derivatives=True)
@@ -111,10 +110,11 @@ def test_fmpy_still_allocates_nine_derivatives(fmu: Path) -> None:
 
 @pytest.mark.usefixtures("repaired")
 def test_interpolated_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
-    """The FMU's part of fmpy's interpolation is in order.
+    """The fixture `repaired` makes fmpy pass slopes of the input to the FMU.
 
-    Where a communication point meets a row, fmpy hands over the slope that ends there. Rows
-    early by 1e-9 s make it the one that begins, and the torque wrong by 1e-9 s · ω = 2e-8.
+    If a communication point coincides with a row, fmpy passes the slope before the row. Therefore
+    the rows are 1e-9 s early, so that fmpy passes the slope after the row; this makes the torque
+    wrong by 1e-9 s · ω = 2e-8.
     """
     rate = drive(fmu, TIME, tau(TIME))["omega"]
     early = table(TIME - 1e-9, tau(TIME))
@@ -137,8 +137,8 @@ def test_wrong_start_values_stop_the_simulation(fmu: Path) -> None:
         simulate(fmu, start_values={"tank.h": 0})
 
 
-def test_the_example_runs(fmu: Path) -> None:
-    """The documentation contains this example."""
+def test_the_example_for_fmpy_runs(fmu: Path) -> None:
+    """The documentation shows this example, harness/hosts/fmpy_example.py."""
     example = Path(__file__).resolve().parents[2] / "hosts" / "fmpy_example.py"
     done = subprocess.run(
         [sys.executable, str(example), str(fmu)], capture_output=True, text=True, check=False
@@ -147,10 +147,10 @@ def test_the_example_runs(fmu: Path) -> None:
     assert "largest rate 0.0" in done.stdout
 
 
-def heard_by_omsimulator(name: str) -> str:
-    """Return what is left of a variable's name below ``model.root.fmu`` in OMSimulator 3.
+def name_in_omsimulator(name: str) -> str:
+    """Return the name by which OMSimulator 3 looks up a variable of ``model.root.fmu``.
 
-    It splits names at points and takes away a part that is in its own path.
+    OMSimulator splits names at dots, and removes parts that occur in the path of the FMU.
     """
     return ".".join(part for part in name.split(".") if part not in ("model", "root", "fmu"))
 
@@ -161,7 +161,7 @@ def test_omsimulator_sets_the_spherical_model_by_names_that_it_accepts(fmu: Path
     Other parameters, of type Integer, choose the same models.
     """
     variables = read_model_description(str(fmu)).modelVariables
-    lost = {v.name for v in variables if heard_by_omsimulator(v.name) != v.name}
+    lost = {v.name for v in variables if name_in_omsimulator(v.name) != v.name}
     assert lost == {"slosh.model", "friction.model"}
     items = next(v for v in variables if v.name == "slosh.model").declaredType.items
     spherical = next(int(item.value) for item in items if item.name == "spherical")

@@ -26,17 +26,17 @@ TUMBLING = POINT | {
     "appendage[1].participation[1]": 1.4, "appendage[1].participation[3]": 2.0,
     "appendage[1].participation[4]": 3.0, "appendage[1].eta_0": 0.02,
 }  # fmt: skip
-"""Every term acts: no surface is at rest, liquids spin and slip, an array is bent."""
+"""A craft in which every term acts: surfaces are not at rest, liquids spin, an array is bent."""
 
 
 @pytest.fixture
 def spacecraft(fmu: Path) -> Path:
-    """Return the packed Spacecraft."""
+    """Return the path of the packed FMU Spacecraft."""
     return fmu.with_name("Spacecraft.fmu")
 
 
 def loop_difference(loop: Loop, model: UncertainModel, delta: np.ndarray) -> float:
-    """Return the largest difference of the loop gain to that of a new loop at Δ, relative."""
+    """Return the relative difference between the model's loop gain and that of a new loop at Δ."""
     new = replace(loop, parameters=model.parameters(delta)).gain()
     mine = loop._gain(model.at(delta), loop.linear())
     f = np.geomspace(0.01, 4.9, 40)
@@ -45,7 +45,7 @@ def loop_difference(loop: Loop, model: UncertainModel, delta: np.ndarray) -> flo
 
 
 def test_every_draw_is_the_linear_model_of_a_craft_that_spins(spacecraft: Path) -> None:
-    """Random vertices and interior points agree with a new linear model, and the loops with it."""
+    """At random corners and interior points, models and loop gains agree with new linear models."""
     ranges = RANGES | {"appendage[1].frequency": "10%", "appendage[1].zeta": "50%"}
     model = uncertain(TUMBLING, ranges, ("torque", "force"), model=spacecraft)
     random = np.random.default_rng(3)
@@ -61,9 +61,10 @@ def test_every_draw_is_the_linear_model_of_a_craft_that_spins(spacecraft: Path) 
 
 @pytest.fixture
 def spinner(spacecraft: Path) -> Craft:
-    """Return a craft that spins about its thrust, with a tank on the axis and two off it.
+    """Return a craft that spins about its thrust, with one tank on the spin axis and two off it.
 
-    Each tank has its axis along the specific force at its slosh mass, so that the liquid rests.
+    The axis of each tank is along the specific force at its slosh mass, so that the liquid is at
+    rest.
     """
     spin, thrust, x = 0.7, 500.0, 0.9
     axial = MountedTank(CYLINDER, (0, 0, 0.4), modes=1, nu=1e-6)
@@ -88,11 +89,14 @@ NAMED = {
 }  # fmt: skip
 
 
-def test_names_mean_the_same_in_the_uncertain_model_and_in_a_loop(spinner: Craft) -> None:
-    """A loop with the uncertain values among its parameters has the gain of the LFT at this Δ.
+def test_a_name_means_the_same_quantity_in_the_uncertain_model_and_in_a_loop(
+    spinner: Craft,
+) -> None:
+    """A loop with the uncertain values as parameters has the loop gain of the LFT at this Δ.
 
-    The liquid rests, so that none of these values moves the accelerations at the point. The drag
-    differs by 1e-7: it follows the specific force at the hinge, which moves with the frequency.
+    The liquid is at rest, so that none of these values changes the accelerations at the operating
+    point. The damping differs by 1e-7, because it depends on the specific force at the hinge, which
+    moves with the frequency.
     """
     gains = 200 * np.eye(3)
     ranges = {name: of for name, of in NAMED.items() if name != "right.bob[1]"}
@@ -107,8 +111,8 @@ def test_names_mean_the_same_in_the_uncertain_model_and_in_a_loop(spinner: Craft
         assert np.abs(mine.response(f) - new).max() < 1e-6 * np.abs(new).max()
 
 
-def test_a_bob_that_moves_keeps_its_frequency(spinner: Craft) -> None:
-    """In a tank off the spin axis the specific force varies with the height of the bob."""
+def test_a_new_height_of_the_slosh_mass_does_not_change_its_frequency(spinner: Craft) -> None:
+    """In a tank off the spin axis the specific force varies with the height of the slosh mass."""
     model = spinner.uncertain("50%", {"right.bob[1]": (0.1, 0.25)}, outputs=RATES)
     high = spinner.parameters("50%", parameters={"right.bob[1]": 0.25})
     now = uncertain(high, {"craft.Jxx": "1%"}, model=spinner.model)._craft.values
@@ -116,15 +120,18 @@ def test_a_bob_that_moves_keeps_its_frequency(spinner: Craft) -> None:
     assert now[name] == pytest.approx(model._craft.values[name], rel=1e-9)
     assert now["tank[3].bob[1]"] == pytest.approx(0.25, rel=1e-12)
     length = model.parameters([1.0])["tank[3].length[1]"]
-    # the model keeps the acceleration, the craft its thrust
+    # agree only approximately: the model keeps the acceleration constant, the craft its thrust
     assert length == pytest.approx(high["tank[3].length[1]"], rel=2e-3)
     assert length < 0.99 * model.parameters([0.0])["tank[3].length[1]"]
 
 
-def test_the_worst_case_of_a_rigid_spinner_is_that_of_its_nutation(spacecraft: Path) -> None:
-    """ξ = ω_1 + j ω_2: across ξ' = j (along - across) s ξ + τ, with the moments of inertia.
+def test_the_worst_case_of_a_rigid_spinner_equals_a_closed_form_of_its_nutation(
+    spacecraft: Path,
+) -> None:
+    """The transverse rate ξ = ω_1 + j ω_2 follows across · ξ' = j (along - across) s ξ + τ.
 
-    With a sampled rate feedback, which acts a time later, the poles are roots of a polynomial.
+    ``along`` and ``across`` are the moments of inertia, s is the spin. With a delayed, sampled rate
+    feedback the poles are the roots of a polynomial.
     """
     across, along, s, k, period, delay = 400.0, 520.0, 2.0, 300.0, 0.1, 0.26
     dry = Craft(900, [across, across, along], spin=s, model=spacecraft)
@@ -147,11 +154,11 @@ def test_the_worst_case_of_a_rigid_spinner_is_that_of_its_nutation(spacecraft: P
 
 
 def test_the_worst_case_of_a_spinner_with_slosh_is_the_limit_of_a_new_loop(spinner: Craft) -> None:
-    """A loop that is made afresh is stable just below the worst case and unstable just above.
+    """A new loop is stable at a Δ just below the worst case, and unstable just above it.
 
-    The certificate proves stability up to a size at most 5 % below.
+    The certificate proves stability up to a size that is at most 5 % smaller.
     """
-    # the gyro turns the torque by 50°
+    # the controller turns the torque by 50° relative to the measured rate
     turn = np.radians(50)
     mix = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     loop = spinner.loop(150 * mix, 0.1, "50%", measured="omega", delay=0.1)
@@ -169,7 +176,7 @@ def test_the_worst_case_of_a_spinner_with_slosh_is_the_limit_of_a_new_loop(spinn
 
 
 def test_wheels_of_a_spinner_are_refused(spinner: Craft) -> None:
-    """Their momentum would be a further state of the uncertain model."""
+    """The momentum of the wheels would be a further state of the uncertain model."""
     wheels = {"x": hubslosh.Wheel((1, 0, 0), 0.02, 0.2, 300)}
     wheeled = replace(spinner, wheels=wheels)
     loop = wheeled.loop(np.ones((1, 3)), 0.1, "50%", measured="omega", command="wheels")
@@ -178,8 +185,10 @@ def test_wheels_of_a_spinner_are_refused(spinner: Craft) -> None:
         model.worst_case(loop)
 
 
-def test_a_spin_is_set_once(spinner: Craft) -> None:
-    """The craft's spin turns its liquids, and a tank's turns the craft and its other tanks."""
+def test_a_spin_of_the_craft_or_of_a_tank_applies_to_the_craft_and_all_liquids(
+    spinner: Craft,
+) -> None:
+    """It is set either as ``spin`` of the craft, or as ``spin`` of a tank."""
     values = spinner.parameters("50%")
     assert values["init.omega[3]"] == 0.7 and values["init.omega[1]"] == 0
     assert values["tank[1].spin_inertia"] > 0 and values["tank[2].spin_inertia"] > 0
@@ -191,16 +200,16 @@ def test_a_spin_is_set_once(spinner: Craft) -> None:
     assert values["init.omega[3]"] == pytest.approx(0.3, rel=1e-15)
     assert values["tank[3].spin_inertia"] == values["tank[1].spin_inertia"] > 0
     assert "spin (0, 0, 0.3) rad/s" in str(by_tank)
-    # across the axis the start is free
+    # an initial rate across the spin axis is allowed
     nutating = by_tank.parameters("50%", parameters={"init.omega[1]": (2, "deg/s")})
     assert nutating["init.omega[1]"] == (2, "deg/s")
 
 
-def test_spins_that_contradict_each_other_are_told_both(spinner: Craft) -> None:
-    """The message has both numbers, and what to do."""
+def test_an_error_names_both_of_two_spins_that_contradict_each_other(spinner: Craft) -> None:
+    """The message also says which of them to leave out."""
     tank = replace(spinner.tanks["axial"], spin=0.4)
     with pytest.raises(
-        FmuError, match=r"axial: spin = 0\.4 rad/s, but .* at 0\.7 rad/s .*give one"
+        FmuError, match=r"axial: spin = 0\.4 rad/s, but .* at 0\.7 rad/s .*give the spin"
     ):
         replace(spinner, tanks={"axial": tank})
     again = replace(spinner, tanks={"axial": replace(tank, spin=0.7)})
@@ -215,7 +224,7 @@ def test_spins_that_contradict_each_other_are_told_both(spinner: Craft) -> None:
 
 
 def test_the_attitude_of_a_spinner_is_no_steady_state(spinner: Craft) -> None:
-    """Margins and uncertain models warn if a loop measures it."""
+    """Margins and uncertain models warn if the loop measures the attitude."""
     for call in (
         lambda: hubslosh.margins(spinner.loop(np.ones((3, 6)), 0.1, "50%")),
         lambda: spinner.uncertain("50%", {"craft.Jxx": "5%"}),

@@ -1,4 +1,4 @@
-"""A saved state brings everything back, bit for bit."""
+"""Saved states of FMU instances restore runs bit by bit."""
 
 import os
 import subprocess
@@ -21,11 +21,11 @@ EVERYTHING = {
     "imu.lsb": 7.636e-5,
     "slosh.modes": 3,
 }
-"""All that has a memory: stick and slip, the wheel's speed, the gyro's noise and samples."""
+"""Parameters with all parts that have states: friction, wheel, noise and samples of the gyro."""
 
 
 def go_on(plant: Plant, steps: int) -> bytes:
-    """Continue with a small torque, so that the hub sticks at times; return all signals as bits."""
+    """Continue with a small torque, with which the hub sticks at times; return signals as bytes."""
     names = plant.names("output", "local")
     rows = []
     first = round(plant.time / STEP)
@@ -39,7 +39,7 @@ def go_on(plant: Plant, steps: int) -> bytes:
 
 @pytest.mark.parametrize("model", ["frozen", "linear", "planar", "spherical", "liquid"])
 def test_replay_from_a_saved_state_is_bit_identical(fmu: Path, model: str) -> None:
-    """A state is restored in its own instance and in a new one with other parameters."""
+    """A state is restored in its own instance and in a new instance with other parameters."""
     settings = EVERYTHING | {"slosh.model": model}
     with Plant(fmu, settings) as plant, Plant(fmu) as other:
         go_on(plant, 500)
@@ -53,8 +53,8 @@ def test_replay_from_a_saved_state_is_bit_identical(fmu: Path, model: str) -> No
         assert go_on(other, 500) == first
 
 
-def test_a_damaged_state_is_refused_and_changes_nothing(fmu: Path) -> None:
-    """The state is cut off or has one changed bit; the error says so."""
+def test_a_damaged_state_is_refused_and_does_not_change_the_instance(fmu: Path) -> None:
+    """The state is cut off or has one changed bit, which the error states."""
     with Plant(fmu) as plant:
         plant.step(STEP, 0.1)
         time, good = plant.save()
@@ -101,7 +101,7 @@ for _ in range(8):
 
 
 def test_close_waits_for_a_run_in_another_thread(fmu: Path) -> None:
-    """The test runs in a process of its own, because without the lock it ends by SIGSEGV."""
+    """The test runs in a process of its own, because a missing lock would end it by SIGSEGV."""
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
     command = [sys.executable, "-c", CLOSED, fmu]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -122,7 +122,7 @@ def test_a_controller_cannot_close_the_instance_that_it_controls(fmu: Path) -> N
 
 
 def test_a_controller_of_another_size_than_its_loop_is_refused(fmu: Path) -> None:
-    """Sizes are compared before any number is read."""
+    """The sizes of arrays are compared before any of their numbers is read."""
     one, none = np.ones((1, 1)), np.zeros((0, 0))
     law = Linear(none, np.zeros((0, 1)), np.zeros((1, 0)), one, np.zeros((2, 1)), np.zeros((2, 1)))
     size = {"cycles": 2, "parts": 1, "switch": 0, "latency": 0}

@@ -8,9 +8,9 @@ from conftest import drive
 
 DURATION = 60  # s
 KNOTS = np.arange(10 * DURATION + 1) / 10
-"""Corners of the torque, s; communication points of every run."""
+"""Times of the corners of the torque, s; every run has communication points there."""
 TORQUE = 0.05 * np.sin(2 * np.pi * 2.35 * KNOTS)
-"""N·m at the knots, straight lines between them; near the slosh frequency, rest included."""
+"""Torque at the knots, N·m, linear between them; its frequency is near the slosh frequency."""
 
 
 def communication_points(cut: str) -> np.ndarray:
@@ -30,8 +30,8 @@ def test_20_ms_5_ms_and_random_steps_agree_within_the_tolerance(
 ) -> None:
     """A piecewise linear torque acts in three runs with different communication steps.
 
-    Rate and angle at its corners differ by no more than the solver's tolerance, relative to each
-    signal's maximum.
+    At the corners of the torque, rate and angle differ by at most the solver's tolerance, relative
+    to the maximum of each signal.
     """
     settings = {"slosh.model": model, "friction.model": friction}
     columns = ("theta", "omega", "slosh_angle", "slosh_angle_radial")

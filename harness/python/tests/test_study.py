@@ -1,4 +1,4 @@
-"""A study's folder: what is stored comes back as it was, or the difference is named."""
+"""Folders of Monte Carlo studies: stored runs are reused unchanged, or reported as damaged."""
 
 import hashlib
 import json
@@ -40,7 +40,7 @@ RANGES = {
     "limit": [float("inf"), float("-inf"), float("nan"), -0.0, 0.0],
     "place": [Path("a/b"), {"a": 1}, b"a", 1j],
 }
-"""One name for each kind of value."""
+"""Ranges with one name for each type of value."""
 
 
 def outcome(values: dict) -> dict[str, float]:
@@ -51,22 +51,22 @@ def outcome(values: dict) -> dict[str, float]:
 
 
 def cells(table: pd.DataFrame) -> list[str]:
-    """Return a text for each cell: two are equal only if types and values are."""
+    """Return a string for each cell; two strings are equal only if types and values are equal."""
     return [f"{name} {json.dumps(encoded(cell))}" for name in table for cell in table[name]]
 
 
 def study(folder: Path | None, runs: int = 40, **more) -> pd.DataFrame:
-    """Run the study of this file's outcome in a folder."""
+    """Run a study with this file's `outcome` in a folder."""
     return monte_carlo(RANGES, runs, 3, more.pop("outcome", outcome), folder=folder, **more)
 
 
 def not_called(values: dict) -> dict[str, float]:
-    """Fail, because a run that was stored is simulated again."""
+    """Fail, because a stored run must not be simulated again."""
     raise AssertionError(values)
 
 
-def test_a_resumed_study_returns_every_kind_of_value_with_its_type(tmp_path: Path) -> None:
-    """Rows that an earlier call with fewer runs has stored are included."""
+def test_a_resumed_study_returns_every_value_with_its_type(tmp_path: Path) -> None:
+    """This includes rows that an earlier call with fewer runs has stored."""
     whole = study(None)
     study(tmp_path, 17)
     resumed = study(tmp_path)
@@ -82,8 +82,8 @@ def test_a_resumed_study_returns_every_kind_of_value_with_its_type(tmp_path: Pat
     assert len(pd.read_csv(tmp_path / "runs.csv")) == 40
 
 
-def test_different_values_are_stored_as_different_texts() -> None:
-    """Equal values of different types, such as 1 and True, also have different texts."""
+def test_different_values_are_stored_as_different_strings() -> None:
+    """Equal values of different types, such as 1 and True, also have different strings."""
     values = [item for of in RANGES.values() if isinstance(of, list) for item in of]
     values += [
         np.array([[1, 2]]),
@@ -96,8 +96,8 @@ def test_different_values_are_stored_as_different_texts() -> None:
     assert len(set(texts)) == len(texts)
 
 
-def test_integers_of_numpy_count_as_seed_and_runs(tmp_path: Path) -> None:
-    """NumPy's integers give the study that Python's integers give, stored or not."""
+def test_seed_and_runs_may_be_integers_of_numpy(tmp_path: Path) -> None:
+    """They give the same study as integers of Python, stored or not."""
     table = monte_carlo(RANGES, np.int32(5), np.int64(3), outcome, folder=tmp_path)
     assert cells(table) == cells(study(tmp_path, 5, outcome=not_called))
 
@@ -110,9 +110,9 @@ def edited(path: Path, change) -> None:
 
 
 def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
-    """A run whose values are not the seed's, or whose SHA-256 is wrong, is simulated again.
+    """A run with values that the seed does not give, or with a wrong SHA-256, is simulated again.
 
-    A warning names it.
+    A warning names the run.
     """
     whole = study(tmp_path)
     file = tmp_path / "runs" / "000007.json"
@@ -124,7 +124,7 @@ def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
     with pytest.warns(FmuWarning, match=said):
         assert cells(study(tmp_path)) == cells(whole)
     assert file.read_bytes() == original
-    # The manifest may have been changed along with it.
+    # The edited run is also noticed if the manifest was changed to match it.
     file.write_bytes(forged)
     sums = (tmp_path / "manifest.sha256").read_text().splitlines()
     new = hashlib.sha256(forged).hexdigest()
@@ -167,9 +167,9 @@ def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
         (b"", 40),
         (good[: len(good) // 2], 20),
         (b"".join(lines[:3] + lines[4:]), 1),
-        (good[:-1], 0),  # the last line is that of study.json, which the call verifies
+        (good[:-1], 0),  # the cut last line is the line of study.json, which is verified otherwise
         (good + twice, 1),
-        (twice + good, 0),  # the last line of a name counts
+        (twice + good, 0),  # if a name has two lines, the last line counts
     ):
         manifest.write_bytes(data)
         with warnings.catch_warnings(record=True) as warned:
@@ -189,7 +189,7 @@ def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
         with pytest.raises(FmuError, match=said):
             study(tmp_path, outcome=not_called)
         manifest.write_bytes(good)
-    # A cut line: the run before it is stored, its own is simulated again.
+    # The last line is cut off: its run is simulated again, and the other runs are reused.
     last = tmp_path / "runs" / "000039.json"
     last.unlink()
     manifest.write_bytes(
@@ -205,7 +205,7 @@ def simulated(folder: Path) -> list[dict]:
     return called
 
 
-def test_a_second_study_is_refused_while_one_holds_the_folder(tmp_path: Path) -> None:
+def test_a_second_study_in_a_folder_is_refused_while_the_first_one_runs(tmp_path: Path) -> None:
     """The message names the process that locks the folder; a killed process locks nothing."""
 
     def second(values: dict) -> dict[str, float]:
@@ -258,7 +258,7 @@ def test_a_seed_draws_the_numbers_of_a_plan(
 
 
 Door = Callable[[Path], tuple[bool, str]]
-"""Makes two runs in a folder; returns whether that succeeded, and errors and warnings."""
+"""Function that stores two runs in a folder; it returns success, and errors and warnings."""
 
 
 @pytest.fixture
@@ -285,8 +285,10 @@ def doors(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str
     return {"campaign": campaign, "study": of_python}
 
 
-def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_path: Path) -> None:
-    """Folders are locked, have a damaged manifest or half a run, or are of the other kind."""
+def test_campaigns_and_studies_accept_and_refuse_the_same_folders(
+    doors: dict[str, Door], tmp_path: Path
+) -> None:
+    """A folder is locked, has a damaged manifest or an incomplete run, or is of the other kind."""
     for kind, door in doors.items():
         folder = tmp_path / kind
         assert door(folder) == (True, ""), kind
@@ -347,7 +349,7 @@ def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_
 
 
 def test_values_that_cannot_be_stored_are_refused_before_the_first_run(tmp_path: Path) -> None:
-    """Some values have no text; results that are texts must not read like numbers."""
+    """Some values have no string form; results that are strings must not count as numbers."""
     with pytest.raises(FmuError, match=r"law has .*of type function.* cannot store"):
         monte_carlo({"law": [not_called]}, 2, 1, not_called, folder=tmp_path)
     with pytest.raises(FmuError, match="outcome must return numbers by name"):
@@ -366,9 +368,9 @@ def slow(values: dict) -> dict[str, float]:
 
 
 def killed(folder: str, seed: int) -> None:
-    """Start the study of 200 runs, and kill it 20 times at random; change a run half way.
+    """Start a study of 200 runs, kill it 20 times at random moments, and edit a run halfway.
 
-    Each start is a fork of a process that has loaded everything.
+    Each start is a fork of a process that has already imported everything.
     """
     chance = random.Random(seed)
     runs = Path(folder) / "runs"

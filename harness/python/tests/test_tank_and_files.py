@@ -1,4 +1,4 @@
-"""A tank from Python as from the command line; tables as files; plots of everything."""
+"""Tanks in Python equal the command line; tables and parameters as files; plots."""
 
 import json
 import os
@@ -24,7 +24,7 @@ SPHERE = {"density": 1008.0, "shape": {"sphere": {"radius": 0.35}}}
 
 @pytest.fixture(autouse=True)
 def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the program, and let the package find it."""
+    """Return the path of the program, and set HUBSLOSH so that the package finds it."""
     path = option(request, "--hubslosh")
     monkeypatch.setenv("HUBSLOSH", str(path))
     return path
@@ -51,7 +51,7 @@ def test_tank_equals_the_command_line(program: Path, tmp_path: Path) -> None:
     modes = mine.modes
     assert (modes["zeta_low"] < modes["zeta"]).all() and (modes["zeta"] < modes["zeta_high"]).all()
     assert modes["zeta"][0] == mine.parameters("Spacecraft", 2)["tank[2].zeta[1]"]
-    # the same tank as a dict
+    # the tank is also given as a dict
     import tomllib
 
     again = tank(tomllib.loads(file.read_text()), fill="40%", modes=2, gravity=3.0, nu=1e-6)
@@ -62,10 +62,10 @@ def test_tank_equals_the_command_line(program: Path, tmp_path: Path) -> None:
     assert (tmp_path / "again.svg").read_text() == mine.picture
 
 
-def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
-    """On a very heavy craft, the pole of the linearised FMU is the mode's.
+def test_liquid_in_the_fmu_has_the_frequency_of_the_tank(fmu: Path) -> None:
+    """On a very heavy craft, the pole of the linearised FMU is the natural frequency of the mode.
 
-    The tank's axis is x or another direction.
+    The axis of the tank is x or another direction.
     """
     full = tank(SPHERE, fill="60%", modes=1, gravity=0.1)
     for axis, thrust in (((0, 0, 1), "force[3]"), ((1, 0, 0), "force[1]"), ((0, 0, -1), None)):
@@ -74,7 +74,7 @@ def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
         craft |= {f"craft.r[{i}]": 0.0 for i in (1, 2, 3)}
         craft |= full.parameters("Spacecraft", position=(0.5, 0, 0), axis=axis)
         model = hubslosh.linearize(fmu.with_name("Spacecraft.fmu"), craft)
-        # the craft has 1e7 times the liquid's mass
+        # the craft has 1e7 times the mass of the liquid, so that it hardly moves
         frequency = model.modes()["frequency"].to_numpy()
         assert frequency == pytest.approx(full.modes["frequency"][0], rel=1e-5)
     rigid = full.parameters("SloshTank", rigid=True)
@@ -111,7 +111,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
 
 
 def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> None:
-    """Other programs read exactly the numbers of a table from .csv, .parquet and .mat."""
+    """Other programs read exactly the same numbers from .csv, .parquet and .mat."""
     from scipy.io import loadmat
 
     table = pd.DataFrame({"time": [0.0, 0.1], "q[1]": [1 / 3, np.pi], "stuck": [True, False]})
@@ -140,8 +140,8 @@ def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> Non
             call()
 
 
-def test_every_plot_has_the_elements_of_its_docstring(fmu: Path) -> None:
-    """For example, the frequency band of a Bode plot follows from the poles."""
+def test_every_plot_has_the_elements_that_its_docstring_describes(fmu: Path) -> None:
+    """For example, the frequency band of a Bode diagram follows from the poles."""
     viscous = {"friction.model": "viscous"}
     model = hubslosh.linearize(fmu, viscous, ["tau_cmd"], ["omega"])
     gain, _ = plot.bode(model)
@@ -190,7 +190,7 @@ def test_every_plot_has_the_elements_of_its_docstring(fmu: Path) -> None:
 
 @pytest.fixture
 def three_axes(fmu: Path) -> hubslosh.Loop:
-    """Return a loop of three axes in which undamped slosh crosses 0 dB."""
+    """Return a loop about three axes in which undamped slosh crosses 0 dB."""
     sphere = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
     tanks = {
         "ox": hubslosh.MountedTank(sphere, (0, 0.6, 0.22)),
@@ -201,7 +201,7 @@ def three_axes(fmu: Path) -> hubslosh.Loop:
         model=fmu.with_name("Spacecraft.fmu"),
     )  # fmt: skip
     undamped = {f"{tank}.zeta[{n}]": 0.0 for tank in tanks for n in (1, 2)}
-    # a lag by Tustin's rule has a zero at half the sampling rate
+    # a lag that is discretised by Tustin's rule has a zero at half the sampling rate
     gains = np.hstack([400 * np.eye(3), 1000 * np.eye(3)])
     lag = hubslosh.LinearModel(
         -9.0 * np.eye(3), 9 * gains, np.eye(3), np.zeros((3, 6)), ("a", "b", "c"), (), ()
@@ -210,18 +210,18 @@ def three_axes(fmu: Path) -> hubslosh.Loop:
 
 
 def labels_of(*axes: Any) -> list[Any]:
-    """Return the boxes of labels, which do not overlap."""
+    """Return the bounding boxes of all labels, after checking that they do not overlap."""
     labels = [text.get_window_extent() for ax in axes for text in ax.texts]
     assert not any(a.overlaps(b) for k, a in enumerate(labels) for b in labels[:k])
     return labels
 
 
-def test_margins_of_three_axes_can_be_read(three_axes: hubslosh.Loop) -> None:
+def test_the_margin_plot_of_three_axes_is_legible(three_axes: hubslosh.Loop) -> None:
     """The title fits, a gain of zero does not set the scale, and labels do not overlap."""
     gain, phase = plot.margins(three_axes)
     figure = gain.figure
     figure.draw_without_rendering()
-    # curves fill the diagram
+    # the curves use most of the diagram
     low, high = gain.get_ylim()
     curves = [line for line in gain.lines if str(line.get_label()).startswith("torque")]
     ends = {round(float(line.get_ydata()[k])) for line in curves for k in (0, -1)}
@@ -282,7 +282,7 @@ SSV = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def parameter(name: str, value: str, unit: str = "", kind: str = "Real") -> str:
-    """Return a parameter of a parameter set."""
+    """Return the XML element of a parameter."""
     unit = f' unit="{unit}"' if unit else ""
     return f'<ssv:Parameter name="{name}"><ssv:{kind} value="{value}"{unit}/></ssv:Parameter>'
 
@@ -290,21 +290,21 @@ def parameter(name: str, value: str, unit: str = "", kind: str = "Real") -> str:
 @pytest.mark.parametrize(
     ("text", "name", "value"),
     [
-        (parameter("tank.h", "50", "mm"), "tank.h", 0.05),  # defined in the file
-        (parameter("tank.h", "1000", "mil"), "tank.h", 0.0254),  # unknown to the FMU
+        (parameter("tank.h", "50", "mm"), "tank.h", 0.05),  # unit of both file and FMU
+        (parameter("tank.h", "1000", "mil"), "tank.h", 0.0254),  # unit of the file only
         (parameter("tank.h", "0.05", "m"), "tank.h", 0.05),
         (parameter("tank.h", "0.05"), "tank.h", 0.05),
         (
             parameter("init.slosh_angle", "3", "deg"),
             "init.slosh_angle",
             np.radians(3),
-        ),  # of the FMU
+        ),  # unit of the FMU only
     ],
 )
 def test_units_of_a_parameter_set_are_converted(
     fmu: Path, tmp_path: Path, text: str, name: str, value: float
 ) -> None:
-    """Units are converted by the file's definitions, or else by the FMU's."""
+    """Units are converted by the definitions of the file or, if it has none, of the FMU."""
     file = tmp_path / "bench.ssv"
     file.write_text(SSV.format(parameters=text, units=""))
     converted = hubslosh.fmu.Fmu.open(fmu).convert(name, hubslosh.read_parameters(file)[name])
@@ -349,7 +349,7 @@ def test_units_of_a_parameter_set_are_converted(
         ),
     ],
 )
-def test_a_unit_that_is_not_one_of_the_variable_is_refused(
+def test_a_unit_that_does_not_fit_the_variable_is_refused(
     fmu: Path, tmp_path: Path, text: str, units: str, said: str
 ) -> None:
     """A file that is not a parameter set is also refused."""
@@ -359,7 +359,7 @@ def test_a_unit_that_is_not_one_of_the_variable_is_refused(
         hubslosh.simulate(fmu, file, stop=0.2)
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in the file system")
 @pytest.mark.parametrize("write", [hubslosh.to_csv, hubslosh.to_parquet, hubslosh.to_mat])
 def test_an_output_follows_links_and_is_written_to_a_pipe(
     tmp_path: Path, write: Callable[[pd.DataFrame, Path], None]
@@ -383,7 +383,7 @@ def test_an_output_follows_links_and_is_written_to_a_pipe(
         path.name for path in (plain, link, far, pipe)
     )
     if not Path("/dev/full").exists():
-        return  # only Linux has it
+        return  # only Linux has /dev/full
     link.unlink()
     link.symlink_to("/dev/full")
     with pytest.raises(FmuError, match="cannot be written: No space left"):

@@ -1,4 +1,4 @@
-"""Temporary folders of a killed process go at the next start, of either program."""
+"""Temporary folders of killed processes are removed at the next start of Python or the program."""
 
 import os
 import signal
@@ -39,7 +39,7 @@ def test_folders_of_a_killed_process_are_removed_at_the_next_start(
 ) -> None:
     """Python and the program remove temporary folders of processes that no longer exist.
 
-    Folders of running processes and foreign folders stay.
+    Folders of running processes, and folders of other programs, are not removed.
     """
     kept = tmp_path / "hubslosh-of-somebody"
     kept.mkdir()
@@ -62,7 +62,7 @@ def test_folders_of_a_killed_process_are_removed_at_the_next_start(
     assert not living.parent.exists()
 
 
-def test_an_incomplete_table_is_removed_when_the_next_one_is_written(tmp_path: Path) -> None:
+def test_an_incomplete_table_is_removed_when_the_next_table_is_written(tmp_path: Path) -> None:
     """The table is first written to a temporary file in the same folder and then renamed."""
     import pandas as pd
 

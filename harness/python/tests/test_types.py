@@ -1,4 +1,4 @@
-"""Type checkers on scripts as users write them, and the types of the compiled half."""
+"""Types: type checkers run on scripts of users, and on the declarations of the compiled part."""
 
 import ast
 import json
@@ -24,7 +24,7 @@ def checkers() -> Path:
 
 
 def check(checkers: Path, name: str, scripts: list[Path], folder: Path) -> tuple[int, str]:
-    """Return exit code and output of a type checker; it sees the package as an installed one."""
+    """Return exit code and output of a type checker that sees the package as installed."""
     package = str(HERE.parent)
     if name == "mypy":
         command = [checkers, "-m", "mypy", "--strict", "--follow-imports=silent"]
@@ -45,7 +45,7 @@ def check(checkers: Path, name: str, scripts: list[Path], folder: Path) -> tuple
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["mypy", "pyright"])
 def test_type_checkers_accept_scripts_of_users(checkers: Path, name: str, tmp_path: Path) -> None:
-    """The script uses a craft, margins, Monte Carlo, identification and figures."""
+    """The scripts use a craft, margins, Monte Carlo, identification and figures."""
     assert len(USERS) == 5
     code, output = check(checkers, name, USERS, tmp_path)
     assert code == 0, output
@@ -67,13 +67,13 @@ MISTAKES = {
     "hubslosh.FmuError().time": "time",
     'hubslosh.identify("bench.csv", method="drag")': "method",
 }
-"""Lines with a mistake, and the word that a type checker names."""
+"""Lines with a mistake, each with the word that a type checker must name."""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["mypy", "pyright"])
 def test_type_checkers_find_mistakes_of_users(checkers: Path, name: str, tmp_path: Path) -> None:
-    """Each line has an error, so that no type of the package is Any by mistake."""
+    """Each line has an error that a checker misses if a type of the package is Any by mistake."""
     script = tmp_path / "mistakes.py"
     script.write_text("\n".join(["import hubslosh", *MISTAKES, ""]))
     code, output = check(checkers, name, [script], tmp_path)
@@ -83,8 +83,8 @@ def test_type_checkers_find_mistakes_of_users(checkers: Path, name: str, tmp_pat
         assert any(word in text for text in about), f"line {line} ({word}):\n{output}"
 
 
-def test_the_compiled_half_has_the_types_that_are_declared() -> None:
-    """``_native.pyi`` declares exactly the names of the compiled module and of its classes."""
+def test_the_stub_declares_exactly_the_names_of_the_compiled_module() -> None:
+    """The stub is ``_native.pyi``; names of methods and attributes are compared, too."""
     tree = ast.parse(Path(hubslosh.__file__).with_name("_native.pyi").read_text())
     module = sys.modules["hubslosh._native"]
     declared = {

@@ -1,4 +1,4 @@
-"""Uncertain models against the FMU's own linear models, and a worst case against its motion."""
+"""Uncertain models equal linear models of the FMU; simulations confirm worst cases."""
 
 import json
 import re
@@ -35,7 +35,7 @@ POINT = {
     "tank[2].q[3]": -0.03, "tank[2].g_ref": 0.3, "tank[2].frequency[1]": 0.21,
     "tank[2].damping_law": "constant_ratio", "tank[2].dI_y": 0.6, "tank[2].I_xy": 0.2,
 }  # fmt: skip
-"""Two tanks off the axis, one leaning; the force turns the craft, so no surface is at rest."""
+"""Craft with two tanks off the axis, one tilted; the force turns it, so no surface is at rest."""
 
 RANGES = {
     "tank[1].frequency[1]": "12%", "tank[1].zeta[1]": "50%", "tank[1].mass[1]": "10%",
@@ -48,16 +48,16 @@ RANGES = {
 
 @pytest.fixture
 def spacecraft(fmu: Path) -> Path:
-    """Return the packed Spacecraft."""
+    """Return the path of the packed FMU Spacecraft."""
     return fmu.with_name("Spacecraft.fmu")
 
 
 def difference(model: UncertainModel, delta: np.ndarray, spacecraft: Path) -> float:
-    """Return the largest difference to `linearize`, relative to each matrix's largest element."""
+    """Return the largest difference from `linearize`, relative to each matrix's largest element."""
     mine = model.at(delta)
     theirs = linearize(spacecraft, model.parameters(delta), list(mine.inputs), list(mine.outputs))
     kept = [theirs.states.index(state) for state in mine.states]
-    # what is left out has no effect: the norms of q and p
+    # states of the FMU that are left out have no effect: they follow from the norms of q and p
     matrices = theirs.A[np.ix_(kept, kept)], theirs.B[kept], theirs.C[:, kept], theirs.D
     errors = [np.abs(a - b).max() / max(np.abs(b).max(), 1e-300)
               for a, b in zip(mine, matrices, strict=True)]  # fmt: skip
@@ -72,16 +72,16 @@ def test_every_draw_is_the_linear_model_of_the_fmu(spacecraft: Path) -> None:
     deltas = [np.zeros(count), np.ones(count), -np.ones(count), 1.5 * (-1.0) ** np.arange(count)]
     for delta in [*deltas, *random.uniform(-1, 1, (40, count))]:
         assert difference(model, delta, spacecraft) < 1e-11
-    # the ranges matter
+    # the ranges have an effect
     assert np.abs(model.at(deltas[1]).A - model.at(deltas[0]).A).max() > 1e-3
-    # M at Δ = 0 has the parameters at which the ranges are centred
+    # the parameters at Δ = 0 are the middles of the ranges
     assert model.values(deltas[0])["tank[2].frequency[1]"] == pytest.approx(0.215, rel=1e-12)
 
 
 def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
-    """The number of copies of each parameter is as derived for a surface at rest.
+    """The numbers of copies of each parameter are those of a free surface at rest.
 
-    Along one axis a mode needs half as many copies.
+    With inputs and outputs of only one axis, a mode needs half as many copies.
     """
     still = {"tank[1].g_ref": 0.3, "force[3]": 470.0, "tank[1].position[3]": -0.3}
     ranges = {f"tank[1].{kind}[1]": "5%" for kind in ("frequency", "zeta", "mass", "bob")}
@@ -89,7 +89,7 @@ def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
     model = uncertain(still, ranges, model=spacecraft)
     assert dict(zip(model.deltas, model.counts, strict=True)) == {
         "tank[1].frequency[1]": 4, "tank[1].zeta[1]": 2, "tank[1].mass[1]": 2, "tank[1].bob[1]": 4,
-        # on the axis torque moves no mass along it
+        # the tank is on the axis, so that a torque moves no mass along it
         "craft.mass": 2, "craft.Jxx": 1, "craft.Jxy": 2, "acceleration": 2,
     }  # fmt: skip
     del ranges["craft.Jxy"], ranges["craft.Jxx"]
@@ -98,7 +98,7 @@ def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
 
 
 def test_surface_tension_without_gravity_gives_a_stable_mode(spacecraft: Path) -> None:
-    """Without thrust the frequency follows from the centring stiffness, for every length."""
+    """Without thrust, the frequency follows from the centring stiffness for any pendulum length."""
     start = {"tank[1].k[1]": 3.0, "tank[1].g_ref": 1e-3}
     ranges = {"tank[1].frequency[1]": "20%", "tank[1].mass[1]": "5%"}
     model = uncertain(start, ranges, model=spacecraft)
@@ -129,7 +129,7 @@ STILL = {
     "force[3]": 470.0, "tank[1].position[3]": -0.3, "tank[1].g_ref": 1.7, "tank[1].k[1]": 2.0,
     "tank[1].zeta[1]": 0.004, "tank[1].H_0": 0.1,
 }  # fmt: skip
-"""One tank on the axis. Its damping follows the acceleration, which is not that of g_ref."""
+"""Craft with one tank on the axis. Its damping depends on the acceleration, which is not g_ref."""
 
 
 def fit(names: list[str], matrix: np.ndarray) -> Identification:
@@ -138,11 +138,11 @@ def fit(names: list[str], matrix: np.ndarray) -> Identification:
     return Identification({}, {}, None, {}, True, True, (), of_fit)
 
 
-def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
-    """Derivatives of the response by each entry of Δ equal the linearised FMU's.
+def test_parameters_of_an_identification_become_uncertain_parameters(spacecraft: Path) -> None:
+    """The derivatives of the response by each entry of Δ equal those of the linearised FMU.
 
-    They are central differences, good to 1e-5 of the largest. The thrust gives each craft the same
-    acceleration.
+    They are central differences with an error of 1e-5 of the largest. The thrust of each craft is
+    chosen so that the acceleration is the same.
     """
     names = ["tank[1].length[1]", "tank[1].hinge[1]", "tank[1].zeta[1]", "tank[1].mass[1]",
              "tank[1].m_0", "tank[1].H_0", "tank[1].I_0", "craft.mass", "craft.Jxx"]  # fmt: skip
@@ -160,7 +160,7 @@ def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
     random = np.random.default_rng(5).standard_normal((12, len(names) + 1))
     deviation = 0.01 * np.append(value, 1.0)
     covariance = np.corrcoef(random, rowvar=False) * np.outer(deviation, deviation)
-    # that of a gyro's bias is no parameter of the craft
+    # the bias of a gyro is no parameter of the craft
     found = fit([*names, "bias(omega[1])@1"], covariance)
     model = uncertain(STILL, covariance=found, outputs=MEASURED, model=spacecraft)
     assert len(model.deltas) == len(names)
@@ -173,7 +173,7 @@ def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
         - model.at(-w * step).response([0.05, 0.17, 0.3])
         for w in np.eye(len(names))
     ])  # fmt: skip
-    # the axes are those of the correlations, two standard deviations long
+    # each axis is a principal axis of the correlations, two standard deviations long
     correlations = np.corrcoef(random, rowvar=False)[:-1, :-1]
     expected = 4 * np.einsum("i...,ij,j...->...", slopes, correlations, slopes)
     squares = np.einsum("i...,i...->...", mine, mine)
@@ -185,7 +185,7 @@ def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
 ) -> None:
     """The frequency is within 4 σ of the true value.
 
-    The deviations of frequency and height of the slosh mass follow from formulas.
+    The standard deviations of frequency and height of the slosh mass follow from formulas.
     """
     time = np.arange(0.0, 60.0, 0.2)
     torque = pd.DataFrame({"time": time, "torque[2]": np.where(time < 2, 5.0, 0.0)})
@@ -212,10 +212,10 @@ def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
     assert abs(off) < 4 * slopes["frequency[1]"] * deviation
 
 
-def test_a_fit_that_the_model_cannot_take_is_refused_by_name(spacecraft: Path) -> None:
+def test_an_identification_that_cannot_be_converted_is_refused(spacecraft: Path) -> None:
     """Refused are a tank's position, a frequency without effect, and undetermined parameters."""
     for name, words in [
-        ("tank[1].position[3]", r"replaces tank\[1\].position\[3\] \(allowed"),
+        ("tank[1].position[3]", r"tank\[1\].position\[3\] cannot be converted"),
         ("tank[1].frequency[1]", r"frequency\[1\] = 0 has no effect"),
     ]:
         with pytest.raises(FmuError, match=words):
@@ -228,7 +228,7 @@ def test_a_fit_that_the_model_cannot_take_is_refused_by_name(spacecraft: Path) -
 
 
 def test_saved_files_restore_the_uncertain_model(spacecraft: Path, tmp_path: Path) -> None:
-    """Files are read by scipy, json and python-control."""
+    """The files are read by scipy and json; python-control gets the model itself."""
     model = uncertain(POINT, RANGES, model=spacecraft)
     hubslosh.to_mat(model, tmp_path / "craft.mat")
     read = loadmat(tmp_path / "craft.mat", simplify_cells=True)
@@ -245,7 +245,7 @@ def test_saved_files_restore_the_uncertain_model(spacecraft: Path, tmp_path: Pat
 
 
 @pytest.mark.octave
-def test_octave_reads_the_file(spacecraft: Path, tmp_path: Path) -> None:
+def test_octave_reads_the_mat_file_of_an_uncertain_model(spacecraft: Path, tmp_path: Path) -> None:
     """Octave runs the part of read_lft.m that needs no toolbox."""
     model = uncertain(POINT, RANGES, model=spacecraft)
     hubslosh.to_mat(model, tmp_path / "craft.mat")
@@ -260,7 +260,9 @@ def test_octave_reads_the_file(spacecraft: Path, tmp_path: Path) -> None:
     assert read["C"] * scale == pytest.approx(mine.C, rel=1e-9, abs=1e-15)
 
 
-def test_models_families_and_parameters_as_mat(spacecraft: Path, tmp_path: Path) -> None:
+def test_models_families_and_parameters_are_written_as_mat(
+    spacecraft: Path, tmp_path: Path
+) -> None:
     """Names are cell arrays, and a family of models has a third dimension."""
     models = {g: linearize(spacecraft, POINT | {"force[3]": g}, "torque", "omega")
               for g in (300.0, 400.0)}  # fmt: skip
@@ -281,10 +283,10 @@ def test_models_families_and_parameters_as_mat(spacecraft: Path, tmp_path: Path)
 
 
 @pytest.mark.filterwarnings("ignore:at the start a tank leaves its range")
-def test_all_faults_of_an_uncertain_model_are_reported_at_once(spacecraft: Path) -> None:
+def test_all_wrong_arguments_of_uncertain_are_reported_at_once(spacecraft: Path) -> None:
     """One message lists wrong names, ranges and signals.
 
-    Craft without such a model are also refused.
+    Craft for which uncertain models do not exist are also refused.
     """
     ranges = {"tank[1].frequence[1]": "5%", "craft.mass": (2, 1), "tank[1].zeta[1]": "150%"}
     with pytest.raises(FmuError) as told:
@@ -302,7 +304,10 @@ def test_all_faults_of_an_uncertain_model_are_reported_at_once(spacecraft: Path)
 
 @pytest.fixture
 def danger(spacecraft: Path) -> tuple[UncertainModel, Loop]:
-    """Return a tank whose bob may lie between centre of mass and centre of percussion."""
+    """Return a model and a loop in which the slosh mass may be in the danger zone.
+
+    The danger zone is between centre of mass and centre of percussion.
+    """
     start = {
         "craft.mass": 900.0, "craft.r[3]": 0.0, "force[3]": 450.0, "tank[1].position[3]": 0.0,
         "tank[1].g_ref": 0.35, "tank[1].zeta[1]": 0.002,
@@ -314,8 +319,13 @@ def danger(spacecraft: Path) -> tuple[UncertainModel, Loop]:
     return uncertain(start, ranges, model=spacecraft), loop
 
 
-def test_the_worst_case_swings_in_the_nonlinear_fmu(danger: tuple[UncertainModel, Loop]) -> None:
-    """Above µ's lower bound the motion grows, below it decays; its frequency agrees to 1 %."""
+def test_the_nonlinear_fmu_is_at_the_limit_of_stability_at_the_worst_case(
+    danger: tuple[UncertainModel, Loop],
+) -> None:
+    """At a slightly larger Δ the motion grows, at a smaller Δ it decays.
+
+    The frequency agrees to 1 %.
+    """
     model, loop = danger
     worst = model.worst_case(loop)
     assert 0.1 < worst.size < 3 and worst.mu == pytest.approx(1 / worst.size)
@@ -336,19 +346,20 @@ def test_the_worst_case_swings_in_the_nonlinear_fmu(danger: tuple[UncertainModel
 
 
 def test_bounds_of_mu_enclose_the_worst_case(danger: tuple[UncertainModel, Loop]) -> None:
-    """At the worst case's frequency the upper bound is above the lower bound, and near."""
+    """At the frequency of the worst case, the upper bound of µ is just above the lower bound."""
     model, loop = danger
     worst = model.worst_case(loop)
     upper = model.mu_upper(loop, [worst.frequency])[0]
-    # it leaves out how images of the hold change with Δ, 1e-5 here
+    # the upper bound ignores changes with Δ of the images of the hold, which are 1e-5 here
     assert worst.mu < upper * (1 + 1e-4)
     assert upper < 1.05 * worst.mu
 
 
 def test_the_upper_bound_of_one_repeated_parameter_is_exact() -> None:
-    """I - δ N is singular where 1/δ is a real eigenvalue of N.
+    """I - δ N is singular if 1/δ is a real eigenvalue of N.
 
-    The bound is within 2 %, the cost of keeping the scaling D away from singular matrices.
+    The error of the bound is at most 2 %, because the scaling D must stay away from singular
+    matrices.
     """
     random = np.random.default_rng(4)
     for n in (1, 2, 3, 4, 5):
@@ -360,18 +371,19 @@ def test_the_upper_bound_of_one_repeated_parameter_is_exact() -> None:
             assert exact * (1 - 1e-9) <= mu_upper(matrix, [n]) <= max(1.02 * exact, 0.02)
 
 
-def test_a_range_may_end_on_one_side() -> None:
-    """1 + 2 δ is singular at δ = -0.5 only, which a damping ratio cannot reach."""
+def test_a_lower_bound_of_a_parameter_lowers_the_bound_of_mu() -> None:
+    """1 + 2 δ is singular only at δ = -0.5, which a damping ratio cannot reach."""
     matrix = np.array([[-2.0]])
     for least, exact in ((-np.inf, 2.0), (-0.6, 2.0), (-0.5, 2.0), (-0.4, SMALLEST)):
         bound = mu_upper(matrix, [1], np.array([least]))
         assert exact * (1 - 1e-9) <= bound <= 1.006 * exact
 
 
-def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
-    """One parameter occurs three times in Δ, the other once.
+def test_the_upper_bound_of_two_parameters_is_near_the_true_value() -> None:
+    """The first parameter occurs three times in Δ, the second once.
 
-    For each value of the first, the value of the second at which the loop is singular is known.
+    For each value of the first parameter, the value of the second parameter at which I - N Δ is
+    singular is known.
     """
     random = np.random.default_rng(8)
     ratios = []
@@ -381,7 +393,7 @@ def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
         matrix[1] /= 1e3
 
         def seen(first: float, N: np.ndarray = matrix) -> complex:
-            """Return 1 over the second parameter δ that makes I - N Δ singular, for a first one."""
+            """Return 1/δ of the second parameter that makes I - N Δ singular, given the first."""
             closing = np.linalg.solve(np.eye(3) - N[:3, :3] * first, N[:3, 3])
             return complex(N[3, 3] + first * N[3, :3] @ closing)
 
@@ -400,7 +412,7 @@ def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
     assert len(ratios) > 6 and np.median(ratios) < 1.05
 
 
-def test_an_error_says_how_to_install_clarabel(
+def test_the_error_about_missing_clarabel_says_how_to_install_it(
     danger: tuple[UncertainModel, Loop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The solver clarabel is an optional dependency."""
@@ -412,9 +424,9 @@ def test_an_error_says_how_to_install_clarabel(
 
 
 def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, Loop]) -> None:
-    """Random draws and corners are stable; beyond the worst case the loop is unstable.
+    """Random draws and corners are stable; just beyond the worst case the loop is unstable.
 
-    A damping ratio does not fall below 0.
+    Damping ratios stay at 0 or above.
     """
     model, loop = danger
     found = model.certify(loop)
@@ -438,7 +450,7 @@ def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, 
 def test_many_delta_at_once_have_the_poles_of_single_loops(
     danger: tuple[UncertainModel, Loop],
 ) -> None:
-    """The stacked matrices of the search equal the loop gain's, for any delay."""
+    """The search computes many Δ in stacked matrices; delays may have any length."""
     model, given = danger
     for delay, latency in ((0.0, 0), (0.04, 0), (given.period, 1), (0.13, 2)):
         loop = replace(given, delay=delay, latency=latency)
@@ -452,7 +464,7 @@ def test_many_delta_at_once_have_the_poles_of_single_loops(
                 assert np.abs(poles - pole).min() < 1e-12
 
 
-def test_a_certificate_takes_the_worst_case_that_is_known(
+def test_a_certificate_reuses_a_given_worst_case(
     danger: tuple[UncertainModel, Loop],
 ) -> None:
     """A worst case of another loop is refused; progress shows sizes, shares and the time left."""
@@ -486,7 +498,7 @@ def test_margins_and_worst_cases_print_the_names_of_the_tanks(spacecraft: Path) 
 def test_a_failed_certificate_is_reported(
     danger: tuple[UncertainModel, Loop], tmp_path: Path
 ) -> None:
-    """A limit of one convex problem is too low to certify a range of any size."""
+    """One convex problem, the limit in this test, is not enough to certify any size."""
     model, loop = danger
     found = model.certify(loop, most=1)
     assert found.size == 0 and found.mu == found.gap == np.inf
@@ -498,7 +510,7 @@ def test_a_failed_certificate_is_reported(
 def test_the_error_about_a_loop_that_does_not_fit_the_model_lists_both_names(
     danger: tuple[UncertainModel, Loop],
 ) -> None:
-    """The message names what loop and model have, and the call that gives a model that fits."""
+    """The message lists the signals of both, and the call that creates a model that fits."""
     model, loop = danger
     other = replace(loop, command="force")
     with pytest.raises(FmuError) as told:
@@ -513,5 +525,5 @@ def test_the_error_about_a_loop_that_does_not_fit_the_model_lists_both_names(
         start, {"craft.Jxx": "10%"}, model=loop.model, inputs=other.names[1],
         outputs=other.names[0],
     )  # fmt: skip
-    with pytest.raises(FmuError, match="unstable at Δ = 0"):  # it fits, but does not control
+    with pytest.raises(FmuError, match="unstable at Δ = 0"):  # the loop fits, but is unstable
         fits.worst_case(other)

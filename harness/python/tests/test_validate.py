@@ -1,4 +1,4 @@
-"""fmpy's validator finds nothing to say about the FMU."""
+"""The validators of FMPy and of ``hubslosh check`` find no problems in the FMU."""
 
 import subprocess
 import sys
@@ -8,13 +8,13 @@ import pytest
 from fmpy.validation import validate_fmu
 
 
-def test_the_validator_finds_no_problems(fmu: Path) -> None:
+def test_the_validator_of_fmpy_finds_no_problems(fmu: Path) -> None:
     """FMPy checks schema, names, model structure, start values, causalities and units."""
     assert validate_fmu(str(fmu)) == []
 
 
 @pytest.mark.long
-def test_the_command_hubslosh_check_finds_no_problems_either(fmu: Path) -> None:
+def test_the_command_hubslosh_check_finds_no_problems(fmu: Path) -> None:
     """The test calls ``hubslosh check`` as a user does."""
     command = [sys.executable, "-m", "fmpy", "validate", str(fmu)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""A run as a page."""
+"""The page that shows a run in 3-D."""
 
 import base64
 import json
@@ -23,7 +23,7 @@ def shown(page: str) -> dict:
 
 
 def test_view_draws_a_table_with_the_parameters_of_its_run(fmu: Path, request) -> None:
-    """The tank has the diameter that was set in another unit; columns are rounded to 32 bits."""
+    """The tank has the set diameter, which is in another unit; columns are rounded to 32 bits."""
     parameters = {"tank.d": (200, "mm"), "slosh.model": "spherical", "init.slosh_angle": 0.2}
     run = hubslosh.simulate(fmu, parameters=parameters, stop=3.0, step=0.02)
     page = hubslosh.view(run, program=option(request, "--hubslosh"))
@@ -34,7 +34,7 @@ def test_view_draws_a_table_with_the_parameters_of_its_run(fmu: Path, request) -
     angle = np.frombuffer(base64.b64decode(drawn["columns"]["slosh_angle"]), "<f4")
     assert np.array_equal(angle, run["slosh_angle"].to_numpy().astype("f4"))
     assert "srcdoc" in page._repr_html_() and page.path is None
-    # by the table itself, also a part of it
+    # the method `view` of the table, and of a selection of it, gives the same page
     same = run.view(program=option(request, "--hubslosh"))
     assert same.html == page.html
     part = run[run["time"] < 1.0].view(program=option(request, "--hubslosh"))
@@ -50,12 +50,13 @@ def test_a_table_without_the_columns_of_the_motion_is_refused(
     with pytest.raises(FmuError, match=r"theta \(or omega\).*slosh_angle") as error:
         hubslosh.view(run, out, program=option(request, "--hubslosh"))
     assert "--columns theta,omega,slosh_angle,slosh_angle_radial" in str(error.value)
-    assert "the run cannot be drawn" in str(error.value)  # not a temporary file
+    # the message does not contain the name of a temporary file
+    assert "the run cannot be drawn" in str(error.value)
     assert not out.exists()
 
 
-def test_a_tank_is_drawn_by_its_file(fmu: Path, tmp_path: Path, request) -> None:
-    """In a sphere that is half full the surface is drawn at mid height."""
+def test_a_tank_is_drawn_with_the_shape_in_its_file(fmu: Path, tmp_path: Path, request) -> None:
+    """In a half-full sphere the surface is drawn at half the height."""
     tank = tmp_path / "sphere.toml"
     tank.write_text("density = 1000\nshape = { sphere = { radius = 0.1 } }\n")
     mass = 1000 * 2 / 3 * np.pi * 0.1**3
@@ -63,13 +64,13 @@ def test_a_tank_is_drawn_by_its_file(fmu: Path, tmp_path: Path, request) -> None
     run = hubslosh.simulate(fmu, {"tank.h": float(depth)}, stop=1.0, step=0.02)
     page = hubslosh.view(run, tanks=[tank], program=option(request, "--hubslosh"))
     drawn = shown(page.html)["scene"]["geometry"]["tanks"][0]
-    # between heights computed at a hundredth of the volume
+    # the height is interpolated between heights at each hundredth of the volume
     assert drawn["level"] == pytest.approx(0.1, abs=1e-4)
     assert max(r for r, _ in drawn["shape"]["contour"]) == pytest.approx(0.1)
 
 
 def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path, request) -> None:
-    """``run.view()`` works on parts and copies of the table, and refuses other tables."""
+    """``run.view()`` works on selections and copies of the table, and refuses other tables."""
     run = hubslosh.closed_loop([[0.5, 0.6]], 0.1, 2.0, fmu)
     for table in (run, run.iloc[5:], run.copy(), pickle.loads(pickle.dumps(run))):
         assert isinstance(table, hubslosh.Run) and isinstance(table, pd.DataFrame)

@@ -1,4 +1,4 @@
-"""The wheel: installed where there is nothing else, it runs READMEs' Python; also notebooks."""
+"""The wheel: in an empty environment it runs the code of READMEs, pages, docstrings, notebooks."""
 
 import base64
 import csv
@@ -25,7 +25,7 @@ NOTEBOOKS = sorted((HERE / "notebooks").glob("*.ipynb"))
 def installed(wheel: Path, tmp_path_factory) -> Path:
     """Return the Python of an environment with the wheel and the packages that it requires.
 
-    The environment begins empty whenever these packages change; otherwise only the wheel is new.
+    The environment is created again if these packages change; otherwise only the wheel is replaced.
     """
     with zipfile.ZipFile(wheel) as archive:
         metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
@@ -65,7 +65,7 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
 
 @pytest.mark.long
 def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) -> None:
-    """The FMUs are found outside the source tree; their rate is bit-identical to FMI 2.0."""
+    """The FMUs are found outside the source tree; results are bit-identical to FMI 2.0."""
     program = """
 from hubslosh import simulate
 for model in ("HubSlosh", "Spacecraft", "SloshTank"):
@@ -96,7 +96,7 @@ def test_the_wheel_tag_names_only_this_machine(wheel: Path) -> None:
 
 
 def python_in(page: Path) -> list[str]:
-    """Return the blocks of Python in a page of Markdown."""
+    """Return the Python code blocks of a Markdown page."""
     blocks = re.findall(r"^ *```python\n(.*?)^ *```", page.read_text(), re.DOTALL | re.MULTILINE)
     assert blocks, f"{page} has no Python"
     return [textwrap.dedent(block) for block in blocks]
@@ -105,7 +105,7 @@ def python_in(page: Path) -> list[str]:
 @pytest.mark.long
 @pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
 def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path) -> None:
-    """The code runs in an empty folder with the wheel alone."""
+    """The code runs in an empty folder, with only the wheel installed."""
     for code in python_in(readme):
         done = subprocess.run(
             [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
@@ -124,7 +124,7 @@ for name in ["hubslosh", *names]:
         found = doctest.TestResults(found.failed + more.failed, found.attempted + more.attempted)
 assert not found.failed and found.attempted > 100, found
 """
-"""Runs the examples of every docstring; none sees the names of its module."""
+"""Program that runs the examples of every docstring, without the names of the module."""
 
 
 @pytest.mark.long
@@ -136,7 +136,7 @@ def test_the_examples_in_docstrings_give_the_shown_results(
 
 
 def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str:
-    """Run pages of the book as one program."""
+    """Run the code of pages of the book as one program, and return its output."""
     code = "\n".join(block for page in pages for block in python_in(ROOT / "book" / f"{page}.md"))
     return run_with_wheel(["-c", code], wheel, folder, request)
 
@@ -152,7 +152,7 @@ def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) ->
 
 @pytest.mark.long
 def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, request) -> None:
-    """The worked example runs first, then the pages on three questions."""
+    """The worked example runs first, then three pages, each of which answers a question."""
     pages = ("spacecraft", "which_damping", "how_many_modes", "is_it_slosh")
     assert "slosh of tank 1, slosh of tank 2" in run_pages(pages, wheel, tmp_path, request)
     for file in ("tank.svg", "margins.png", "slew.png"):
@@ -171,7 +171,7 @@ def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, req
 def test_every_fmu_of_the_wheel_runs(
     installed: Path, tmp_path: Path, model: str, parameters: dict, moves: str
 ) -> None:
-    """An FMU, found by name, is simulated for a second, and its initial slosh moves it."""
+    """Each FMU is found by name and simulated for a second; its initial slosh moves it."""
     code = (
         "import hubslosh\n"
         f"run = hubslosh.simulate({model!r}, {parameters!r}, stop=1)\n"
@@ -185,7 +185,7 @@ def test_every_fmu_of_the_wheel_runs(
 
 
 @pytest.mark.long
-def test_a_craft_of_one_or_two_tanks_is_made_uncertain(installed: Path, tmp_path: Path) -> None:
+def test_craft_of_one_or_two_tanks_have_uncertain_models(installed: Path, tmp_path: Path) -> None:
     """`Craft.uncertain` works in the wheel, which contains one Spacecraft FMU for any craft."""
     code = """
 import numpy as np
@@ -233,7 +233,7 @@ def test_functions_name_the_optional_package_that_is_missing(
 def test_a_notebook_runs(
     wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path
 ) -> None:
-    """Every cell runs in order with the wheel's files, figures included."""
+    """All cells run in order with the files of the wheel, including their figures."""
     import nbformat
     from nbclient import NotebookClient
 

@@ -16,7 +16,7 @@ SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 INERTIA = np.array([[900.0, -20.0, 5.0], [-20.0, 850.0, 12.0], [5.0, 12.0, 700.0]])
 GAINS = np.hstack([80 * np.eye(3), 400 * np.eye(3)])
 
-# Four wheels in a pyramid.
+# Four wheels in a pyramid configuration.
 PYRAMID = {
     name: Wheel((np.cos(angle), np.sin(angle), 0.7), 0.02, 0.3, 500, speed)
     for name, angle, speed in zip(
@@ -51,16 +51,17 @@ def craft(fmu: Path) -> Craft:
 
 
 def rotated(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return vectors in inertial axes, row by row."""
+    """Return vectors, one in each row, transformed from body to inertial axes."""
     w, xyz = q[:, :1], q[:, 1:]
     across = np.cross(xyz, vectors)
     return vectors + 2 * (w * across + np.cross(xyz, across))
 
 
-def test_wheels_turn_a_craft_that_rests_by_their_momentum(rigid: Craft) -> None:
+def test_wheels_turn_a_craft_at_rest_by_their_momentum(rigid: Craft) -> None:
     """The total angular momentum stays 0, so that omega = -J^-1 h at every time.
 
-    J is that of the whole craft. The torques go through a loop and through `simulate`.
+    J is the inertia of the whole craft. The torques are commands of a loop, or inputs of
+    `simulate`.
     """
     wheels = {name: replace(wheel, speed=0.0) for name, wheel in PYRAMID.items()}
     craft = replace(rigid, wheels=wheels)
@@ -79,10 +80,11 @@ def test_wheels_turn_a_craft_that_rests_by_their_momentum(rigid: Craft) -> None:
     assert run["a.speed"].to_numpy() == pytest.approx(-0.2 / 0.02 * run["time"].to_numpy())
 
 
-def test_a_gyrostat_precesses_as_in_closed_form(rigid: Craft) -> None:
-    """The rates of a symmetric body with a wheel on its axis turn with ((C - A) s + h)/A.
+def test_the_precession_of_a_gyrostat_equals_its_closed_form(rigid: Craft) -> None:
+    """The transverse rate of a symmetric body with a wheel on its axis rotates.
 
-    A and C are the moments of inertia across and along the axis, s the spin, h the momentum.
+    Its angular velocity is ((C - A) s + h)/A, where A and C are the moments of inertia across and
+    along the axis, s is the spin, and h the momentum of the wheel.
     """
     a, c, s, x, h = 500.0, 800.0, 0.02, 0.03, -40.0  # a, c: A, C
     wheel = Wheel((0, 0, 2), 0.1, 1, 1000, h / 0.1)
@@ -100,12 +102,13 @@ def test_a_gyrostat_precesses_as_in_closed_form(rigid: Craft) -> None:
 
 
 @pytest.mark.parametrize("period", [0.05, 0.2])
-def test_angular_momentum_stays_while_wheels_work_against_slosh(
+def test_wheels_and_slosh_do_not_change_the_total_angular_momentum(
     craft: Craft, period: float
 ) -> None:
-    """Without thrust nothing from outside turns the craft, whatever the wheels do.
+    """Without thrust, no external torque acts on the craft.
 
-    The momentum of the wheels is also summed from their speeds; craft and liquid have the rest.
+    The momentum of the wheels is computed from their speeds, the momentum of craft and liquid from
+    their motion.
     """
     free = replace(craft, thrust=0.0, gravity=0.4)
     start = {"init.omega[1]": 0.02, "init.omega[3]": -0.01, "ox.zeta[1]": 0.0}
@@ -123,7 +126,7 @@ def test_angular_momentum_stays_while_wheels_work_against_slosh(
     assert (np.abs(torques).max(axis=0) == 0.3).any() and np.ptp(speeds, axis=0).min() > 1
     own = 0.02 * speeds @ AXES
     assert run[[f"h_wheels[{i}]" for i in (1, 2, 3)]].to_numpy() == pytest.approx(own, abs=1e-11)
-    # the torque of each row turns its wheel until the next, if no limit of speed is met
+    # the torque of each row accelerates its wheel until the next row, below the largest speed
     dt = np.diff(run["time"])[:, None]
     short = np.abs(np.diff(speeds, axis=0)) - np.abs(torques[:-1]) * dt / 0.02
     limited = np.abs(speeds[1:]) == 500
@@ -131,10 +134,10 @@ def test_angular_momentum_stays_while_wheels_work_against_slosh(
     assert (short < -0.1).any()
 
 
-def test_a_saturated_wheel_gives_no_more_momentum(rigid: Craft) -> None:
-    """In a loop and in `simulate` torque and speed stay within the limits.
+def test_a_wheel_at_its_largest_speed_gains_no_more_momentum(rigid: Craft) -> None:
+    """In a loop and in `simulate`, torque and speed stay within their limits.
 
-    A torque that brakes a wheel at its largest speed acts. The craft has the wheel's momentum.
+    A torque that brakes such a wheel acts. The craft has the opposite momentum of the wheel.
     """
     wheel = Wheel((0, 0, 1), 0.01, 0.2, 100, 80.0)
     body = replace(rigid, inertia=[400, 400, 300], wheels={"z": wheel}, center_of_mass=(0, 0, 0))
@@ -150,15 +153,15 @@ def test_a_saturated_wheel_gives_no_more_momentum(rigid: Craft) -> None:
         turned = 0.01 * (speed - 80) / 300
         assert run["omega[3]"].to_numpy() == pytest.approx(-turned, rel=1e-9, abs=1e-15)
         assert run["z.speed"].iloc[-1] == pytest.approx(100 - 0.1 * 3 / 0.01)
-    # the limit is met after 1 s, within the fourth row, until which the torque acts
+    # the wheel reaches its largest speed after 1 s, between two rows; until then the torque acts
     for run in (looped, opened):
         assert run["z.torque"].to_numpy()[:5].tolist() == [-0.2, -0.2, -0.2, -0.2, 0]
     assert looped["omega[3]"].tolist() == opened["omega[3]"].tolist()
     assert opened["torque[1]"].iloc[-1] == 0.6 and opened["torque[1]"].iloc[5] == pytest.approx(0.3)
 
 
-def test_the_loop_is_that_of_single_calls(craft: Craft) -> None:
-    """A loop with a matrix of gains is bit-identical to a loop that calls the FMU itself."""
+def test_a_loop_with_wheels_is_bit_identical_to_single_calls_of_the_fmu(craft: Craft) -> None:
+    """The loop has a matrix of gains; the single calls are made in Python."""
     loop = craft.loop(
         np.linalg.pinv(AXES.T) @ GAINS, 0.1, "50%", command="wheels",
         parameters={"init.omega[1]": 0.01},
@@ -199,7 +202,7 @@ def test_the_loop_is_that_of_single_calls(craft: Craft) -> None:
 def test_a_loop_with_wheels_has_the_margins_of_a_loop_with_torques_and_bias_momentum(
     craft: Craft,
 ) -> None:
-    """Wheels about the body axes have the margins of `torque`, with their bias momentum."""
+    """The wheels turn about the body axes."""
     craft = replace(craft, wheels=BODY_WHEELS)
     there = hubslosh.margins(craft.loop(GAINS, 0.1, "50%", command="wheels", delay=0.05))
     plain = hubslosh.margins(craft.loop(GAINS, 0.1, "50%", delay=0.05))
@@ -212,11 +215,10 @@ def test_a_loop_with_wheels_has_the_margins_of_a_loop_with_torques_and_bias_mome
     assert abs(np.sort(abs(without_bias)) - np.sort(abs(plain.poles))).max() > 3e-5
 
 
-def test_a_wheel_in_a_craft_that_turns_is_a_gyrostat(rigid: Craft) -> None:
-    """The linear model of wheels in a craft that spins has their momentum as states.
-
-    Compared with J w' = -w x (J w + h) + torques, linearised by hand.
-    """
+def test_the_linear_model_of_wheels_in_a_craft_that_spins_has_their_speeds_as_states(
+    rigid: Craft,
+) -> None:
+    """The model equals J w' = -w x (J w + h) + torques, linearised by hand."""
     spin = np.array([0.0, 0.0, 0.4])
     body = replace(rigid, inertia=[500, 500, 800], center_of_mass=(0, 0, 0))
     inertia = np.diag([500.0, 500, 800])
@@ -224,7 +226,7 @@ def test_a_wheel_in_a_craft_that_turns_is_a_gyrostat(rigid: Craft) -> None:
     def cross(v: np.ndarray) -> np.ndarray:
         return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
-    # equal speeds leave a momentum along z, with which the craft turns steadily
+    # equal speeds have a total momentum along z, with which the craft turns steadily
     wheels = {n: replace(w, speed=100.0) for n, w in PYRAMID.items()}
     body = replace(body, wheels=wheels)
     h = sum(wheel.momentum for wheel in wheels.values())
@@ -242,8 +244,8 @@ def test_a_wheel_in_a_craft_that_turns_is_a_gyrostat(rigid: Craft) -> None:
     assert model.states[-4:] == ("a.speed", "b.speed", "c.speed", "d.speed")
 
 
-def test_a_loop_with_wheels_follows_equations_of_its_own(rigid: Craft) -> None:
-    """A spinning craft under a gain and wheels that saturate equals an own integration to 1e-8."""
+def test_a_loop_with_wheels_equals_an_independent_integration(rigid: Craft) -> None:
+    """The case is a spinning craft with wheels that saturate; results agree to 1e-8."""
     body = replace(rigid, center_of_mass=(0, 0, 0))
     gain = -np.linalg.pinv(AXES.T) @ np.diag([30.0, 20.0, 25.0])
     start = {"init.omega[1]": 0.03, "init.omega[2]": -0.02, "init.omega[3]": 0.4}
@@ -265,10 +267,10 @@ def test_a_loop_with_wheels_follows_equations_of_its_own(rigid: Craft) -> None:
     assert np.abs(run[["a.torque", "b.torque"]].to_numpy()).max() == 0.3
 
 
-def test_a_review_and_an_uncertain_model_take_wheels(craft: Craft, tmp_path: Path) -> None:
-    """A review of wheels about the body axes has the margins of a review of a torque.
+def test_reviews_and_uncertain_models_accept_wheels(craft: Craft, tmp_path: Path) -> None:
+    """Wheels about the body axes give the same margins as torques.
 
-    A project file keeps wheels and command.
+    Wheels and command are unchanged after writing and reading a project file.
     """
     craft = replace(craft, wheels=BODY_WHEELS)
     settings = {"draws": 6, "fills": ["40%", "60%"]}
@@ -294,8 +296,8 @@ def test_a_review_and_an_uncertain_model_take_wheels(craft: Craft, tmp_path: Pat
     assert again.loop(0).names[1] == ["x.torque", "y.torque", "z.torque"]
 
 
-def test_wrong_wheels_are_named(rigid: Craft, fmu: Path) -> None:
-    """Messages say what is wrong, where, and what is allowed."""
+def test_errors_name_the_wrong_wheel_and_the_allowed_values(rigid: Craft, fmu: Path) -> None:
+    """Wrong commands and inputs are reported, too."""
     for wheel, what in (
         (Wheel((0, 0, 0), 0.01, 0.2, 400), "axis must not be zero"),
         (Wheel((0, 1), 0.01, 0.2, 400), "axis must be 3 finite numbers"),
@@ -338,7 +340,7 @@ def test_wrong_wheels_are_named(rigid: Craft, fmu: Path) -> None:
     assert "wheels are for Spacecraft" in bench.problems()[0]
 
 
-def test_a_wheel_that_stays_at_its_largest_speed_is_warned_of(rigid: Craft) -> None:
+def test_a_warning_names_a_wheel_that_stays_at_its_largest_speed(rigid: Craft) -> None:
     """A constant torque of 0.2 N·m turns the wheel from 80 to 100 rad/s in 1 s.
 
     A wheel that is braked later, or that reaches the limit only at the end, is not reported.

@@ -1,4 +1,4 @@
-"""Draws fills and slosh models and prints the 95 % quantile of the largest slosh angle."""
+"""Runs a Monte Carlo study of the largest slosh angle and prints its 95 % quantile."""
 
 from typing import Any
 

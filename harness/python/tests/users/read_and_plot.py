@@ -1,4 +1,4 @@
-"""Reads a logger's file, estimates the frequency response and draws both."""
+"""Reads a recording of a data logger, estimates the frequency response and draws both."""
 
 from pathlib import Path
 
