@@ -1,15 +1,15 @@
-"""Compares the spherical model with Basilisk's ``sphericalPendulum`` and writes a page about it.
+"""Compares the spherical slosh model with Basilisk's ``sphericalPendulum``; writes a page.
 
     PYTHONPATH=harness/python python3 harness/studies/basilisk_comparison.py
 
-needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and Python 3.11 or newer; the first run
-makes a virtual environment in the target directory and needs the network. It takes minutes.
+It needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and Python 3.11 or newer. The first run
+creates a virtual environment in the target directory and needs the network. It takes minutes.
 
-Basilisk's spacecraft is free in six degrees of freedom, ours turns about z alone. So Basilisk
-gets a hub of a very large mass M (and, about x and y, moments of inertia of M · 1 m²), with just
-our inertia about z: ``hub.I`` + m0 r², the rigid liquid's share included. Gravity along the
-tank's axis is a thrust (M + m) g along the body's z. What M leaves of the other five degrees of
-freedom goes to zero as 1/M, and the page shows it.
+Basilisk's spacecraft has six degrees of freedom, while HubSlosh turns only about z. Therefore
+Basilisk's hub gets a very large mass M, and moments of inertia of M · 1 m² about x and y. Its
+inertia about z is that of HubSlosh with the rigid liquid, ``hub.I`` + m0 r². A thrust (M + m) g
+along the body's z axis replaces gravity along the tank's axis. The motion in the other five degrees
+of freedom tends to zero as 1/M, which the page shows.
 """
 
 import argparse
@@ -37,10 +37,10 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "book" / "basilisk.md"
 
 DURATION = 20.0  # s
-EVERY = 0.02  # s, between samples
-TOLERANCE = 1e-14  # of our solver
-MASS = 1e14  # kg, of Basilisk's hub where the two are compared
-ALLOWED = 1e-9  # difference over a signal's maximum
+EVERY = 0.02  # time between samples, s
+TOLERANCE = 1e-14  # tolerance of the FMU's solver
+MASS = 1e14  # mass of Basilisk's hub in the comparison, kg
+ALLOWED = 1e-9  # largest difference, relative to the maximum of the signal
 GRAVITY = 9.81  # m/s², the default of g_axial
 LEVER = 0.225  # m, the default of tank.r
 DAMPING = (0.0, 0.003, 0.05)
@@ -53,7 +53,7 @@ Vector = Sequence[float] | np.ndarray
 
 @dataclass(frozen=True)
 class Start:
-    """Start of a run: sin(angle) = displacement/length per axis; y tangential, x radial."""
+    """Start of a run; sin(angle) = displacement/length along x (radial) and y (tangential)."""
 
     text: str
     angle_x: float = 0.0  # rad
@@ -87,9 +87,9 @@ class Case:
 
 
 def starts(length: float) -> dict[str, Start]:
-    """Return the starts of the motions that are compared, for a pendulum of ``length`` (m)."""
+    """Return the start of each compared motion by its name, for a pendulum of ``length`` (m)."""
     cone = np.arcsin(0.3)
-    conical = (GRAVITY / (length * np.cos(cone))) ** 0.5  # of a conical pendulum, rad/s
+    conical = (GRAVITY / (length * np.cos(cone))) ** 0.5  # rate of a conical pendulum, rad/s
     return {
         "pulse": Start("hub and liquid at rest; a torque of 0.05 N·m acts for 1 s", pulse=0.05),
         "release": Start("liquid released at a tangential slosh angle of 0.1 rad", angle_y=0.1),
@@ -141,9 +141,9 @@ def ours(fmu: Path, given: Case, tolerance: float = TOLERANCE) -> Signals:
 
 
 def bob(craft: spacecraft.Spacecraft, pendulum: sphericalPendulum.SphericalPendulum) -> np.ndarray:
-    """Return the bob's direction from the hinge, in the body's frame.
+    """Return the direction from the hinge to the bob, body axes.
 
-    Basilisk turns the pendulum's frame while it runs, to stay away from its singularity.
+    Basilisk rotates the frame of the pendulum during a run, to avoid the singularity of its angles.
     """
     state = craft.dynManager.getStateObject
     phi = state(pendulum.nameOfPhiState).getState()[0][0]
@@ -156,8 +156,8 @@ def bob(craft: spacecraft.Spacecraft, pendulum: sphericalPendulum.SphericalPendu
 def basilisk(given: Case, mass: float, integrator: str = "RKF78", step: float = 1e-3) -> Signals:
     """Return Basilisk's signals every 20 ms.
 
-    ``mass`` is the mass of the hub, kg, ``integrator`` the integrator's name in Basilisk, ``step``
-    its step, s.
+    ``mass`` is the mass of the hub, kg; ``integrator`` is the name of the integrator in Basilisk,
+    and ``step`` its step, s.
     """
     simulation = SimulationBaseClass.SimBaseClass()
     process = simulation.CreateNewProcess("process")
@@ -206,18 +206,18 @@ def basilisk(given: Case, mass: float, integrator: str = "RKF78", step: float = 
 
 
 def pendulum_of(given: Case) -> sphericalPendulum.SphericalPendulum:
-    """Return Basilisk's pendulum, hinged at the tank's place.
+    """Return Basilisk's pendulum, hinged at the position of the tank.
 
-    Its angles start at zero, so its frame's first axis points to where the bob starts. The third
-    lies as near to radial as it can, so that tangential motion turns phi, which is harmless. The
-    damping is the same in all directions and does not care about the frame.
+    Its angles are zero at the start, so that the first axis of its frame points to the bob's start.
+    The third axis is as near to radial as possible, so that tangential motion changes the angle
+    phi, which has no singularity. The damping is the same in all directions.
     """
     start = given.start
     sines = np.sin([start.angle_x, start.angle_y])
     rates = np.cos([start.angle_x, start.angle_y]) * [start.rate_x, start.rate_y]
     down = np.sqrt(1 - sines @ sines)
     bob = np.array([*sines, -down])
-    velocity = np.array([*rates, sines @ rates / down])  # of the direction, 1/s
+    velocity = np.array([*rates, sines @ rates / down])  # derivative of the direction, 1/s
     third = np.array([1.0, 0.0, 0.0]) - bob[0] * bob
     third /= np.linalg.norm(third)
     second = np.cross(third, bob)
@@ -228,7 +228,7 @@ def pendulum_of(given: Case) -> sphericalPendulum.SphericalPendulum:
 def pendulum_at(
     mass: float, length: float, place: Vector, drag: float, axes: Sequence[Vector], rate: Vector
 ) -> sphericalPendulum.SphericalPendulum:
-    """Return a pendulum hinged at a place; its first axis points to where the bob starts."""
+    """Return a pendulum hinged at ``place``; its first axis points to the start of the bob."""
     _, second, third = axes
     pendulum = sphericalPendulum.SphericalPendulum()
     pendulum.massInit = mass
@@ -242,7 +242,7 @@ def pendulum_at(
 
 
 def column(x: float, y: float, z: float) -> list[list[float]]:
-    """Return a vector as Basilisk takes it."""
+    """Return a vector in the form that Basilisk expects, a column matrix."""
     return [[float(x)], [float(y)], [float(z)]]
 
 
@@ -252,7 +252,7 @@ def differences(a: Signals, b: Signals) -> list[float]:
 
 
 def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
-    """Return what the call returns and CPU time for it, s."""
+    """Call a function; return its result and the CPU time, s."""
     begin = time.process_time()
     return signals(), time.process_time() - begin
 
@@ -260,8 +260,8 @@ def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
 def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]:
     """Compare all cases at one mass of the hub.
 
-    Return the table's lines, for each start the largest differences over both fills and every
-    damping ratio, and the largest difference of all.
+    Return the lines of a table, which has for each start the largest differences over both fills
+    and all damping ratios, and the largest difference of the whole table.
     """
     names = list(starts(1.0))
     cases = [(name, case(fmu, name, h, zeta)) for h in FILLS for name in names for zeta in DAMPING]
@@ -281,7 +281,7 @@ def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]
 
 
 def integrators_table(fmu: Path) -> list[str]:
-    """Return the table of each Basilisk integrator's error and of its cost relative to our FMU."""
+    """Return a table of errors of Basilisk's integrators and their CPU times relative to the FMU."""
     given = case(fmu, "release far", 0.10, 0.003)
     own = ours(fmu, given)
     rows = []
@@ -305,10 +305,10 @@ def integrators_table(fmu: Path) -> list[str]:
 
 
 def rounding(fmu: Path) -> tuple[dict[str, float], float]:
-    """Show how undamped motion magnifies small differences.
+    """Measure how undamped motion magnifies small differences.
 
-    Return the change of our motion, by start, if the start's angle is the next larger number, and
-    the change of the start *very far* at a tolerance of 1e-12.
+    Return the change of the FMU's motion, by start, if the start angle is the next larger number,
+    and the change of the motion *very far* with a tolerance of 1e-12.
     """
     moved = {}
     for name in ("release far", "very far"):
@@ -326,7 +326,7 @@ def page(
     ulp: dict[str, float],
     looser: float,
 ) -> str:
-    """Return the page: two tables, the largest difference, and the results of `rounding`."""
+    """Return the page with two tables, the largest difference, and the results of `rounding`."""
     far, very = ulp["release far"], ulp["very far"]
     described = "\n".join(f"* *{name}*: {start.text}." for name, start in starts(1.0).items())
     return "\n".join([
@@ -403,10 +403,11 @@ def page(
 
 
 def write(out: Path, text: str, worst: float) -> None:
-    """Write the page, unless the largest difference exceeds the allowed one."""
+    """Write the page, or exit with an error if the largest difference exceeds `ALLOWED`."""
     if worst > ALLOWED:
         sys.exit(
-            f"{text}\nerror: {worst:.1e} is more than the {ALLOWED:.0e} allowed; nothing written"
+            f"{text}\nerror: the largest difference is {worst:.1e} (allowed: up to {ALLOWED:.0e}); "
+            "the page is not written"
         )
     half_written = out.with_suffix(".tmp")
     half_written.write_text(text, encoding="utf-8")
@@ -415,7 +416,7 @@ def write(out: Path, text: str, worst: float) -> None:
 
 
 def main() -> None:
-    """Compare and write the page."""
+    """Run the comparison and write the page."""
     parser = argparse.ArgumentParser(description="Compares the spherical model with Basilisk's.")
     parser.add_argument("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu", metavar="FILE")
     parser.add_argument("--out", type=Path, default=PAGE, metavar="FILE", help="the page to write")

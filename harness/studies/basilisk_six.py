@@ -1,13 +1,14 @@
-"""Compares Spacecraft.fmu with Basilisk's spacecraft in six degrees of freedom and writes a page.
+"""Compares Spacecraft.fmu with Basilisk's spacecraft in six degrees of freedom; writes a page.
 
     PYTHONPATH=harness/python python3 harness/studies/basilisk_six.py
 
-needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft --out
-dist/Spacecraft.fmu``) and Python 3.11 or newer; the first run makes a virtual environment in the
+It needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft --out
+dist/Spacecraft.fmu``) and Python 3.11 or newer. The first run creates a virtual environment in the
 target directory and needs the network. It takes a minute or two.
 
-Basilisk's hub is our dry craft with the rigid liquids; each tank is a ``sphericalPendulum``. Both
-fly freely from the same start under forces and torques that are constant over some seconds.
+In Basilisk, the hub is the dry craft with the rigid liquids, and each tank is a
+``sphericalPendulum``. Both craft fly freely from the same start, under forces and torques that are
+constant over some seconds.
 """
 
 import argparse
@@ -43,17 +44,17 @@ except ModuleNotFoundError as missing:
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "modelDescription" / "Spacecraft" / "documentation" / "basilisk.md"
 
-TOLERANCE = 1e-13  # of our solver where the two are compared
+TOLERANCE = 1e-13  # tolerance of the FMU's solver in the comparison
 SIGNALS = ("attitude", "omega", "position", "velocity", "p[1]", "p[2]")
 
 
 @dataclass(frozen=True)
 class Tank:
-    """A tank with one mode; the start values of Spacecraft.fmu are another tank."""
+    """A tank with one mode; its values differ from the start values of Spacecraft.fmu."""
 
     position: tuple[float, float, float]  # m, from O
     q: tuple[float, float, float, float] = (1, 0, 0, 0)  # tank to body axes
-    p: tuple[float, float, float] = (0, 0, -1)  # where the bob starts, tank axes
+    p: tuple[float, float, float] = (0, 0, -1)  # direction of the bob at the start, tank axes
     p_dot: tuple[float, float, float] = (0, 0, 0)  # 1/s
     m_0: float = 114.356  # kg
     H_0: float = 0.0246138  # m
@@ -69,9 +70,9 @@ class Tank:
 
 @dataclass(frozen=True)
 class Case:
-    """Inputs of one comparison, for both codes.
+    """Inputs of one comparison, for both programs.
 
-    Each of the segments has its end (s), force (N) and torque (N·m), body axes.
+    Each segment has its end (s), and a constant force (N) and torque (N·m), body axes.
     """
 
     text: str
@@ -79,11 +80,11 @@ class Case:
     tanks: tuple[Tank, Tank]
     omega: tuple[float, float, float] = (0, 0, 0)  # rad/s
     zeta: float = 0.01
-    mass: float = 1180.0  # kg, dry
-    r: tuple[float, float, float] = (0.012, -0.018, 0.21)  # m, its centre of mass from O
+    mass: float = 1180.0  # dry mass, kg
+    r: tuple[float, float, float] = (0.012, -0.018, 0.21)  # dry centre of mass from O, m
     J: np.ndarray = field(
         default_factory=lambda: np.array([[910, 14, -9], [14, 860, 6], [-9, 6, 640.0]])
-    )  # kg·m², about its centre of mass
+    )  # dry inertia about the dry centre of mass, kg·m²
 
     @property
     def duration(self) -> float:
@@ -91,7 +92,7 @@ class Case:
         return self.segments[-1][0]
 
 
-G_REF = 1.5  # m/s², at which zeta holds
+G_REF = 1.5  # specific force for which zeta is given, m/s²
 UPRIGHT = (Tank((0.62, 0, -0.2)), Tank((-0.62, 0, -0.2)))
 LEANING = (
     Tank((0.62, 0.1, -0.2), q=(0.98, 0.1, -0.15, 0.05), p=(0.3, -0.2, -0.9), p_dot=(0.4, 0.3, 0)),
@@ -146,7 +147,7 @@ def drag(case: Case, tank: Tank) -> float:
 def ours(fmu: Path, case: Case, start: Signals, tolerance: float = TOLERANCE) -> Signals:
     """Return the signals of our FMU every 20 ms, simulated in steps of 20 ms.
 
-    ``start`` has Basilisk's first samples.
+    ``start`` has the first samples of Basilisk's signals, from which the FMU starts.
     """
     settings: dict[str, float | int] = {"craft.mass": case.mass, "tanks": 2}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2),
@@ -198,17 +199,17 @@ def ours(fmu: Path, case: Case, start: Signals, tolerance: float = TOLERANCE) ->
 def basilisk(case: Case, integrator: str = "RKF78", step: float = 1e-3) -> Signals:
     """Return Basilisk's signals every 20 ms.
 
-    ``integrator`` is the integrator's name in Basilisk, ``step`` its step, s.
+    ``integrator`` is the name of the integrator in Basilisk, and ``step`` its step, s.
     """
     simulation = SimulationBaseClass.SimBaseClass()
     process = simulation.CreateNewProcess("process")
     process.addTask(simulation.CreateNewTask("task", macros.sec2nano(step)))
 
-    # The rigid part: dry craft and rigid liquids about their common centre of mass.
+    # rigid part of the craft: dry craft and rigid liquids about their common centre of mass
     parts = [(case.mass, np.array(case.r), case.J)]
     for tank in case.tanks:
         e = tank.axes()[:, 2]
-        # I_z = 0
+        # the rigid liquid has no inertia about the tank's axis, I_z = 0
         inertia = tank.I_0 * (np.eye(3) - np.outer(e, e))
         parts.append((tank.m_0, np.array(tank.position) + tank.H_0 * e, inertia))
     mass = sum(m for m, *_ in parts)
@@ -253,9 +254,9 @@ def basilisk(case: Case, integrator: str = "RKF78", step: float = 1e-3) -> Signa
 
 
 def pendulum_of(case: Case, tank: Tank) -> sphericalPendulum.SphericalPendulum:
-    """Return Basilisk's pendulum.
+    """Return Basilisk's pendulum for a tank.
 
-    Its angles start at zero, so that its first axis points to where the bob starts.
+    Its angles are zero at the start, so that its first axis points to the start of the bob.
     """
     axes = tank.axes()
     first = np.array(tank.p) / np.linalg.norm(tank.p)
@@ -270,7 +271,10 @@ def pendulum_of(case: Case, tank: Tank) -> sphericalPendulum.SphericalPendulum:
 
 
 def cost_table(fmu: Path, exact: Signals) -> list[str]:
-    """Return the table of error and CPU time of both codes for *thrown*; ours at 1e-8 is 1."""
+    """Return a table with the errors and CPU times of both programs for the case *thrown*.
+
+    CPU times are relative to Spacecraft.fmu at the tolerance 1e-8.
+    """
     case = CASES["thrown"]
     rows = []
     for tolerance in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
@@ -337,7 +341,7 @@ def page(cases: list[str], cost: list[str], worst: float) -> str:
 
 
 def main() -> None:
-    """Compare and write the page."""
+    """Run the comparison and write the page."""
     parser = argparse.ArgumentParser(description="Compares Spacecraft.fmu with Basilisk.")
     parser.add_argument(
         "--fmu", type=Path, default=ROOT / "dist" / "Spacecraft.fmu", metavar="FILE"

@@ -1,19 +1,19 @@
-"""Hold models of the liquid, damping that grows with amplitude, and seeds against a bench.
+"""Compares models of damping and of the onset of rotary slosh with measurements on a bench.
 
     PYTHONPATH=harness/python python3 harness/studies/bench_damping.py [--jobs N] [--out FILE.csv]
 
-needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt. Sine
-sweeps of 1.25 to 3.5 Hz in 2700 s, both fills of the bench, by
+It needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
+It simulates sine sweeps of 1.25 to 3.5 Hz in 2700 s, for both fills of the bench, with:
 
 * `slosh.model`: linear, spherical, liquid,
 * `slosh.zeta_amplitude`: 0 to 0.016 1/rad,
-* what a real bench has that starts rotary slosh (`SEEDS`).
+* disturbances of a real bench that can start rotary slosh (`SEEDS`).
 
-For each model it prints the largest hub acceleration at 0.25 N·m and at 0.0125 N·m, by central
-differences of the rate at 50 Hz; the second also for the rate that the specified gyro reads. It
-also prints the first amplitude of the ladder at which the liquid swirls. Rubaga's thesis has 2.21
-and 0.222 rad/s², and swirl from 0.075 to 0.1 N·m. Prints the tables of book/damping.md. Some 370
-runs: half an hour of CPU time.
+For each model it prints the largest angular acceleration of the hub at the torque amplitudes 0.25
+and 0.0125 N·m, by central differences of the rate at 50 Hz; for 0.0125 N·m also from the rate that
+the specified gyro measures. It also prints the smallest amplitude of `LADDER` at which the slosh
+becomes rotary. Rubaga's thesis has 2.21 and 0.222 rad/s², and rotary slosh from 0.075 to 0.1 N·m.
+The output is the tables of book/damping.md. Some 370 runs take half an hour of CPU time.
 """
 
 import argparse
@@ -37,7 +37,8 @@ FILLS = (0.05, 0.10)  # m
 MODELS = ("linear", "spherical", "liquid")
 GROWTHS = (0.0, 0.012, 0.016)  # 1/rad
 
-# Parameters, and the standard deviation of white torque noise at 50 Hz, N·m.
+# Disturbances that can start rotary slosh: parameters, and the standard deviation of white torque
+# noise at 50 Hz, N·m.
 SEEDS = {
     "none": ({}, 0.0),
     "waves": ({"init.slosh_angle_radial": np.radians(2.0)}, 0.0),
@@ -45,12 +46,13 @@ SEEDS = {
     "noise": ({}, 2e-3),
 }
 
-# Swirl: over two seconds the radial swing is half of the tangential one and above 3 degrees.
+# Slosh counts as rotary if, over two seconds, the radial amplitude is at least half the tangential
+# amplitude and above 3 degrees.
 WINDOW, SHARE, LEAST = 2.0, 0.5, np.radians(3.0)
 
 
 def sweep(amplitude: float, noise: float) -> pd.DataFrame:
-    """Return the torque of the thesis's sweep, linear in frequency, and the other inputs."""
+    """Return the inputs: the thesis's sweep of the torque, linear in frequency, and torque noise."""
     time = np.arange(round(DURATION / STEP)) * STEP
     phase = 2 * np.pi * (FIRST * time + (LAST - FIRST) / (2 * DURATION) * time**2)
     columns = {"time": time, "tau_cmd": amplitude * np.sin(phase)}
@@ -120,9 +122,9 @@ def case(key: tuple[str, float, float, str]) -> dict[str, object]:
 
 
 def cases() -> list[tuple[str, float, float, str]]:
-    """Return all cases.
+    """Return all cases: slosh model, growth of damping, fill and seed.
 
-    A linear liquid stays in its plane, whatever the seed, so it has one seed.
+    The linear model has only one seed, because its liquid always stays in its plane.
     """
     every = product(MODELS, GROWTHS, FILLS, SEEDS)
     return [key for key in every if key[0] != "linear" or key[3] == "none"]
@@ -140,7 +142,7 @@ MEASURED = "| measured on the bench (thesis 7.1, 7.2) | | | 2.21 | | 0.222 | 0.0
 
 
 def text(rows: pd.DataFrame) -> str:
-    """Return the tables, Markdown."""
+    """Return the tables in Markdown."""
     lines = []
     for fill in FILLS:
         lines.append(" | ".join((f"| {fill * 100:.0f} cm fill: slosh model", *HEADS)) + " |")
@@ -160,7 +162,7 @@ def main() -> None:
     """Run all cases and print the tables."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--jobs", type=int, default=2, help="processes")
-    options.add_argument("--out", type=Path, help="where to put the rows, CSV")
+    options.add_argument("--out", type=Path, help="also write the rows to this CSV file")
     given = options.parse_args()
     with ProcessPoolExecutor(given.jobs) as pool:
         rows = pd.DataFrame(pool.map(case, cases()))

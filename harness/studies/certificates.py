@@ -1,9 +1,9 @@
-"""How close the certificate of an uncertain loop is to its worst case.
+"""Compares the sizes of certificates of robust stability with the sizes of worst cases.
 
-The loops are the 20 fills of example 14 and random craft with a PD controller. Each row has the
-certified size, the size of the worst case divided by it, and the CPU time of the search and of the
-certificate together, on one core. ``--draws`` also counts unstable loops among random Δ within the
-certificate.
+The loops are the 20 fills of example 14, and random craft with a PD controller. Each row has the
+certified size, the ratio of the size of the worst case to the certified size, and the CPU time of
+search and certificate together, on one core. ``--draws`` also counts unstable loops among random Δ
+within the certified size.
 
     python3 harness/studies/certificates.py [--fills 97% 60%] [--craft 10] [--draws 100000]
 """
@@ -45,8 +45,8 @@ def example(fill: str) -> tuple[hubslosh.UncertainModel, hubslosh.Loop]:
 def random_craft(seed: int) -> tuple[hubslosh.UncertainModel, hubslosh.Loop]:
     """Return the model and the loop of a random craft with one or two tanks.
 
-    Uncertain are frequency (10 %) and damping of mode 1 of each tank, and a moment of inertia
-    (10 %).
+    The uncertain quantities are frequency (10 %) and damping of mode 1 of each tank, and one moment
+    of inertia (10 %).
     """
     random = np.random.default_rng(seed)
     mass = random.uniform(400, 2000)  # kg
@@ -77,7 +77,7 @@ def random_craft(seed: int) -> tuple[hubslosh.UncertainModel, hubslosh.Loop]:
 def unstable_draws(
     model: hubslosh.UncertainModel, loop: hubslosh.Loop, found: hubslosh.Certificate, draws: int
 ) -> int:
-    """Return how many random Δ, uniform within the certificate, make the sampled loop unstable."""
+    """Return the number of random Δ, uniform within the certified size, with an unstable loop."""
     random, count, linear = np.random.default_rng(1), 0, loop.linear()
     low = np.maximum(-found.size, list(found.least.values()))
     for _ in range(draws):

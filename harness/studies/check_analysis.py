@@ -1,9 +1,9 @@
-"""Computes the features of a campaign of sweeps again, from its stored runs, with numpy and scipy.
+"""Checks the results of a campaign of sweeps by an independent analysis of its stored runs.
 
-It is written from the definitions in book/campaign_methods.md, not
-from the harness's code, and shares no part of it: another Fourier transform, another least-squares
-solver, another discretisation. Where the two differ by more than the tolerances below, one of them
-does not do what the documentation says.
+This program is written from the definitions in book/campaign_methods.md, with numpy and scipy, and
+shares no code with the harness: it has another Fourier transform, another least-squares solver and
+another discretisation. If results differ by more than the tolerances below, then one of the two
+programs does not follow the documentation.
 
     python check_analysis.py dist/campaign
 """
@@ -44,8 +44,9 @@ TOLERANCES = {
     "off_axis_energy": 1e-6,
     "leakage": 1e-6,
 }
-"""Largest difference between the harness's value and ours, in the column's unit. The two fits leave
-residuals that differ a little, so skewness and kurtosis do; sums over the same samples do not."""
+"""Largest allowed difference between the two programs, in the unit of the column. Skewness and
+kurtosis may differ because the residuals of the two fits differ slightly; sums over the same
+samples may not."""
 
 
 @dataclass
@@ -92,7 +93,7 @@ class Sweep:
 
     @property
     def lag(self) -> float:
-        """Longest lag of ``spa``, s: 200 for the thesis's band, at most half of the record."""
+        """Longest lag of ``spa``, s: 200 for the thesis's band, but at most half the recording."""
         slower = np.sqrt(1.25 * 3.5 / (self.f0 * self.f1))
         return min(200 * slower, self.duration / 2)
 
@@ -103,7 +104,7 @@ class Sweep:
 
 
 def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real) -> Complex:
-    """Fourier coefficients at the sweep's phase, in a Hann window of at most 24 cycles."""
+    """Return Fourier coefficients at the sweep's phase, in Hann windows of at most 24 cycles."""
     carrier = np.exp(-1j * sweep.phase(time))
     response = np.empty(len(grid), complex)
     for i, (f, centre) in enumerate(zip(grid, sweep.time_of(grid), strict=True)):
@@ -115,7 +116,7 @@ def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real)
 
 
 def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Complex:
-    """Blackman and Tukey's estimate at the frequencies of ``grid``, with lags up to ``lag`` s."""
+    """Return the Blackman–Tukey estimate at the frequencies ``grid``, with lags up to ``lag`` s."""
     u, y = torque - torque.mean(), output - output.mean()
     last = min(round(lag / step), len(u) - 1)
     lags = np.arange(-last, last + 1)
@@ -124,7 +125,7 @@ def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Comp
 
     def transformed(x: Real) -> Complex:
         covariance = signal.correlate(x, u, method="fft")[middle - last : middle + last + 1]
-        # the sum over all lags, in rows of 256 lags whose turns are a common factor
+        # sum over all lags, in rows of 256 lags that share a phase factor
         rows = np.pad(covariance * taper, (0, -len(lags) % 256)).reshape(-1, 256)
         turn = -2j * np.pi * step * grid
         within = np.exp(np.outer(np.arange(256), turn))
@@ -135,7 +136,8 @@ def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Comp
 
 
 def features(grid: Real, response: Complex) -> Features:
-    """Antiresonance and resonance: both ends of the largest rise of |H| (dB) with the frequency."""
+    """Return antiresonance and resonance, the ends of the largest rise of |H| (dB) over frequency.
+    """
     level = 20 * np.log10(np.abs(response))
     lowest = np.minimum.accumulate(level)
     high = int(np.argmax(level - lowest))
@@ -162,7 +164,10 @@ def features(grid: Real, response: Complex) -> Features:
 
 @dataclass
 class Model:
-    """``numerator(s) / ((s + p) (s² + 2 ζ ω s + ω²))``, s in rad/s, powers of s falling."""
+    """Transfer function ``numerator(s) / ((s + p) (s² + 2 ζ ω s + ω²))``, s in rad/s.
+
+    Coefficients begin with the highest power of s.
+    """
 
     numerator: Real
     p: float
@@ -181,7 +186,10 @@ class Model:
 
 
 def fit(grid: Real, measured: Complex) -> Model:
-    """Least squares on the complex response: search of poles, best numerator for each."""
+    """Fit a model to a complex response by least squares.
+
+    The poles are optimised; for given poles the numerator follows from linear least squares.
+    """
     unit = 2 * np.pi * grid.mean()
     s = 2j * np.pi * grid / unit
     target = np.concatenate([measured.real, measured.imag])
@@ -211,20 +219,21 @@ def fit(grid: Real, measured: Complex) -> Model:
 def residual_of(model: Model, step: float, torque: Real, rate: Real) -> Real:
     """Return the measured rate minus the rate of the model.
 
-    The model gets the torque as straight lines, and the initial state with which it fits best.
+    The torque is interpolated linearly; the initial state of the model is fitted.
     """
     driven = signal.TransferFunction(model.numerator, model.denominator()).to_ss()
     time = np.arange(len(torque)) * step
     _, forced, _ = signal.lsim(driven, torque, time)
     poles = np.roots(model.denominator())
     free = np.concatenate([[np.exp(p * time).real, np.exp(p * time).imag] for p in poles]).T
-    # twins are one, and the real pole's imaginary part is none: the solver takes the least weights
+    # columns of conjugate poles coincide, and the imaginary part of the real pole's column is 0;
+    # lstsq then returns the solution with the smallest norm
     missing = rate - rate.mean() - forced
     return missing - free @ np.linalg.lstsq(free, missing, rcond=1e-9)[0]
 
 
 def coherence(step: float, torque: Real, output: Real, length: int) -> tuple[Real, Real]:
-    """Welch's coherence: Hamming windows, half overlap, zeros added to four times the length."""
+    """Return Welch's coherence, with half-overlapping, zero-padded Hamming windows."""
     window = signal.windows.hamming(length, sym=True)
     return signal.coherence(
         torque - torque.mean(),
@@ -294,7 +303,7 @@ def analyse(path: Path) -> tuple[Features, Features]:
     some = squares[1] > 0
     values["off_axis_median"] = float(np.median(squares[0][some] / squares[1][some]))
     values["off_axis_energy"] = float(squares[0].sum() / squares[1].sum())
-    # the tank's arm is not a stored signal: the plan's or the FMU's start value
+    # the arm of the tank is not stored as a signal; it is in the settings, or the FMU's start value
     settings = dict(pair.split("=", 1) for pair in notes["settings"].split())
     arm = float(settings.get("tank.r", 0.225))
     values["leakage"] = float(np.sqrt(np.mean(np.abs(arm * force) ** 2)))
@@ -306,7 +315,7 @@ def analyse(path: Path) -> tuple[Features, Features]:
 def compare(
     campaign: Path, analyse: Callable[[Path], tuple[Features, Features]] = analyse
 ) -> list[str]:
-    """Analyse all runs of a campaign; return the features that exceed their tolerances."""
+    """Analyse all runs of a campaign; return one line for each feature that differs too much."""
     rows = {}
     with (campaign / "runs.csv").open(newline="") as file:
         rows["features.csv"] = [row for row in csv.DictReader(file) if not row["error"]]
@@ -337,14 +346,14 @@ def compare(
 
 
 def main() -> None:
-    """Compare a campaign's tables with this analysis; exit with 1 if they differ."""
+    """Compare the tables of a campaign with this analysis; exit with 1 if they differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("campaign", type=Path, help="directory that hubslosh campaign left")
+    parser.add_argument("campaign", type=Path, help="directory with the results of a campaign")
     campaign = parser.parse_args().campaign
     if not (campaign / "runs.csv").is_file():
-        parser.error(f"{campaign} has no runs.csv; hubslosh campaign --out {campaign} makes it")
+        parser.error(f"{campaign} has no runs.csv; hubslosh campaign --out {campaign} writes it")
     differences = compare(campaign)
-    print("\n".join(differences) or "the tables are what the documentation says")
+    print("\n".join(differences) or "the tables agree with this analysis")
     sys.exit(bool(differences))
 
 

@@ -1,20 +1,21 @@
-"""Makes the runs of a campaign's plan on a Dask cluster, with the package hubslosh as host.
+"""Simulates the runs of a campaign's plan on a Dask cluster, with the Python package as host.
 
     PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan monte_carlo --workers 4
     PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan mine.toml --scheduler tcp://head:8786
 
-needs dist/HubSlosh.fmu and the program hubslosh (``cargo run --release -- pack`` makes both) and
-Python 3.11 or newer; the first start makes a virtual environment in the target directory and
-needs the network. Without ``--scheduler`` the workers are processes of this machine.
+It needs dist/HubSlosh.fmu and the program hubslosh (``cargo run --release -- pack`` builds both)
+and Python 3.11 or newer. The first start creates a virtual environment in the target directory and
+needs the network. Without ``--scheduler`` the workers are processes on this machine.
 
-``hubslosh campaign --list`` says what is to be run, ``hubslosh torque`` with which torque. A worker
-gets the FMU once, and torque and settings with every run; it sends the signals back: no disk is
-shared. This side writes runs/<name>.parquet, each whole or not at all. In the end ``hubslosh
-campaign`` reads the runs and writes tables and report: the same as if it had made them.
+``hubslosh campaign --list`` lists the runs, and ``hubslosh torque`` computes their torques. A
+worker receives the FMU once, and torque and settings for each run. It sends the signals back, so
+that no shared disk is needed. This program writes them to runs/<name>.parquet; a file is never
+incomplete. Finally ``hubslosh campaign`` reads the runs and writes the same tables and report as if
+it had simulated the runs itself.
 
-Start the same command again after an interruption: runs that are stored are reused. A run
-whose worker dies is given to another worker. Workers of a real cluster need ``--nthreads 1``, the
-system and processor of this machine, and the packages of requirements-cluster.txt.
+After an interruption start the same command again: stored runs are reused. If a worker dies,
+another worker repeats its run. Workers of a real cluster need ``--nthreads 1``, the same operating
+system and processor type as this machine, and the packages of requirements-cluster.txt.
 """
 
 import argparse
@@ -48,7 +49,7 @@ try:
 except ModuleNotFoundError as missing:
     environment.run_again_in("cluster", missing)
 
-# workers have no file of ours but those that `prepare` sends: what they call travels with the call
+# Send functions of this module by value, because workers have only the files that `prepare` sends.
 cloudpickle.register_pickle_by_value(sys.modules[__name__])
 
 Run = dict[str, Any]
@@ -58,7 +59,7 @@ TORQUE_COLUMNS = ("time", hubslosh.TORQUE, "tau_slope")
 
 
 class CampaignError(Exception):
-    """Reason why the runs cannot start, or cannot go on."""
+    """Raised if the runs cannot start or cannot continue."""
 
 
 class Harness:
@@ -69,7 +70,7 @@ class Harness:
         self.program, self.fmu, self.plan, self.out = program, fmu, plan, out
 
     def listing(self) -> dict[str, Any]:
-        """Return the list of the plan's runs that are to be simulated."""
+        """Return the list of the plan's runs, from ``hubslosh campaign --list``."""
         return json.loads(self._say(*self._campaign(), "--list"))
 
     def torque(self, run: Run) -> list[np.ndarray]:
@@ -84,10 +85,10 @@ class Harness:
             return [table[name].to_numpy() for name in TORQUE_COLUMNS]
 
     def analyse(self) -> bool:
-        """Write tables and report from the stored runs.
+        """Write tables and report from the stored runs by ``hubslosh campaign``.
 
-        Return True if all runs are in them. The program's output goes to the terminal. It also
-        simulates runs that are not stored, as always.
+        Return True if they contain all runs. The output of the program goes to the terminal. The
+        program also simulates runs that are not stored.
         """
         return subprocess.run([self.program, *self._campaign()]).returncode == 0
 
@@ -99,8 +100,8 @@ class Harness:
             done = subprocess.run([self.program, *arguments], capture_output=True, text=True)
         except OSError as error:
             raise CampaignError(
-                f"{self.program} cannot be started ({error}); cargo run --release -- pack "
-                "makes it, or say where it is with --hubslosh"
+                f"{self.program} cannot be started ({error}); build it by cargo run --release -- "
+                "pack, or give its path with --hubslosh"
             ) from None
         if done.returncode != 0:
             raise CampaignError(done.stderr.strip().removeprefix("error: "))
@@ -108,9 +109,9 @@ class Harness:
 
 
 def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
-    """Return the reason why a file is not this run, complete; None if it is.
+    """Return the reason why a file is not a complete record of a run, or None if it is one.
 
-    The harness judges the stored runs by the same rules when it reads them.
+    The harness applies the same rules when it reads stored runs.
     """
     try:
         file = pyarrow.parquet.ParquetFile(path)
@@ -165,10 +166,13 @@ def drive_here(
 
 
 class Package(WorkerPlugin):
-    """The package hubslosh without FMUs, as a folder: compiled code cannot be loaded from a zip."""
+    """Installs the package hubslosh on workers, without FMUs.
+
+    It is sent as a folder, because compiled code cannot be loaded from a ZIP file.
+    """
 
     def __init__(self) -> None:
-        """Read the package's files; the compiled half gets the name that Python looks for."""
+        """Read the files of the package; the compiled part gets the name that Python expects."""
         source = Path(hubslosh.__file__).parent
         native = Path(str(sys.modules["hubslosh._native"].__file__))
         self.files = {file.name: file.read_bytes() for file in source.iterdir() if file.is_file()}
@@ -182,13 +186,13 @@ class Package(WorkerPlugin):
         for name, content in self.files.items():
             (folder / "hubslosh" / name).write_bytes(content)
         sys.path.insert(0, str(folder))
-        import hubslosh.simulation  # noqa: F401 - it may lack a package
+        import hubslosh.simulation  # noqa: F401 - fails here if the worker lacks a package
 
 
 def prepare(client: Client, fmu: Path, sha256: str) -> str:
     """Give every worker, also those that start later, the FMU and the package hubslosh.
 
-    Return the FMU's file name there. Workers that cannot host the FMU are refused.
+    Return the path of the FMU on the workers. Raise CampaignError if workers cannot host the FMU.
     """
     threads = client.nthreads()
     if not threads:
@@ -196,12 +200,12 @@ def prepare(client: Client, fmu: Path, sha256: str) -> str:
     many = [address for address, count in threads.items() if count != 1]
     if many:
         raise CampaignError(
-            f"start the workers with --nthreads 1, one per core: {', '.join(many)} "
-            "would make several runs in turns, as Python runs one thread at a time"
+            f"start the workers with --nthreads 1, one per core: {', '.join(many)} have several "
+            "threads, of which Python runs only one at a time"
         )
     data = fmu.read_bytes()
     if hashlib.sha256(data).hexdigest() != sha256:
-        raise CampaignError(f"{fmu} has changed while it was read; start the command again")
+        raise CampaignError(f"{fmu} changed while it was read; start the command again")
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / f"{sha256}.fmu"
         copy.write_bytes(data)
@@ -210,8 +214,8 @@ def prepare(client: Client, fmu: Path, sha256: str) -> str:
             client.register_plugin(Package(), name="hubslosh")
         except ImportError as error:
             raise CampaignError(
-                f"the workers lack a package ({error}); requirements-cluster.txt says which "
-                "they need"
+                f"the workers lack a package ({error}); install the packages of "
+                "requirements-cluster.txt"
             ) from None
     return copy.name
 
@@ -221,8 +225,8 @@ def make_runs(
 ) -> dict[str, str]:
     """Simulate all runs of the plan that are not stored yet.
 
-    Return by name why runs have failed. A run is written as soon as its worker returns it, and then
-    `made` is called with it.
+    Return the reason of each failure by the name of the run. A run is written as soon as its worker
+    returns it, and then `made` is called with the run.
     """
     store = Store.campaign(harness.out, "cluster.py")
     try:
@@ -234,7 +238,7 @@ def make_runs(
 def make_runs_in(
     store: Store, client: Client, harness: Harness, made: Callable[[Run], None]
 ) -> dict[str, str]:
-    """`make_runs` in a locked directory."""
+    """Do the work of `make_runs` in a directory that is locked already."""
     todo = harness.listing()
     columns = todo["columns"]
     missing = []
@@ -252,7 +256,7 @@ def make_runs_in(
     print(f"{len(missing)} runs to simulate, {there} reused; {len(client.nthreads())} workers")
 
     failed: dict[str, str] = {}
-    runs = {}  # by key, those that are under way
+    runs = {}  # runs in progress, by key
 
     def futures() -> Iterator[Any]:
         torque, torque_of = [], None
@@ -260,7 +264,8 @@ def make_runs_in(
             of = (run["profile"], run["step"], run["sample"], run["stop"], run["hold"])
             if of != torque_of:
                 torque, torque_of = harness.torque(run), of
-            key = f"{run['name']}-{os.urandom(8).hex()}"  # the scheduler must not know it already
+            # a new key, because the scheduler would reuse the result of a known key
+            key = f"{run['name']}-{os.urandom(8).hex()}"
             runs[key] = run
             yield client.submit(drive_here, fmu, run, torque, columns, key=key)
 
@@ -268,8 +273,8 @@ def make_runs_in(
     under_way = as_completed()
 
     def fill() -> None:
-        # One run per worker at a time: a run that kills its worker takes no other with it, and
-        # torques and signals do not pile up on the scheduler.
+        # Give each worker one run at a time, so that a run that kills its worker affects no other
+        # run, and torques and signals do not accumulate on the scheduler.
         while len(runs) < max(1, len(client.nthreads())):
             future = next(coming, None)
             if future is None:
@@ -288,9 +293,9 @@ def make_runs_in(
                 table, said = future.result()
             except FutureCancelledError:
                 raise CampaignError(
-                    "the scheduler is gone; start the same command again to go on from here"
+                    "the scheduler has ended; start the same command again to continue"
                 ) from None
-            except Exception as error:  # whatever went wrong on the worker, with this run alone
+            except Exception as error:  # any error on the worker concerns only this run
                 table, said = None, reason(error)
             if table is None:
                 failed[run["name"]] = said
@@ -308,15 +313,15 @@ def make_runs_in(
 
 
 def reason(error: BaseException) -> str:
-    """Return the reason of a run's failure other than a message of the FMU, in words for users."""
+    """Return the reason of a run's failure, for an error that is not a message of the FMU."""
     if isinstance(error, KilledWorker):
-        return f"{error.allowed_failures + 1} workers died while they made it"
+        return f"{error.allowed_failures + 1} workers died while they simulated it"
     return f"{type(error).__name__}: {error}"
 
 
 @contextmanager
 def cluster(workers: int, scheduler: str | None) -> Iterator[Client]:
-    """Yield a client of the cluster at that address, or of one of this machine's processes."""
+    """Yield a client of the cluster at the address ``scheduler``, or of local processes."""
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout="10s")
@@ -337,7 +342,7 @@ def cluster(workers: int, scheduler: str | None) -> Iterator[Client]:
 
 
 def arguments(description: str) -> argparse.ArgumentParser:
-    """Return the flags that say which program, FMU, plan and workers."""
+    """Return a parser of the flags for program, FMU, plan and workers."""
     program = environment.target() / "release" / ("hubslosh.exe" if os.name == "nt" else "hubslosh")
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument(
@@ -362,8 +367,8 @@ def positive(text: str) -> int:
 
 
 def main() -> None:
-    """Make the runs, then have the harness analyse them."""
-    parser = arguments("Makes a plan's runs on a Dask cluster.")
+    """Simulate the runs, then analyse them by ``hubslosh campaign``."""
+    parser = arguments("Simulates the runs of a plan on a Dask cluster.")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
         help="of a running Dask cluster, tcp://HOST:PORT [default: workers on this machine]",
@@ -376,7 +381,7 @@ def main() -> None:
     out = args.out or Path("dist") / Path(args.plan).stem
     harness = Harness(args.hubslosh, args.fmu, args.plan, out)
     try:
-        harness.listing()  # what is wrong with the plan is said before any worker starts
+        harness.listing()  # report errors in the plan before workers are started
         with cluster(args.workers, args.scheduler) as client:
             failed = make_runs(client, harness)
     except (CampaignError, hubslosh.FmuError) as error:

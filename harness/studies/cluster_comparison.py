@@ -1,14 +1,14 @@
-"""Makes a plan's runs twice and says how far the tables differ: by the harness, and by Dask.
+"""Simulates the runs of a plan both by the harness and by Dask, and compares the results.
 
     export PYTHONPATH=harness/python
     python3 harness/studies/cluster_comparison.py --plan monte_carlo --workers 2
 
-The Dask workers host the FMU by the Python package; as soon as there is a run, one of them is
-killed in the middle of another. Compared are all columns of features.csv, features_spa.csv and
-runs.csv and all signals of all runs. Ends with an error if anything differs by more than 1e-9 of
-itself.
+The Dask workers host the FMU by the Python package. After the first run is finished, one worker is
+killed in the middle of another run. The program compares all columns of features.csv,
+features_spa.csv and runs.csv, and all signals of all runs. It ends with an error if a relative
+difference exceeds 1e-9.
 
-Needs what cluster.py needs. The 200 runs of monte_carlo take some minutes on two cores.
+It needs what cluster.py needs. The 200 runs of monte_carlo take some minutes on two cores.
 """
 
 import csv
@@ -19,7 +19,7 @@ import sys
 import time
 from pathlib import Path
 
-import cluster  # first: it makes the virtual environment and starts this program in it
+import cluster  # import first, because it restarts this program in a virtual environment
 
 # isort: split
 import numpy as np
@@ -30,29 +30,29 @@ from distributed import Client
 import hubslosh
 
 MOST = 1e-9
-"""Largest difference that passes, relative."""
+"""Largest allowed relative difference."""
 
 
 class Killer:
     """Kills one local worker in the middle of a run, after the first run is finished."""
 
     def __init__(self, client: Client) -> None:
-        """Store the client; `made` kills the worker."""
+        """Store the client; no worker is killed yet."""
         self.client = client
         self.process: int | None = None
-        """The killed worker's process."""
+        """Process of the killed worker."""
         self.interrupted = ""
-        """The run that it was making."""
+        """Name of the run that the worker was simulating."""
 
     def made(self, run: cluster.Run) -> None:
-        """Kill a worker that is busy, unless one was killed before. It is called after each run."""
+        """Kill a busy worker after the first run; this method is called after each run."""
         if self.process is not None:
             return
         for address, process in self.client.run(os.getpid).items():
-            # stopped first: so it cannot end its run between the look and the blow
+            # stop the worker first, so that it cannot finish its run before it is killed
             worker = psutil.Process(process)
             worker.suspend()
-            time.sleep(0.2)  # what it said before has arrived
+            time.sleep(0.2)  # wait until messages that the worker has sent have arrived
             busy = self.client.processing().get(address, ())
             if busy:
                 self.process, self.interrupted = process, busy[0].rpartition("-")[0]
@@ -62,7 +62,7 @@ class Killer:
 
 
 def difference(a: str, b: str) -> float:
-    """Return the difference of two cells: of numbers the relative one, of texts 0 or infinity."""
+    """Return the relative difference of two numbers; for texts, 0 if equal and infinity if not."""
     if a == b:
         return 0.0
     try:
@@ -79,7 +79,7 @@ def table_differences(one: Path, other: Path) -> dict[str, float]:
         with path.open(newline="") as file:
             tables.append(list(csv.reader(file)))
     if tables[0][0] != tables[1][0] or len(tables[0]) != len(tables[1]):
-        sys.exit(f"error: {one} and {other} have not the same columns and rows")
+        sys.exit(f"error: {one} and {other} do not have the same columns and rows")
     rows = list(zip(*(table[1:] for table in tables), strict=True))
     return {
         name: max((difference(a[i], b[i]) for a, b in rows), default=0.0)
@@ -88,7 +88,7 @@ def table_differences(one: Path, other: Path) -> dict[str, float]:
 
 
 def signal_differences(one: Path, other: Path, columns: list[str]) -> dict[str, float]:
-    """Return the largest difference in each column of two runs, over the column's largest value."""
+    """Return the largest difference in each column of two runs, relative to its largest value."""
     a, b = (pyarrow.parquet.read_table(path, columns=columns).to_pandas() for path in (one, other))
     largest = {name: np.abs(a[name]).max() for name in columns}
     return {
@@ -97,25 +97,25 @@ def signal_differences(one: Path, other: Path, columns: list[str]) -> dict[str, 
 
 
 def maker(path: Path) -> str:
-    """Return the program that made a stored run, from the run's metadata."""
+    """Return the name of the program that simulated a stored run, from the run's metadata."""
     return (pyarrow.parquet.read_schema(path).metadata or {}).get(b"made_by", b"").decode()
 
 
 def compare(
     client: Client, ours: cluster.Harness, theirs: cluster.Harness
 ) -> tuple[dict[str, float], Killer]:
-    """Simulate the plan's runs in both ways; return the largest difference of every column.
+    """Simulate the runs of the plan in both ways; return the largest difference of every column.
 
-    ``ours`` is the directory of the harness, ``theirs`` that of Dask, one of whose workers is
-    killed; the latter is emptied first. Columns are named file:column; those of the signals start
-    with runs:.
+    ``ours`` has the directory for the harness, and ``theirs`` the directory for Dask, which is
+    emptied first. Columns are named file:column; names of signals begin with runs:. A worker of
+    Dask is killed during the runs.
     """
     shutil.rmtree(theirs.out, ignore_errors=True)
     killer = Killer(client)
     failed = cluster.make_runs(client, theirs, killer.made)
     for harness in (theirs, ours):
         if not harness.analyse() or failed:
-            sys.exit(f"error: not all runs of {harness.plan} could be made")
+            sys.exit(f"error: not all runs of {harness.plan} could be simulated")
     worst: dict[str, float] = {}
 
     def note(file: str, columns: dict[str, float]) -> None:
@@ -132,8 +132,8 @@ def compare(
 
 
 def main() -> None:
-    """Compare both ways, and print the largest differences."""
-    parser = cluster.arguments("Compares a plan's runs by the harness with those by Dask.")
+    """Run the comparison, and print the largest differences."""
+    parser = cluster.arguments("Compares the runs of a plan by the harness with runs by Dask.")
     parser.add_argument(
         "--out", type=Path, metavar="DIRECTORY",
         help="for both campaigns [default: dist/cluster_comparison/ and the plan's name]",
@@ -145,7 +145,7 @@ def main() -> None:
         for name in ("harness", "dask")
     )
     try:
-        theirs.listing()  # what is wrong with the plan is said before any worker starts
+        theirs.listing()  # report errors in the plan before workers are started
         with cluster.cluster(args.workers, None) as client:
             worst, killer = compare(client, ours, theirs)
     except (cluster.CampaignError, hubslosh.FmuError) as error:

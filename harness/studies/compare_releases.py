@@ -1,19 +1,20 @@
-"""Compares the motion of two builds of HubSlosh.fmu: the newest release and the present one.
+"""Compares the motion of two builds of HubSlosh.fmu: the newest release and the present build.
 
     export PYTHONPATH=harness/python
     python3 harness/studies/compare_releases.py [--before FMU] [--now FMU] [--short]
 
-needs dist/HubSlosh.fmu and the package's compiled half (``cargo run --release -- pack``,
-``cargo build --release -p hubslosh-native``) and Python 3.11 or newer; the first run makes a
-virtual environment in the target directory and needs the network. It takes some minutes, with
-``--short`` (300 s instead of 2700 s of every sweep) some seconds.
+It needs dist/HubSlosh.fmu and the package's compiled part (``cargo run --release -- pack``,
+``cargo build --release -p hubslosh-native``) and Python 3.11 or newer. The first run creates a
+virtual environment in the target directory and needs the network. It takes some minutes or, with
+``--short`` (300 s instead of 2700 s of every sweep), some seconds.
 
-Every slosh model with every friction law of 0.1.0, 300 s, wheel and gyro on; the 22 sine sweeps
-of Rubaga's thesis, 2700 s each, linear and spherical. Of every output and every single local that
-both builds have the largest difference is taken over the signal's maximum. The difference must be
-at most 1e-13, or SENSITIVE times the older build's change when the last bit of a parameter changes:
-a motion that amplifies a last bit so much has no more valid digits. Ends with 1 where neither
-holds. ``omega_imu`` is left out: 0.1.0 took samples a step late from some 50 s on.
+The runs are every slosh model with every friction law of version 0.1.0, with wheel and gyro, for
+300 s; and the 22 sine sweeps of Rubaga's thesis, 2700 s each, with the linear and the spherical
+model. For each output and scalar local variable that both builds have, the largest difference is
+divided by the maximum of the signal. This must be at most 1e-13, or at most SENSITIVE times the
+change of the older build if the last bit of a parameter changes, because the other digits of a
+motion that amplifies a last bit so much are not valid. Otherwise the program exits with 1.
+``omega_imu`` is left out, because version 0.1.0 took samples a step late from some 50 s on.
 """
 
 import argparse
@@ -47,7 +48,7 @@ Parameters = dict[str, Value]
 
 
 def sweep(amplitude: float, seconds: float) -> pd.DataFrame:
-    """Return the torque of an exponential sweep, 1.25 to 3.5 Hz, N·m."""
+    """Return the torque (N·m) of a sweep from 1.25 to 3.5 Hz, exponential in frequency."""
     time = np.arange(round(seconds / STEP) + 1) * STEP
     rate = math.log(3.5 / 1.25) / seconds
     torque = amplitude * np.sin(math.tau * 1.25 * np.expm1(rate * time) / rate)
@@ -55,7 +56,7 @@ def sweep(amplitude: float, seconds: float) -> pd.DataFrame:
 
 
 def runs(seconds: float) -> list[tuple[str, Parameters, pd.DataFrame]]:
-    """Return the name, the parameters and the torque of every run that is compared."""
+    """Return the name, the parameters and the torque of every compared run."""
     all_runs: list[tuple[str, Parameters, pd.DataFrame]] = []
     torque = sweep(0.1, 300.0)
     for slosh, friction in itertools.product(SLOSH, FRICTION):
@@ -71,7 +72,7 @@ def runs(seconds: float) -> list[tuple[str, Parameters, pd.DataFrame]]:
 
 
 def signals(*fmus: Path) -> list[str]:
-    """Return the outputs and local variables that all builds have, without arrays and gyro."""
+    """Return the names of outputs and scalar local variables that all builds have, without gyro."""
     names = [Fmu.open(fmu).names("output", "local") for fmu in fmus]
     common = set(names[0]).intersection(*names) - {"omega_imu"}
     return [name for name in names[0] if name in common and "[" not in name and "(" not in name]
@@ -83,7 +84,7 @@ def run(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: list[str
 
 
 def difference(one: pd.DataFrame, other: pd.DataFrame, names: list[str]) -> tuple[float, str]:
-    """Return the largest difference of a signal over its maximum, and the name of the signal."""
+    """Return the largest difference relative to its signal's maximum, and the signal's name."""
     largest = (0.0, "")
     for name in names:
         a, b = one[name].to_numpy(float), other[name].to_numpy(float)
@@ -94,7 +95,7 @@ def difference(one: pd.DataFrame, other: pd.DataFrame, names: list[str]) -> tupl
 
 
 def sensitivity(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: list[str]) -> float:
-    """Return the largest difference that a change of a parameter's last bit makes."""
+    """Return the largest difference that a change of the last bit of a parameter causes."""
     reference = run(fmu, parameters, torque, names)
     found = 0.0
     for name, toward in itertools.product(("hub.I", "tank.r"), (0.0, math.inf)):

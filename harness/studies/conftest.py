@@ -1,4 +1,4 @@
-"""Fixtures of the studies' short forms: packed FMUs and the program.
+"""Fixtures of the tests of the studies: packed FMUs and the program. To run the tests by hand:
 
     for model in HubSlosh Spacecraft SloshTank; do
         cargo run --release -- pack --model $model --out dist/$model.fmu
@@ -35,7 +35,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the long tests, unless the option for all tests is given."""
+    """Deselect the long tests, unless --long is given."""
     if not config.getoption("--long"):
         items[:] = [item for item in items if item.get_closest_marker("long") is None]
 
@@ -49,14 +49,14 @@ def fmu(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def program(request: pytest.FixtureRequest) -> Path:
-    """Return the program ``hubslosh``, which the package uses from here on."""
+    """Return the path of the program ``hubslosh``, and make the package use it."""
     path: Path = request.config.getoption("--hubslosh").absolute()
     os.environ["HUBSLOSH"] = os.fspath(path)
     return path
 
 
 def same_picture(drawing: str, committed: Path) -> None:
-    """Compare a drawing with the one in the book: the same text, positions equal to 0.2 px."""
+    """Check that a drawing equals a committed drawing: equal texts, and positions within 0.2 px."""
     texts = (drawing, committed.read_text(encoding="utf-8"))
     assert NUMBER.sub("0", texts[0]) == NUMBER.sub("0", texts[1])
     places = [np.array(NUMBER.findall(text), float) for text in texts]

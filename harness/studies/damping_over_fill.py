@@ -1,8 +1,8 @@
-"""Draw the damping ratio of a sphere and a capsule over the fill: book/damping.svg.
+"""Draws the damping ratio of a sphere and a capsule over the fill, book/damping.svg.
 
     PYTHONPATH=harness/python python3 harness/studies/damping_over_fill.py
 
-needs the program ``hubslosh`` and matplotlib. 90 fills of each tank; a minute of work.
+It needs the program ``hubslosh`` and matplotlib. It computes 90 fills of each tank in a minute.
 """
 
 import io
@@ -29,7 +29,7 @@ NU, GRAVITY = 1e-6, 0.3  # m²/s, m/s²
 
 
 def damping(shape: str, fills: list[str]) -> pd.DataFrame:
-    """Damping ratio of mode 1 at each fill, with its interval, by ``hubslosh tank --sweep``."""
+    """Return the damping ratio of mode 1 at each fill, with its interval, by ``hubslosh tank``."""
     with tempfile.TemporaryDirectory() as folder:
         tank = Path(folder) / "tank.toml"
         tank.write_text(f"density = 1000\nshape = {{ {shape} }}\n", encoding="utf-8")

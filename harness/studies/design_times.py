@@ -1,10 +1,10 @@
-"""CPU and elapsed time of the design steps of one satellite with two tanks of two modes.
+"""Measures CPU and elapsed time of design steps, for a satellite with two tanks of two modes.
 
     python3 harness/studies/design_times.py
     python3 harness/studies/design_times.py --before dist/release/hubslosh-0.5.0-….whl
 
-The satellite is that of example 14, its controller has 15 states. `--before` also runs what an
-older wheel can: margins, and a tenth of the Monte Carlo runs.
+The satellite is that of example 14; its controller has 15 states. With `--before`, the steps that
+an older wheel has are also measured: margins, and a tenth of the Monte Carlo runs.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "examples" / "14_telecom_satellite"
 FILLS, POINTS, RUNS, STOP = 40, 1000, 300, 300.0
-"""Fills of the family, points of the review, runs, and seconds of each."""
+"""Number of fills of the family, points of the review and Monte Carlo runs; seconds per run."""
 RATE = 1e-3
 """Angular velocity at the start of a run, rad/s."""
 
@@ -38,7 +38,7 @@ class Time:
     cpu: float
     """CPU time of this process and its children, s."""
     elapsed: float
-    """s"""
+    """Elapsed time, s."""
 
     def __str__(self) -> str:
         """Return a row of a Markdown table."""
@@ -54,7 +54,7 @@ HEAD = (
 
 
 def timed(what: str, count: int, step: Callable[[], Any]) -> tuple[Time, Any]:
-    """Return the time that ``step`` takes, and the value that it returns."""
+    """Call ``step``; return its time and its result."""
     before, begin = os.times(), time.monotonic()
     found = step()
     after, end = os.times(), time.monotonic()
@@ -71,7 +71,7 @@ def satellite() -> tuple[Any, Any]:
 
 
 def loop_of(given: dict[str, Any]) -> Any:
-    """Return the control loop that a file describes."""
+    """Return the control loop with the parameters and matrices in ``given``."""
     import control
 
     import hubslosh
@@ -105,14 +105,14 @@ def loop_steps(loop: Any, inertia: float, runs: int, stop: float) -> list[Time]:
 
 
 def now(fills: int, points: int, runs: int, stop: float) -> tuple[list[Time], dict[str, Any]]:
-    """Return the times of the design steps in this version, and the loop as a file describes it."""
+    """Return the times of the design steps in this version, and the loop as a dict for a file."""
     import numpy as np
 
     import hubslosh
 
     telecom, design_review = satellite()
     craft = telecom.craft
-    craft.linearize("50%")  # reads the FMU
+    craft.linearize("50%")  # read the FMU before the time is measured
     over = [f"{fill:g}%" for fill in np.linspace(4, 97, fills)]
 
     def family() -> list[Any]:
@@ -154,7 +154,7 @@ for step in design_times.loop_steps(loop, 1150.0, int(sys.argv[3]), float(sys.ar
 
 
 def before(wheel: Path, given: dict[str, Any], runs: int, stop: float) -> str:
-    """Return the table's rows for the version of HubSlosh in an older wheel."""
+    """Return the rows of the table for an older wheel of HubSlosh."""
     with tempfile.TemporaryDirectory(prefix="hubslosh-") as folder:
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(folder)
@@ -169,7 +169,7 @@ def before(wheel: Path, given: dict[str, Any], runs: int, stop: float) -> str:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table of times."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--before", type=Path, metavar="WHEEL", help="an older wheel to compare")
     args = parser.parse_args()

@@ -1,16 +1,18 @@
-"""A flight in twins: what slews of 0.3° with two gyros of different quality tell of slosh.
+"""Identifies slosh from simulated flights (twins) with slews of 0.3° and gyros of two qualities.
 
     python flight_twin.py [--gyro good|mems] [--twins 1] [--known exact|wrong|tolerances]
 
 A second simulator, independent of Spacecraft.fmu, flies a rigid craft with two tanks under thrust.
-It solves Newton's law of craft and bobs, with the rods' tensions as unknowns, as one dense system
-by Runge–Kutta. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. Three gyros
-with scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The
-search starts at the values that `hubslosh tank` computes from the tanks' drawing; the true values
-differ from them by up to 10 %. With --known wrong, dry mass, thrust, hinges and rigid liquids are
-off by their tolerances, too; with --known tolerances, the fit takes these tolerances into account.
+It integrates Newton's law of craft and bobs by Runge–Kutta, as one dense system with the tensions
+of the rods as unknowns. Wheels turn the craft by 0.3° to and fro, and thrusters fire sideways. The
+recordings of two flights at 10 Hz have three gyros, with errors of scale and alignment and with
+biases, and an accelerometer. The fit starts at the values that `hubslosh tank` computes from the
+drawing of the tanks, which differ from the true values by up to 10 %. With --known wrong, dry mass,
+thrust, hinges and rigid liquids also have errors of the size of their tolerances. With --known
+tolerances, the fit takes these tolerances into account.
 
-Prints estimates and true values; for several twins also how many intervals contain the true value.
+The program prints estimates and true values; for several twins it also prints how many intervals
+contain the true value.
 """
 
 import argparse
@@ -33,16 +35,16 @@ TANK = """
 density = 1000.0
 shape = { cylinder = { radius = 0.4, height = 1.0 } }
 """
-# origin of each tank from O: its lowest point on the axis, m
+# position of each tank's origin from O, which is its lowest point, m
 PLACES = ((0.0, 0.0, -0.75), (0.0, 0.0, 0.45))
 FILLS = (0.6, 0.35)  # m
-NOISE = {  # of a row: gyro, rad/s, and its drift; accelerometer, m/s²; biases, scale, alignment
+NOISE = {  # gyro noise per row and drift, rad/s; accelerometer, m/s²; biases, scale, alignment
     "good": {"w": 9e-6, "drift": 0.0, "a": 3e-4, "b": 5e-6, "scale": 1e-3, "angle": 1e-3},
     "mems": {"w": 2.8e-4, "drift": 5e-5, "a": 3e-3, "b": 1e-3, "scale": 1e-2, "angle": 1e-2},
 }
 
 
-TOLERANCES = {  # standard deviations of known values: part, or m
+TOLERANCES = {  # standard deviations of known values, relative or in m
     "craft.mass": "0.5%",
     "scale(force[3])": "0.3%",
     "tank[1].hinge[1]": "±0.005",
@@ -65,10 +67,10 @@ def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 class Craft:
-    """The second simulator. Parameters by their names in Spacecraft.fmu; body axes, about O."""
+    """The second simulator; parameters have their names in Spacecraft.fmu, body axes, about O."""
 
     def __init__(self, p: dict[str, float]) -> None:
-        """Set up the rigid part: dry craft and rigid liquids."""
+        """Compute the rigid part of the craft: dry craft and rigid liquids."""
         mass, at = p["craft.mass"], np.array([p[f"craft.r[{i}]"] for i in (1, 2, 3)])
         inertia = np.diag([p[f"craft.J{i}{i}"] for i in "xyz"])
         rigid = [(mass, at, inertia)]
@@ -93,7 +95,7 @@ class Craft:
         self.matrix[3:6, 3:6] = self.inertia
 
     def solve(self, x: np.ndarray, u: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Solve for specific force, w', p'' and the pull T of each rod.
+        """Solve for the specific force, w', and p'' and the tension T of the rod of each bob.
 
         ``x`` has w, then p and p' of each bob; ``u`` has force, torque and momentum h of the
         wheels; ``slope`` is h'.
@@ -105,7 +107,7 @@ class Craft:
         for i, (mass, length, drag, hinge) in enumerate(self.bobs):
             p, p_dot = x[3 + 6 * i : 6 + 6 * i], x[6 + 6 * i : 9 + 6 * i]
             rho, push, k = hinge + length * p, drag * length * p_dot, 6 + 4 * i
-            # on the craft: the rod's pull T p and the drag, both at the bob
+            # the craft feels the tension T p of the rod and the damping force, both at the bob
             right[:3] += push
             right[3:6] += times(rho, push)
             m[:3, k + 3] = -p
@@ -117,13 +119,13 @@ class Craft:
             m[k : k + 3, k + 3] = p
             turning = times(w, times(w, rho)) + 2.0 * length * times(w, p_dot)
             right[k : k + 3] = -push - mass * turning
-            # |p| = 1
+            # constraint |p| = 1
             m[k + 3, k : k + 3] = p
             right[k + 3] = -p_dot @ p_dot
         return np.linalg.solve(m, right)
 
     def rate(self, x: np.ndarray, u: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Return x'."""
+        """Return the derivative of the state, x'."""
         solved, dx = self.solve(x, u, slope), np.empty_like(x)
         dx[:3] = solved[3:6]
         for i in range(len(self.bobs)):
@@ -135,13 +137,13 @@ class Craft:
         """Simulate a flight with commanded attitudes and sideways forces; angles are small."""
         x = np.concatenate([np.zeros(3), *(np.array([0, 0, -1.0, 0, 0, 0]) for _ in self.bobs)])
         angle, h, rows = np.zeros(3), np.zeros(3), []
-        # the engine is trimmed: thrust through the centre of mass turns nothing
+        # the engine is trimmed, so that its thrust acts through the centre of mass
         total = self.mass + sum(m for m, _, _, _ in self.bobs)
         down = np.array([0.0, 0.0, 1.0])
         center = self.moment + sum(m * (hinge - rod * down) for m, rod, _, hinge in self.bobs)
         trim = times(center / total, np.array([0.0, 0.0, self.thrust]))
         for row in range(ROWS):
-            # proportional, derivative; a torque of the wheels over the next step
+            # PD controller: torque of the wheels over the next step
             torque = -np.diag(self.inertia) * (0.5 * (angle - slew[row]) + 0.9 * x[:3])
             torque = np.clip(torque, -3.0, 3.0)
             force = np.array([*pulse[row], self.thrust])
@@ -222,10 +224,7 @@ def measured(
     errors: np.ndarray,
     truth: dict,
 ) -> pd.DataFrame:
-    """Return the sensors' readings of a flight.
-
-    Adds the biases of the sensors to the true values.
-    """
+    """Return the readings of the sensors in a flight, and add their biases to ``truth``."""
     number = 1 + sum(name.startswith("bias(omega[1])") for name in truth)
     table = flight.copy()
     table[OMEGA] = flight[OMEGA].to_numpy() @ (np.eye(3) + errors).T
@@ -240,13 +239,13 @@ def measured(
             for kick in noise["drift"] * np.sqrt(1 - keep**2) * random.normal(size=ROWS - 1):
                 drift.append(keep * drift[-1] + kick)
             table[name] += drift
-            # a flight cannot tell the drift's mean from the bias
+            # the mean of the drift counts as bias, because a flight cannot separate the two
             truth[f"bias({name})@{number}"] += np.mean(drift)
     return table
 
 
 def deviation(name: str, start: dict[str, float]) -> float:
-    """Return the standard deviation with which a known value is known."""
+    """Return the standard deviation of a known value."""
     size = TOLERANCES[name]
     if not size.endswith("%"):
         return float(size.removeprefix("±"))
@@ -327,7 +326,7 @@ def twin(
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the tables of estimates and of coverage."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--gyro", default="good", choices=list(NOISE), help="which gyro")
     parser.add_argument(

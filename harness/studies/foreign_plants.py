@@ -1,14 +1,15 @@
-"""Benches outside the model of `hubslosh identify bench`, and twins within it.
+"""Tests `hubslosh identify bench` with benches outside its model, and with twins within its model.
 
     python3 harness/studies/foreign_plants.py plants [--only NAME,…] [--amplitudes 0.05,0.15]
     python3 harness/studies/foreign_plants.py twins --habits [--seeds 1-12]
 
-The benches are `foreign_plants.c`, compiled by `cc`: equations, integrator and draws of their own,
-and nothing of HubSlosh. `plants` have an effect that HubSlosh does not have. An identification of
-such a recording is wrong if it says that the model fits while the true value is beyond five
-standard deviations and outside the interval, or if it names a cause that does not act. `twins` are
-benches within the model; with `--habits` the k-th is recorded with the k-th habit of loggers.
-Prints tables in Markdown; `--keep` keeps recordings and results.
+`foreign_plants.c`, compiled by `cc`, simulates the benches with equations, an integrator and random
+draws of its own; it contains nothing of HubSlosh. `plants` have an effect that HubSlosh does not
+have. Their identification is wrong if the verdict is that the model fits although a true value is
+outside its interval and more than five standard deviations off, or if the verdict names a cause
+that does not act. `twins` are benches within the model; with `--habits`, each is recorded with
+another imperfection of data loggers. The program prints tables in Markdown; `--keep` keeps
+recordings and results.
 """
 
 import argparse
@@ -33,14 +34,14 @@ from identify_twins import Tally, Twin
 
 ROOT = Path(__file__).resolve().parents[2]
 XI = 1.8411837813406593  # first zero of the derivative of the Bessel function J1
-WRONG = 5.0  # standard deviations beyond which a fit that is called good is wrong
-STEP = 1e-3  # of the integration, s
+WRONG = 5.0  # error in standard deviations beyond which a fit with a good verdict counts as wrong
+STEP = 1e-3  # step of the integration, s
 LIQUIDS = ("linear", "planar", "spherical")
 ARRAYS = np.ctypeslib.ndpointer(dtype=float, flags="C")
 
 
 class Bench(ctypes.Structure):
-    """`struct bench` of foreign_plants.c."""
+    """The structure `bench` of foreign_plants.c."""
 
     _fields_ = [
         *((name, ctypes.c_double) for name in ("I_a", "I_b", "stiffness", "shaft_damping", "play")),
@@ -66,7 +67,7 @@ def compile_plant(folder: str) -> ctypes.CDLL:
 
 
 def first_mode(d: float, h: float, rho: float) -> tuple[float, float, float]:
-    """Return mass and length of an upright cylinder's first mode, and the mass of the liquid."""
+    """Return mass and length of the first mode of an upright cylinder, and the liquid's mass."""
     filling = tanh(2 * XI * h / d)
     liquid = rho * pi / 4 * d**2 * h
     return liquid * d * filling / (XI * (XI**2 - 1) * h), d / (2 * XI * filling), liquid
@@ -76,19 +77,19 @@ def first_mode(d: float, h: float, rho: float) -> tuple[float, float, float]:
 class Setup:
     """A bench, its torque, its sensors and its logger; SI units."""
 
-    parameters: dict[str, float]  # by their names in the FMU: the truth
+    parameters: dict[str, float]  # true values by their names in the FMU
     liquid: str = "linear"
-    effects: dict[str, float] = field(default_factory=dict)  # fields of Bench
+    effects: dict[str, float] = field(default_factory=dict)  # further fields of Bench
     torque: Callable[[np.ndarray], np.ndarray] = np.zeros_like
-    actuator: Callable[[np.ndarray], np.ndarray] = np.array  # torque that acts for a command
-    hold: str = "held"  # how the torque runs between rows
+    actuator: Callable[[np.ndarray], np.ndarray] = np.array  # acting torque from command
+    hold: str = "held"  # intersample behaviour of the torque
     duration: float = 600.0
     rate: float = 50.0  # rows per second
     arm: float = 0.225
     gravity: float = 9.81
     density: float = 1000.0
-    torque_scale: float = 1.0  # recorded torque over the true one
-    clock: float = 1.0  # recorded time over the true one
+    torque_scale: float = 1.0  # ratio of the recorded to the true torque
+    clock: float = 1.0  # ratio of the recorded to the true time
     delay: float = 0.0
     gyro_scale: float = 1.0
     gyro_bias: float = 0.0
@@ -97,12 +98,12 @@ class Setup:
     drift: float = 7.85e-5
     drift_time: float = 100.0
     lsb: float = 1.53e-4
-    clip: float = 0.0  # part of the largest rate at which the gyro clips
-    jitter: float = 0.0  # of the rows' times, parts of a row
-    lost: float = 0.0  # part of the rows
+    clip: float = 0.0  # rate at which the gyro clips, as a fraction of the largest rate
+    jitter: float = 0.0  # jitter of the times, as a fraction of a row
+    lost: float = 0.0  # fraction of the rows that is lost
     gaps: int = 0
-    spikes: float = 0.0  # part of the rows
-    stamp: float = 0.0  # least step of the recorded times
+    spikes: float = 0.0  # fraction of the rows with a spike
+    stamp: float = 0.0  # resolution of the recorded times, s
     arguments: list[str] = field(default_factory=list)
 
     def bench(self) -> Bench:
@@ -147,7 +148,7 @@ class Setup:
         return bench
 
     def move(self, plant: ctypes.CDLL, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants and the hub's rates there; the torque is commanded at `rows`."""
+        """Simulate torques commanded at the times `rows`; return times and rates of the hub."""
         count = round(1 / (self.rate * STEP))
         part = np.arange(count) / count
         begin = (rows[:-1, None] + np.diff(rows)[:, None] * part).ravel()
@@ -175,7 +176,7 @@ class Setup:
         instants, rates = self.move(plant, rows)
         if self.gyro_lag:
             keep = np.exp(-STEP / self.gyro_lag)
-            middle = 1 - (1 - keep) * self.gyro_lag / STEP  # exact for a rate that is a line
+            middle = 1 - (1 - keep) * self.gyro_lag / STEP  # exact if the rate is linear in time
             rates = lfilter([middle, 1 - keep - middle], [1, -keep], rates)
         rate = CubicSpline(instants, rates)(np.maximum(rows - self.delay, 0.0))
         keep = np.exp(-1 / (self.rate * self.drift_time))
@@ -210,12 +211,12 @@ class Setup:
 
 
 def sweep(amplitude: float, f0: float, f1: float, duration: float) -> Callable:
-    """Return a sweep that is linear in frequency."""
+    """Return a function of time, a sine sweep that is linear in frequency."""
     return lambda t: amplitude * np.sin(2 * pi * (f0 * t + (f1 - f0) / (2 * duration) * t**2))
 
 
 def noise(random: Generator, rms: float, band: tuple[float, float], period: float) -> Callable:
-    """Return a sum of sines with random phases in a band."""
+    """Return a function of time, a sum of sines with random phases in a frequency band."""
     lines = np.fft.rfftfreq(round(200 * period), 1 / 200)
     spectrum = np.exp(2j * pi * random.uniform(size=lines.size))
     spectrum[(lines < band[0]) | (lines > band[1])] = 0.0
@@ -227,15 +228,15 @@ def noise(random: Generator, rms: float, band: tuple[float, float], period: floa
 
 
 def turning(amplitude: float, duration: float) -> Callable:
-    """Return a sweep with a slow sine that turns the hub several times."""
+    """Return a function of time, a sweep plus a slow sine that turns the hub several times."""
     fast = sweep(amplitude, 1.5, 3.6, duration)
     return lambda t: fast(t) + 0.05 * np.sin(2 * pi * t / 60)
 
 
 def draw(random: Generator, duration: float) -> Setup:
-    """Return a bench drawn within 30 % of the thesis's.
+    """Return a random bench, whose values are within 30 % of the bench of the thesis.
 
-    Its known values are within their tolerances.
+    Errors of its known values are within their tolerances.
     """
 
     def near(value: float) -> float:
@@ -302,8 +303,8 @@ HABITS: dict[str, dict] = {
 class Plant:
     """An effect of the bench that the fitted models do not have."""
 
-    change: Callable[[Setup, Generator, float], None]  # of a setup, for an amplitude of the torque
-    causes: str  # causes that are right, as a regular expression
+    change: Callable[[Setup, Generator, float], None]  # applies the effect for a torque amplitude
+    causes: str  # regular expression of the causes that are true
     spread: dict[str, float] = field(default_factory=dict)  # largest relative change of parameters
 
 
@@ -331,12 +332,12 @@ def actuator(law: Callable) -> Callable[[Setup, Generator, float], None]:
 
 
 def dead_zone(u: np.ndarray, x: float, _: float) -> np.ndarray:
-    """Take 2 to 5 mN·m from the torque."""
+    """Return the torque of an actuator with a dead zone of 2 to 5 mN·m."""
     return np.sign(u) * np.maximum(abs(u) - 0.002 - 0.003 * x, 0.0)
 
 
 def periodic_friction(setup: Setup, random: Generator, amplitude: float) -> None:
-    """Let the dry friction vary once a revolution, while the hub turns."""
+    """Let the dry friction vary once per revolution, and make the hub turn."""
     setup.torque = turning(amplitude, setup.duration)
     setup.effects["periodic"] = random.uniform(0.3, 0.6)
 
@@ -347,9 +348,10 @@ def slow_clipped_gyro(setup: Setup, random: Generator, _: float) -> None:
 
 
 def wrong_fill(option: str, known: str) -> Callable[[Setup, Generator, float], None]:
-    """Return a change that states a fill 50 % too high.
+    """Return a function that gives `identify` a fill 50 % too high.
 
-    Much smaller errors are no misfit: the torque's tolerance of 1 % is 5 to 9 % of the fill.
+    Much smaller errors would not be a misfit, because the torque's tolerance of 1 % corresponds to
+    5 to 9 % of the fill.
     """
 
     def change(setup: Setup, *_: object) -> None:
@@ -417,7 +419,7 @@ PLANTS = {
 
 
 def run(program: str, twin: Twin, arguments: Iterable[str], path: Path) -> tuple[dict | str, float]:
-    """Identify a recording; return the result, or the words of a refusal, and the CPU time in s."""
+    """Identify a recording; return the result, or the error message, and the CPU time, s."""
     twin.table.to_csv(path, index=False)
     result = path.with_suffix(".json")
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -431,9 +433,9 @@ def run(program: str, twin: Twin, arguments: Iterable[str], path: Path) -> tuple
 
 
 def beyond(found: dict, truth: dict[str, float], spread: dict[str, float]) -> list[str]:
-    """Return the parameters that are more than five standard deviations off.
+    """Return the parameters whose errors exceed five standard deviations.
 
-    A parameter with a spread changes during the recording, by this fraction to both sides at most.
+    ``spread`` has the largest relative change of parameters that vary during the recording.
     """
     wrong = []
     for name, e in (found["parameters"] | found["measurement"]).items():
@@ -467,7 +469,7 @@ def judge(found: dict, plant: Plant, twin: Twin) -> list[str]:
 
 
 def options_of(setup: Setup, seed: int, models: str | None) -> list[str]:
-    """Return the options of a user, who knows the torque between rows for twins with even seeds."""
+    """Return command-line options; for even seeds, the intersample behaviour is given as known."""
     hold = ["--torque", setup.hold] if seed % 2 == 0 else []
     return ["--model", models or setup.liquid, *hold, *setup.arguments]
 
@@ -500,7 +502,7 @@ def plants(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> N
 
 
 def twins(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> None:
-    """Print a line for each twin, and how often the interval of each parameter is right."""
+    """Print a line for each twin, and a table with the coverage of each parameter's intervals."""
     tally, runs, seconds = Tally(), [], []
     for seed in arguments.seeds:
         random = default_rng([seed, 1000])
@@ -535,12 +537,12 @@ def seeds(text: str) -> range:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table of plants or of twins."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=["plants", "twins"])
     parser.add_argument("--seeds", type=seeds, help="such as 1-12 (default; plants: 1)")
     parser.add_argument("--only", help="plants whose names have one of these words")
-    parser.add_argument("--amplitudes", default="0.05,0.15", help="of the plants' torque, N·m")
+    parser.add_argument("--amplitudes", default="0.05,0.15", help="amplitudes of the torque, N·m")
     parser.add_argument("--habits", action="store_true", help="twins with habits of loggers")
     parser.add_argument("--duration", type=float, default=600.0, help="of a recording, s")
     parser.add_argument("--models", help="slosh models to try (default: the true one)")

@@ -1,14 +1,14 @@
-"""Twins for `hubslosh identify --free`: whether the truth lies inside the stated intervals.
+"""Tests with twins whether the intervals of `hubslosh identify --free` contain the true values.
 
     python identify_twins.py FOLDER [--cases VanDerPol,Hub,…] [--twins 100] [--first 1]
 
-FOLDER has the FMUs of others by name: VanDerPol.fmu, BouncingBall.fmu and Dahlquist.fmu of
-modelica/Reference-FMUs (built for FMI 2.0), Orifice.fmu (`orifice.py`, exported by PythonFMU, whose
-binary needs LD_PRELOAD=libpython3.11.so). HubSlosh is found by the program.
+FOLDER must contain VanDerPol.fmu, BouncingBall.fmu and Dahlquist.fmu of modelica/Reference-FMUs
+(built for FMI 2.0), and Orifice.fmu (`orifice.py`, exported by PythonFMU, whose binary needs
+LD_PRELOAD=libpython3.11.so). The program finds HubSlosh itself.
 
-No recording comes from an FMU: each case solves its equation in closed form or by SciPy at a
-tolerance of 1e-10, draws true values within 30 % of the start of the search, and adds noise.
-Prints a table in Markdown.
+A twin is a simulated recording whose true parameters are known. No recording comes from an FMU:
+each case solves its equation in closed form, or by SciPy at a tolerance of 1e-10, with true values
+drawn within 30 % of the start of the fit, and adds noise. The program prints a table in Markdown.
 """
 
 import argparse
@@ -46,17 +46,17 @@ class Case:
 
 
 def draw_near(random: Generator, value: float) -> float:
-    """Draw within 30 % of a value."""
+    """Return a random number within 30 % of ``value``."""
     return float(value * random.uniform(0.7, 1.3))
 
 
 def noisy(random: Generator, signal: np.ndarray, part: float) -> np.ndarray:
-    """Add noise whose standard deviation is the fraction ``part`` of the signal's."""
+    """Return the signal with white noise of ``part`` times the signal's standard deviation."""
     return signal + part * signal.std() * random.normal(size=signal.size)
 
 
 def van_der_pol(random: Generator) -> Twin:
-    """x0' = x1, x1' = mu (1 - x0²) x1 - x0, a few cycles of a relaxation oscillation."""
+    """Return a few cycles of the Van der Pol oscillator x0' = x1, x1' = mu (1 - x0²) x1 - x0."""
     truth = {
         "mu": draw_near(random, 1.0),
         "x0@1": draw_near(random, 2.0),
@@ -77,7 +77,7 @@ def van_der_pol(random: Generator) -> Twin:
 
 
 def bouncing_ball(random: Generator) -> Twin:
-    """Parabolas from bounce to bounce; below 0.1 m/s the ball stays on the ground."""
+    """Return the path of a bouncing ball, which rests on the ground when slower than 0.1 m/s."""
     truth = {
         "e": random.uniform(0.55, 0.9),
         "g": -draw_near(random, 9.81),
@@ -101,7 +101,7 @@ def bouncing_ball(random: Generator) -> Twin:
 
 
 def dahlquist(random: Generator) -> Twin:
-    """Decay, x' = -k x."""
+    """Return an exponential decay, x' = -k x."""
     truth = {"k": draw_near(random, 1.0), "x@1": draw_near(random, 1.0)}
     time = np.arange(0.0, 5.0, 0.02)
     x = truth["x@1"] * np.exp(-truth["k"] * time)
@@ -109,7 +109,7 @@ def dahlquist(random: Generator) -> Twin:
 
 
 def orifice(random: Generator) -> Twin:
-    """Drained tank, area h' = q - c sqrt(h) under an inflow in steps."""
+    """Return the level of a draining tank, area · h' = q - c sqrt(h), with an inflow in steps."""
     truth = {
         "area": draw_near(random, 1.0),
         "c": draw_near(random, 0.5),
@@ -136,7 +136,10 @@ def orifice(random: Generator) -> Twin:
 
 
 def hub(random: Generator) -> Twin:
-    """I w' = tau - b w - c sgn(w): stick and slip under torque in steps, solved piece by piece."""
+    """Return the motion of a hub with stick and slip, I w' = tau - b w - c sgn(w).
+
+    The torque has steps; the solution is in closed form from step to step.
+    """
     truth = {
         "hub.I": draw_near(random, 0.3),
         "friction.b": draw_near(random, 0.04),
@@ -155,7 +158,7 @@ def hub(random: Generator) -> Twin:
                 break
             sign = np.sign(w if w != 0.0 else torque)
             limit = (torque - sign * c) / b
-            # w(t) = limit + (w - limit) exp(-b t/I): at rest when?
+            # w(t) = limit + (w - limit) exp(-b t/I) is 0 at this time
             ratio = limit / (limit - w) if w != 0.0 else 1.0
             stop = -inertia / b * log(ratio) if 0.0 < ratio < 1.0 else float("inf")
             if stop < left:
@@ -237,10 +240,10 @@ def run(case: Case, twin: Twin, program: str, folder: str) -> dict:
 
 
 class Tally:
-    """Errors of the estimates of all twins over their standard deviations.
+    """Errors of the estimates of all twins, relative to their standard deviations.
 
-    A result that does not fit says itself that its intervals cannot be trusted: it is counted
-    apart.
+    A result with the verdict that the model does not fit is counted separately, because the verdict
+    says that its intervals cannot be trusted.
     """
 
     def __init__(self) -> None:
@@ -250,7 +253,7 @@ class Tally:
         self.unfit: list[int] = []
 
     def add(self, seed: int, found: dict | str, truth: dict[str, float]) -> None:
-        """Count the result of a twin; a text in place of a result is a refusal."""
+        """Count the result of a twin; ``found`` is a text if the identification was refused."""
         if isinstance(found, str):
             self.refused.append(seed)
             return
@@ -276,11 +279,11 @@ class Tally:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table of coverage."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="where the FMUs of others are")
+    parser.add_argument("folder", type=Path, help="folder with the FMUs of other projects")
     parser.add_argument("--cases", default=",".join(CASES), help="which cases")
-    parser.add_argument("--twins", type=int, default=100, help="how many of each")
+    parser.add_argument("--twins", type=int, default=100, help="number of twins of each case")
     parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--program", default="hubslosh", help="the program")
     arguments = parser.parse_args()

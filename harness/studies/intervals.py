@@ -1,15 +1,17 @@
-"""Coverage and width of the 95 % intervals that the command prints, each over random draws.
+"""Measures coverage and width of the 95 % intervals that the program prints, over random draws.
 
     python3 harness/studies/intervals.py [--draws 100] [--program hubslosh] [--only METHOD]
 
-Each draw is a recording of a plant whose truth is known. It has noise of the gyro, and errors of
-clock, torque and scale drawn from the tolerances that the method states. The plants are closed
-forms, or one run of HubSlosh.fmu. Of 100 draws a share of 0.95 is known to 0.022.
+Each draw is a recording of a plant with known true values. It has noise of the gyro, and errors of
+clock, torque and scale that are drawn from the tolerances of the method. The plants are closed
+forms, or one run of HubSlosh.fmu. With 100 draws, a coverage of 0.95 has a standard deviation of
+0.022.
 
-`design` states standard deviations before there is a recording. For these the last column is the
-stated width over the width that `identify` states afterwards for the recordings of the draws: the
-median, and the range that holds nine of ten draws.
-Prints the tables of `book/verification.md`.
+`design` predicts standard deviations before a recording exists. For `design`, the last column is
+the ratio of the predicted width to the width that `identify` finds from the recordings of the
+draws: the median, and the range of nine tenths of the draws.
+
+The output is the tables of `book/verification.md`.
 """
 
 import argparse
@@ -26,17 +28,17 @@ import numpy.typing as npt
 
 Vector = npt.NDArray[np.float64]
 Result = dict[str, tuple[float, ...]]
-"""Truth and ends of each interval; of a planned one also its width over that of the fit."""
+"""True value and ends of each interval; for `design` also the ratio of its width to the fit's."""
 
 GYRO = 4.07e-4
-"""Noise of a row of the gyro, rad/s."""
+"""Standard deviation of the gyro's noise in one row, rad/s."""
 
 
 class Bench:
     """Runs the command `hubslosh` in a folder."""
 
     def __init__(self, program: str, fmu: str, folder: Path) -> None:
-        """Keep the paths of the command, of HubSlosh.fmu and of the folder."""
+        """Store the paths of the program, of HubSlosh.fmu and of the folder."""
         self.program, self.fmu, self.folder = program, fmu, folder
 
     def call(self, *arguments: str) -> str:
@@ -50,7 +52,7 @@ class Bench:
         return done.stdout
 
     def write(self, name: str, **columns: Vector) -> None:
-        """Write a table as CSV."""
+        """Write columns as a CSV file in the folder."""
         rows = np.column_stack(list(columns.values()))
         header = ",".join(columns)
         np.savetxt(self.folder / name, rows, delimiter=",", header=header, comments="", fmt="%.12g")
@@ -61,7 +63,7 @@ class Bench:
         return json.loads((self.folder / "found.json").read_text())
 
     def run(self, *settings: str, profile: str) -> tuple[Vector, Vector, Vector]:
-        """Return time, torque and true rate of HubSlosh.fmu."""
+        """Simulate HubSlosh.fmu; return time, torque and true rate."""
         flags = [flag for setting in settings for flag in ("--set", setting)]
         self.call(
             "run",
@@ -80,19 +82,20 @@ class Bench:
 
 
 Draws = Callable[[Bench, int], Iterator[Result]]
-"""Makes so many draws of a method; the results of one are its intervals."""
+"""Function that yields the intervals of a method for each of a number of draws."""
 
 
 def ends(found: dict[str, object], truth: float) -> tuple[float, float, float]:
-    """Return the true value and the ends of its interval; an end that is null is open."""
+    """Return the true value and the ends of its interval; an end that is null is infinite."""
     low, high = found["interval"]  # type: ignore[misc]
     return truth, -np.inf if low is None else low, np.inf if high is None else high
 
 
 def free_decay(bench: Bench, rng: np.random.Generator) -> Result:
-    """Fit a damped oscillation of 2.3 Hz, recorded by a clock of 100 ppm.
+    """Fit a decaying oscillation of 2.3 Hz, recorded with a clock error of up to 100 ppm.
 
-    Its damping doubles, and its frequency falls by 0.5 %, up to the amplitude at the start, 10 mm.
+    Compared with small amplitudes, at the initial amplitude of 10 mm the damping is twice as large
+    and the frequency 0.5 % lower.
     """
     f, zeta, growth, hardening, start = 2.3, 0.004, 0.4, -50.0, 0.01
     time = np.arange(0, 60, 0.02)
@@ -113,7 +116,7 @@ def free_decay(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def gyro(bench: Bench, rng: np.random.Generator) -> Result:
-    """Estimate white noise of a gyro at 10 Hz over half an hour."""
+    """Estimate the white noise of a gyro from half an hour at 10 Hz."""
     truth = 1e-4
     time = 0.1 * np.arange(1 << 14)
     bench.write("draw.csv", time=time, omega=truth / np.sqrt(0.1) * rng.standard_normal(time.size))
@@ -124,7 +127,7 @@ def gyro(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def friction(bench: Bench, rng: np.random.Generator) -> Result:
-    """Fit an empty bench; the scales of torque and gyro have errors of 1 %."""
+    """Fit friction and inertia of an empty bench; torque and gyro have scale errors of 1 %."""
     time, torque, rate = clean(
         bench,
         "slosh.model=frozen",
@@ -145,7 +148,7 @@ def friction(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 FREE = {"hub.I": 0.35, "friction.b": 0.05}
-"""Truths of `any_fmu`."""
+"""True values of the parameters in `any_fmu`."""
 
 
 def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
@@ -155,9 +158,9 @@ def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def planned_free(bench: Bench, rng: np.random.Generator) -> Result:
-    """Plan the same fit from its torque by `design`, before there is a rate."""
+    """Predict the intervals of the same fit by `design`, from the torque only."""
     found, asked = free_fit(bench, rng)
-    # bounds hold near the expected values, which are taken as known here
+    # the predictions are valid near the expected values; here the true values are expected
     expected = ",".join(f"{name}={truth}:0.001:1" for name, truth in FREE.items())
     asked[asked.index("--free") + 1] = expected
     stated = bench.call("design", "torque.csv", *asked, "--noise", "omega=1e-3", "--json")
@@ -168,7 +171,7 @@ def planned_free(bench: Bench, rng: np.random.Generator) -> Result:
 def free_fit(
     bench: Bench, rng: np.random.Generator
 ) -> tuple[dict[str, dict[str, object]], list[str]]:
-    """Return the parameters that `identify fmu` finds, and the flags that `design` accepts too."""
+    """Return the parameters that `identify fmu` finds, and the flags that `design` also accepts."""
     inertia, b = FREE.values()
     step = 0.05
     time = step * np.arange(600)
@@ -190,16 +193,16 @@ def free_fit(
 
 
 def foretold(found: dict[str, object], truth: float, std: float) -> tuple[float, ...]:
-    """Return the true value, the predicted interval, and the ratio of deviations.
+    """Return the true value, the predicted interval, and a ratio of standard deviations.
 
-    The ratio is that of the predicted standard deviation to the deviation of the fit.
+    The ratio is the predicted standard deviation divided by the standard deviation of the fit.
     """
     value, fitted = float(found["value"]), float(found["std"])  # type: ignore[arg-type]
     return truth, value - 1.96 * std, value + 1.96 * std, std / fitted
 
 
 def planned_bench(bench: Bench, draws: int) -> Iterator[Result]:
-    """Plan an optimal multisine for the bench, whose gyro has another seed in each draw.
+    """Design an optimal multisine for the bench; in each draw its gyro has another seed.
 
     `design` predicts the part of a standard deviation that noise causes, `std_noise` of the fit.
     """
@@ -214,7 +217,7 @@ def planned_bench(bench: Bench, draws: int) -> Iterator[Result]:
         columns = ["--columns", "omega=omega_imu", "--model", "linear"]
         result = bench.identify("bench", "--fmu", bench.fmu, *columns)
         found = result["parameters"] | result["measurement"]
-        # a bias that drifts has no single truth
+        # leave out the bias, which has no single true value because it drifts
         yield {
             name: foretold(
                 found[name] | {"std": found[name]["std_noise"]}, bound["value"], bound["std_noise"]
@@ -225,9 +228,9 @@ def planned_bench(bench: Bench, draws: int) -> Iterator[Result]:
 
 
 def campaign(friction: str) -> Draws:
-    """Return a source of draws: features of slow sweeps, whose gyro has another seed in each.
+    """Return a function that yields features of slow sweeps, each with another seed of the gyro.
 
-    The truth is the feature of the run without a gyro.
+    The true value is the feature of the run without a gyro.
     """
 
     def draw(bench: Bench, draws: int) -> Iterator[Result]:
@@ -265,10 +268,11 @@ friction.model = "{friction}"
 
 
 def tank_damping(bench: Bench, rng: np.random.Generator) -> Result:
-    """Solve a random tank that is a measured shape, and one whose height is up to 5 % off.
+    """Compute the damping of random tanks with a measured shape, and with nearly this shape.
 
-    Truths are the fits to measured tanks, as NASA SP-106 prints them: two of cylinders, one of
-    spheres. No fit of a measured tank has less than its own wall layer.
+    Heights of the latter differ by up to 5 %. True values are three fits to measurements in NASA
+    SP-106, two for cylinders and one for spheres, but at least the damping of the wall's boundary
+    layer.
     """
     nu, g = 10 ** rng.uniform(-6.5, -5.5), 10 ** rng.uniform(-1, 1)
     radius, off = rng.uniform(0.05, 0.5), rng.uniform(-0.05, 0.05)
@@ -280,7 +284,7 @@ def tank_damping(bench: Bench, rng: np.random.Generator) -> Result:
     shallow = rng.uniform(0.1, 2)
     stephens = 5.23 / (2 * np.pi) * np.sqrt(number) * np.tanh(1.84 * shallow) ** -0.25
     stephens *= 1 + 2 * (1 - shallow) / np.sinh(3.68 * shallow)
-    # within the measured B = 1e4 nu/sqrt(g D^3) of 0.01 to 1
+    # the measurements cover B = 1e4 nu/sqrt(g D^3) from 0.01 to 1
     part, size = rng.uniform(0.1, 1.9), 10 ** rng.uniform(-2, 0)
     ball = (1e-4 * size / nu * np.sqrt(g)) ** (-2 / 3) / 2
     upper = (1 + 0.46 * (2 - part)) / (1.46 * (2 - part)) if part > 1 else 1 / part
@@ -321,7 +325,7 @@ def tank_damping(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def each(method: Callable[[Bench, np.random.Generator], Result]) -> Draws:
-    """Return the draws of a method, with the seeds 0, 1 and so on."""
+    """Return a function that draws a method with the seeds 0, 1, and so on."""
 
     def draw(bench: Bench, draws: int) -> Iterator[Result]:
         for seed in range(draws):
@@ -334,7 +338,7 @@ CLEAN: dict[str, tuple[Vector, Vector, Vector]] = {}
 
 
 def clean(bench: Bench, *settings: str, profile: str) -> tuple[Vector, Vector, Vector]:
-    """Return a run without noise; it is simulated only once."""
+    """Return a run without noise; each run is simulated only once."""
     if profile not in CLEAN:
         CLEAN[profile] = bench.run(*settings, profile=profile)
     return CLEAN[profile]
@@ -383,7 +387,7 @@ def census(bench: Bench, only: str, draws: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table of coverage and widths."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

@@ -1,11 +1,11 @@
-"""An FMU with many variables, and what `hubslosh check` needs for it.
+"""Builds an FMU with many variables, and measures time and memory of `hubslosh check` for it.
 
     cargo build --release
     python3 harness/studies/large_fmu.py --variables 100044
 
-A C compiler makes the FMU from harness/check/tests/all/model.c. It has one state and both
-interfaces. Every tenth variable is a parameter, the others are multiples of the state. Each has a
-unit and a sentence: about 300 bytes of the description.
+A C compiler builds the FMU from harness/check/tests/all/model.c. It has one state and both
+interfaces. Every tenth variable is a parameter; the others are multiples of the state. Each
+variable has a unit and a description, about 300 bytes of XML.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "harness/check/tests/all/model.c"
-OWN = 4  # x, der(x), k, u
+OWN = 4  # number of variables in HEAD: x, der(x), k, u
 FLAGS = (
     'modelIdentifier="model" canNotUseMemoryManagementFunctions="true" '
     'canGetAndSetFMUstate="true" canSerializeFMUstate="true"'
@@ -54,7 +54,7 @@ TAIL = """  </ModelVariables>
 
 
 def variable(k: int) -> str:
-    """Return the description of one of the further variables, counted from 0."""
+    """Return the XML of the further variable with the index ``k``, counted from 0."""
     name = f"machine.drive[{k // 1000}].stage[{k // 10 % 100}]"
     if k % 10 == 0:
         name += ".preload"
@@ -72,7 +72,7 @@ def variable(k: int) -> str:
 
 
 def write(path: Path, variables: int) -> int:
-    """Write the FMU with so many variables; return the bytes of its description."""
+    """Write an FMU with ``variables`` variables; return the size of its description, bytes."""
     if variables < OWN:
         raise ValueError(f"{variables} variables (allowed: {OWN} or more)")
     more = variables - OWN
@@ -91,11 +91,11 @@ def write(path: Path, variables: int) -> int:
 
 
 def main() -> None:
-    """Write the FMU, check it, and print what that took."""
+    """Write the FMU, check it, and print time and memory of the check."""
     assert platform.system() == "Linux", "the binary is made for Linux"
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--variables", type=int, default=100_044)
-    parser.add_argument("--out", type=Path, help="keep the FMU here")
+    parser.add_argument("--out", type=Path, help="write the FMU to this path, and keep it")
     parser.add_argument("--hubslosh", type=Path, default=ROOT / "target/release/hubslosh")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -104,7 +104,7 @@ def main() -> None:
         began = time.monotonic()
         done = subprocess.run([args.hubslosh, "check", fmu], check=False)
         elapsed = time.monotonic() - began
-    # children that were waited for, with theirs; memory of the largest process
+    # CPU time of all finished child processes, and memory of the largest one
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     print(
         f"{args.variables} variables, {size / 1e6:.1f} MB of XML: exit code {done.returncode}, "

@@ -1,14 +1,15 @@
-"""Holds the models against published measurements: book/measured.md and its pictures.
+"""Compares the models with published measurements; writes book/measured.md and its pictures.
 
     PYTHONPATH=harness/python python3 harness/studies/measured.py
 
-needs dist/HubSlosh.fmu and dist/SloshTank.fmu (``cargo run --release -- pack``, the second with
-``--model SloshTank``), the program ``hubslosh`` and the packages in requirements.txt. One minute
-of CPU time.
+It needs dist/HubSlosh.fmu and dist/SloshTank.fmu (``cargo run --release -- pack``, the second with
+``--model SloshTank``), the program ``hubslosh`` and the packages in requirements.txt. It takes one
+minute of CPU time.
 
-The measurements are in ``measured/``, numbers only, each file with its source and its error. What
-is ours comes from ``hubslosh tank`` and from the FMUs. How each comparison came out is kept in
-``measured/results.csv``, of which the page is made; the tests compute the quick ones again.
+The measurements are in ``measured/``; each file of numbers states its source and its error.
+Computed values come from ``hubslosh tank`` and from the FMUs. The results of all comparisons are
+stored in ``measured/results.csv``, from which the page is written; the tests repeat the comparisons
+that take little time.
 """
 
 import csv
@@ -41,11 +42,11 @@ TEMPLATE = DATA / "page.md.in"
 G = 9.80665  # m/s²
 WATER = 1.0e-6  # m²/s, at 20 °C
 TENSION = 0.072  # N/m
-WARMTH = 0.06  # of a damping ratio: water of 15 to 25 °C in place of 20 °C
-SCATTER = 0.3  # of a damping ratio: what measured tanks scatter around a correlation
+WARMTH = 0.06  # relative change of a damping ratio if water has 15 to 25 °C instead of 20 °C
+SCATTER = 0.3  # relative scatter of damping ratios of measured tanks around a correlation
 UNSTATED = {"frequency": 0.01, "amplitude": 0.05, "damping": 0.1}
-"""Relative error of a measurement whose source states none."""
-SHARE = 0.9  # of the points of a set that must pass, rounded down to whole points
+"""Relative errors of measurements whose sources state no error."""
+SHARE = 0.9  # fraction of a set of points that must pass; the number of points is rounded down
 OFTEN = 0.05  # probability below which a sign test excludes chance
 KINDS = {
     "frequency": "natural frequencies",
@@ -56,12 +57,12 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity: as measured and as computed, each with its band."""
+    """One comparison of a measured with a computed quantity, each with its uncertainty."""
 
     experiment: str
     quantity: str
     kind: str  # one of KINDS
-    unit: str  # "share": of a set of points
+    unit: str  # "share" if the quantity is a fraction of a set of points
     measured: float
     error: float
     ours: float
@@ -78,19 +79,19 @@ class Row:
 def share(
     experiment: str, quantity: str, kind: str, inside: np.ndarray, least: int, rule: int = 2
 ) -> Row:
-    """Return the row of a set of points of which at least ``least`` must be inside."""
+    """Return the row of a set of points, of which at least ``least`` must be inside a band."""
     low = least / len(inside)
     middle, half = (1 + low) / 2, (1 - low) / 2
     return Row(experiment, quantity, kind, "share", float(np.mean(inside)), 0.0, middle, half, rule)
 
 
 def most(count: int) -> int:
-    """Return how many points of a set of ``count`` must be inside."""
+    """Return the number of points of a set of ``count`` points that must be inside a band."""
     return math.floor(SHARE * count + 1e-9)
 
 
 def table(name: str) -> pd.DataFrame:
-    """Read a file of measurements."""
+    """Read a file of measurements as a table."""
     return pd.read_csv(DATA / name, comment="#")
 
 
@@ -119,7 +120,7 @@ def tank(
 
 
 def frequency(of: dict[str, float], mode: int = 1) -> float:
-    """Return the natural frequency of a mode, rad/s, capillarity included."""
+    """Return the natural frequency of a mode with capillarity, rad/s."""
     stiffness = of[f"k[{mode}]"] / of[f"mass[{mode}]"]
     return math.sqrt(G / of[f"length[{mode}]"] + stiffness)
 
@@ -141,7 +142,7 @@ BOX = "density = 998.2\nbox = [0.5, 0.05]\n"
 
 
 def rectangular_tanks() -> tuple[list[Row], str]:
-    """52 first natural frequencies over the depth, of waves of unknown amplitude."""
+    """Compare 52 frequencies of the first mode over the depth, for waves of unknown amplitude."""
     data, name = table("rectangular_tanks.csv"), "Addington (1960)"
     depth, measured = data["h_over_L"].to_numpy(), data["omega_sqrt_L_over_g"].to_numpy()
     unit = "density = 1000\nbox = [1, 1.5]\n"
@@ -150,7 +151,7 @@ def rectangular_tanks() -> tuple[list[Row], str]:
         """Return the range of natural frequencies at the depth ``h`` (third order)."""
         of, found = tank(unit, h, 1)
         slow = frequency(of) / math.sqrt(G)
-        # without coefficients (secondary resonance) there is no statement
+        # without coefficients (because of a secondary resonance) no range is known
         mode = found["finite_amplitude"]["mode"] or {"planar": 0.0, "series_limit": 0.0}
         fast = slow * math.sqrt(1 + mode["planar"] * mode["series_limit"] ** 2)
         return slow, fast, float(np.sign(mode["planar"]))
@@ -192,7 +193,7 @@ def rectangular_tanks() -> tuple[list[Row], str]:
 
 
 def box_decay() -> tuple[list[Row], str]:
-    """Frequency and damping of small free waves; the picture has the frequency of large ones."""
+    """Compare frequency and damping of small free waves; the picture also shows large waves."""
     name = "Bäuerlein and Avila (2021), free decay"
     of, _ = tank(BOX, 0.4)
     omega, zeta = frequency(of), of["zeta[1]"]
@@ -221,12 +222,13 @@ def box_decay() -> tuple[list[Row], str]:
 
 
 def ring_down(start: float = 7.2) -> tuple[np.ndarray, np.ndarray]:
-    """Release mode 1 of SloshTank at an X in % of the box; return amplitudes and frequencies.
+    """Release mode 1 of SloshTank; return amplitudes and frequencies of the free oscillation.
 
-    Frequencies are of the free oscillation, rad/s.
+    ``start`` and the amplitudes are X, the displacement of the centre of mass, % of the length of
+    the box. Frequencies are in rad/s.
     """
     parameters, found = tank(BOX, 0.4, model="SloshTank")
-    # the first mode's share of the liquid's mass
+    # fraction of the liquid's mass in the first mode
     share = parameters["tank.mass[1]"] / found["m_liq"]
     sine = start / 100 * 0.5 / (share * parameters["tank.length[1]"])
     place = {"tank.p_0[1,1]": sine, "tank.p_0[1,3]": -math.sqrt(1 - sine * sine)}
@@ -243,7 +245,7 @@ def ring_down(start: float = 7.2) -> tuple[np.ndarray, np.ndarray]:
 
 
 def extremes(time: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return time and value of the extremes, by a parabola through three samples."""
+    """Return time and value of the extremes of a signal, by a parabola through three samples."""
     i = np.flatnonzero(np.diff(x[:-1]) * np.diff(x[1:]) < 0) + 1
     bend, rise = (x[i - 1] - 2 * x[i] + x[i + 1]) / 2, (x[i + 1] - x[i - 1]) / 2
     step = time[1] - time[0]
@@ -251,7 +253,7 @@ def extremes(time: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def box_transient() -> tuple[list[Row], str]:
-    """Elevation near the wall of a box that is moved from rest, 10 s."""
+    """Compare the wave elevation near the wall of a box that is moved from rest, over 10 s."""
     name = "Faltinsen et al. (2000), figure 7"
     data = table("box_transient.csv")
     length, omega = 1.73, 2 * math.pi / 1.3
@@ -260,7 +262,7 @@ def box_transient() -> tuple[list[Row], str]:
     time = np.arange(1001) * 0.01
     move = -0.032 * omega**2 * np.cos(omega * time)
     inputs = pd.DataFrame({"time": time, "a[1]": move, "a[3]": G})
-    # along x: modes 1 and 3 of the file
+    # modes along x are modes 1 and 3 of the tank file
     angles = {"tank.angle_x[1]": 1, "tank.angle_x[3]": 3}
     run = hubslosh.simulate(FMUS["SloshTank"], parameters, inputs, outputs=list(angles))
     first = np.zeros(len(run))
@@ -274,7 +276,7 @@ def box_transient() -> tuple[list[Row], str]:
     edges = np.flatnonzero(np.diff(np.sign(eta)) != 0) + 1
     for part in np.split(np.arange(len(eta)), edges):
         peak = part[np.argmax(np.abs(eta[part]))]
-        if abs(eta[peak]) < 0.02:  # ten times the error of reading
+        if abs(eta[peak]) < 0.02:  # ten times the error of reading the figure
             continue
         among = np.abs(at - t[peak]) < 1.3 / 4
         pairs.append((eta[peak], (np.max if eta[peak] > 0 else np.min)(ours[among])))
@@ -321,7 +323,7 @@ DEPTH = 0.078  # m
 
 
 def cylinder_decay() -> tuple[list[Row], str]:
-    """Moments of a water cylinder after a motion: frequency and damping."""
+    """Compare frequency and damping of water in a cylinder after a motion, from measured moments."""
     name = "Soprani, Di Leva et al. (2025), free decay"
     of, _ = tank(CYLINDER, DEPTH, sigma=TENSION)
     omega, zeta = frequency(of), of["zeta[1]"]
@@ -330,7 +332,7 @@ def cylinder_decay() -> tuple[list[Row], str]:
     rate = 1 / (time[1] - time[0])
     band = butter(3, [2.2, 4.2], "bandpass", fs=rate, output="sos")
     waves = [hilbert(sosfiltfilt(band, data[m] - data[m].mean())) for m in ("Mx_Nm", "My_Nm")]
-    # both directions together: a path that turns has no plane of its own
+    # combine both directions, because the plane of the oscillation turns
     size = np.sqrt(sum(np.abs(w) ** 2 for w in waves))
     among = (time > 3) & (time < 13)
     turning = [float(np.polyfit(time[among], np.unwrap(np.angle(w[among])), 1)[0]) for w in waves]
@@ -379,9 +381,10 @@ def cylinder_decay() -> tuple[list[Row], str]:
 
 
 def ramp(duration: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the motion law 0 to 1 and its derivatives: acceleration a trapezoid with cosine ramps.
+    """Return the motion law from 0 to 1 and its derivatives.
 
-    Ramps of T/8: up to 3/8, through 0 at T/2, down to 7/8; the same backwards.
+    The acceleration is a trapezoid with cosine ramps of T/8: positive up to 3/8 T, through 0 at
+    T/2, negative up to 7/8 T. The way back is the same.
     """
     s = np.clip(time / duration, 0, 1)
     knots = 20000
@@ -403,16 +406,16 @@ def ramp(duration: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def path(kind: str, level: str, sigma: np.ndarray) -> np.ndarray:
-    """Return the robot's path in m over its motion law."""
-    if kind == "LE":  # a lemniscate, and a saddle above it
+    """Return the path of the robot, m, for values ``sigma`` of the motion law."""
+    if kind == "LE":  # a lemniscate, with vertical motion along a saddle
         phi = 2 * np.pi * sigma
         x, y = 0.25 * np.sin(2 * phi + np.pi), 0.5 * np.cos(phi + np.pi / 2)
         z = y**2 - x**2
-    elif kind == "RD":  # two turns
+    elif kind == "RD":  # two turns of a circle
         theta = 4 * np.pi * sigma
         x, y = 0.3 * np.sin(theta), 0.3 * np.cos(theta) - 0.3
         z = -(x**2 - (y + 0.3) ** 2) / 1.5**2 - 0.3**2 / 1.5**2
-    else:  # TRD: three quarters of a turn, and on
+    else:  # TRD: three quarters of a turn, then straight on
         theta = 1.5 * np.pi * sigma
         x, y = 0.3 * np.sin(theta), 0.3 * np.cos(theta) + sigma - 0.3
         z = 0.15 * np.sin(4 / 3 * theta)
@@ -420,7 +423,7 @@ def path(kind: str, level: str, sigma: np.ndarray) -> np.ndarray:
 
 
 def cylinder_heights() -> tuple[list[Row], str]:
-    """Peak heights of the surface during 18 motions of a robot."""
+    """Compare peak heights of the surface during 18 motions of a robot."""
     name = "Soprani, Di Leva et al. (2025), 18 paths"
     parameters, _ = tank(CYLINDER, DEPTH, sigma=TENSION, model="SloshTank")
     data, ours = table("cylinder_heights.csv"), []
@@ -479,10 +482,10 @@ def cylinder_heights() -> tuple[list[Row], str]:
 
 
 def fits() -> tuple[list[Row], str]:
-    """Damping as others' measurements have it: two fits, and one number.
+    """Compare damping ratios with two published fits to measurements, and with one number.
 
-    Contours that are 1 to 2 % off their shape, so that they are none of the measured ones and have
-    the damping of a shape without measurements.
+    The contours deviate from the measured shapes by 1 to 2 %, so that the program computes their
+    damping as for a shape without measurements.
     """
     rows = []
     band = math.hypot(SCATTER, WARMTH)
@@ -504,7 +507,7 @@ def fits() -> tuple[list[Row], str]:
         zeta = tank(sphere, 0.102 * x, 1)[0]["zeta[1]"]
         quantity = f"damping ratio of a tank close to a sphere, 0.2 m wide, water to h/R = {x:g}"
         rows.append(Row(name, quantity, "damping", "1", fit, SCATTER * fit, zeta, band * zeta))
-    # from liquid oxygen to water: the paper does not say which liquid
+    # the range from liquid oxygen to water, because the paper does not name the liquid
     thin, thick = (tank(cylinder, 0.5, 1, nu=nu)[0]["zeta[1]"] for nu in (1.9e-7, WATER))
     rows.append(
         Row(
@@ -524,11 +527,11 @@ def fits() -> tuple[list[Row], str]:
 # --------------------------------------------------------------------------------------- bench
 
 DEPTHS = ((50, "mm"), (100, "mm"))
-AMPLITUDES = (0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2)  # N·m, of the thesis's sweeps
+AMPLITUDES = (0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2)  # amplitudes of the thesis's sweeps, N·m
 
 
 def bench_sweep(depth: tuple, amplitude: float) -> tuple[float, bool]:
-    """Return the peak hub acceleration (rad/s²) of a sweep, and whether slosh became rotary."""
+    """Return the peak hub acceleration (rad/s²) of a sweep, and True if slosh became rotary."""
     time = np.arange(135001) * 0.02
     rate = math.log(3.5 / 1.25) / 2700.0
     torque = amplitude * np.sin(2 * np.pi * 1.25 * np.expm1(rate * time) / rate)
@@ -545,7 +548,7 @@ def bench_sweep(depth: tuple, amplitude: float) -> tuple[float, bool]:
 
 
 def bench() -> tuple[list[Row], str]:
-    """Peak hub acceleration and onset of rotary slosh on the thesis's bench."""
+    """Compare peak hub acceleration and onset of rotary slosh on the bench of the thesis."""
     name = "Rubaga's thesis, bench"
     rows, onsets = [], []
     for amplitude, measured in ((0.25, 2.21), (0.0125, 0.222)):
@@ -568,18 +571,19 @@ def bench() -> tuple[list[Row], str]:
         before = AMPLITUDES[AMPLITUDES.index(first) - 1]
         onsets.append((before, first))
     low, high = min(o[0] for o in onsets), max(o[1] for o in onsets)
-    # open below, closed above: at 0.1 N·m the bench had it, so ours must have it there or below
+    # the interval excludes its lower end and includes its upper end, because slosh on the bench was
+    # rotary at 0.1 N·m
     middle, half = (low + high) / 2, (high - low) / 2 - 0.0005
     name_of = "smallest torque of a sweep with rotary slosh (thesis 7.1), both fills"
     rows.append(Row(name, name_of, "nonlinear", "N·m", 0.0875, 0.0125, middle, half))
     return rows + as_built(), ""
 
 
-SEEDS = range(1, 11)  # of the gyro's noise
+SEEDS = range(1, 11)  # seeds of the gyro's noise
 
 
 def built_sweep(fill: dict, amplitude: float, gyro: str = "omega") -> tuple[float, bool]:
-    """Return peak acceleration (rad/s²) and rotary slosh of a sweep of the bench as built."""
+    """Return the peak acceleration (rad/s²) of a sweep of the bench as built, and True if rotary."""
     plan = tomllib.loads(PLAN.read_text(encoding="utf-8"))
     run = hubslosh.simulate(
         FMUS["HubSlosh"],
@@ -594,14 +598,14 @@ def built_sweep(fill: dict, amplitude: float, gyro: str = "omega") -> tuple[floa
 
 
 def linear_sweep(amplitude: float) -> pd.DataFrame:
-    """Return the thesis's sweep: 1.25 to 3.5 Hz in 2700 s, linear in time."""
+    """Return the sweep of the thesis, 1.25 to 3.5 Hz in 2700 s, linear in frequency."""
     time = np.arange(135001) * 0.02
     phase = 2 * np.pi * (1.25 * time + (3.5 - 1.25) / (2 * 2700.0) * time**2)
     return pd.DataFrame({"time": time, "tau_cmd": amplitude * np.sin(phase)})
 
 
 def flat(settings: dict, prefix: str = "") -> dict:
-    """Return the variables of a plan's nested table by their names."""
+    """Return the variables in a nested table of a plan by their full names."""
     out = {}
     for key, value in settings.items():
         if isinstance(value, dict):
@@ -612,11 +616,11 @@ def flat(settings: dict, prefix: str = "") -> dict:
 
 
 BREAKING = ((0.03, 0.66), (0.09, 0.60))
-"""Growth and begin of breaking: the ends of book/damping.md."""
+"""Growth and onset of wave breaking: both ends of the ranges in book/damping.md."""
 
 
 def as_built() -> list[Row]:
-    """Return the same quantities of the plan bench_as_built."""
+    """Compare the same quantities with the plan bench_as_built."""
     name = "Rubaga's thesis, bench as built"
     fills = [flat(run) for run in tomllib.loads(PLAN.read_text(encoding="utf-8"))["run"]]
     rows = []
@@ -638,7 +642,7 @@ def as_built() -> list[Row]:
         middle, half = (high + low) / 2, (high - low) / 2
         rows.append(Row(name, quantity, "nonlinear", "rad/s²", measured, error, middle, half, 2))
     first = [next(a for a in AMPLITUDES if built_sweep(fill, a)[1]) for fill in fills]
-    # appendix A: weak and occasional at 0.075 N·m, visible at 0.1 N·m
+    # appendix A: rotary slosh is weak and occasional at 0.075 N·m, and visible at 0.1 N·m
     quantity = "smallest torque of a sweep with rotary slosh (thesis, appendix A), both fills"
     middle, half = (max(first) + min(first)) / 2, (max(first) - min(first)) / 2
     rows.append(Row(name, quantity, "nonlinear", "N·m", 0.0875, 0.0125, middle, half, 2))
@@ -662,7 +666,7 @@ def legend(panel: Panel, words: list[tuple[str, str]], x: float, y: float) -> No
 
 
 def svg(title: str, panels: list[Panel], size: tuple[int, int]) -> str:
-    """Return a drawing of panels."""
+    """Return a drawing of panels as SVG text."""
     width, height = size
     style = STYLE + "circle.a{fill:var(--a);stroke:none}circle.b{fill:var(--b);stroke:none}"
     style += "circle.c{fill:var(--c);stroke:none}svg{--d:#117733}"
@@ -685,11 +689,11 @@ EXPERIMENTS: dict[str, Callable[[], tuple[list[Row], str]]] = {
     "bench": bench,
 }
 QUICK = tuple(name for name in EXPERIMENTS if name != "bench")
-"""Experiments that the tests compute again: a second or two each."""
+"""Experiments that the tests compute again, because each takes only a second or two."""
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Return a number with some significant digits."""
+    """Return a number as text with ``digits`` significant digits."""
     if value == 0:
         return "0"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
@@ -697,7 +701,7 @@ def short(value: float, digits: int = 3) -> str:
 
 
 def ours_of(row: Row) -> str:
-    """Return our value of a comparison; for a share the smallest one that passes."""
+    """Return the computed value of a comparison as text; for a share, the smallest that passes."""
     if row.unit == "share":
         return f"at least {short(row.ours - row.band)}"
     return with_band(row.ours, row.band)
@@ -710,21 +714,21 @@ def name_of(row: Row) -> str:
 
 
 def with_band(value: float, band: float) -> str:
-    """Return a number with its uncertainty."""
+    """Return a number with its uncertainty as text."""
     if band < 1e-12:
         return short(value)
     return f"{short(value)} ± {short(band, 2)}"
 
 
 def verdict(rows: list[Row]) -> str:
-    """Return how many comparisons pass, in the words that README uses."""
+    """Return the number of comparisons that pass, in the words of the README."""
     return f"{sum(row.passed for row in rows)} of {len(rows)} comparisons"
 
 
 def computed() -> list[tuple[float, float, float]]:
-    """Return depth, frequency by CFD and our frequency.
+    """Return depth, frequency by published CFD, and frequency by HubSlosh.
 
-    Results of others' computations are no measurements, and are therefore kept apart.
+    These are separate from the comparisons, because computations are no measurements.
     """
     data = table("box_cfd.csv")
     return [

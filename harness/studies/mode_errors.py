@@ -1,10 +1,10 @@
-"""Draw the force's error against the number of modes: book/mode_errors.svg.
+"""Draws the error of the slosh force over the number of modes, book/mode_errors.svg.
 
     PYTHONPATH=harness/python python3 harness/studies/mode_errors.py
 
-needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
-Figure 4.4 of Rubaga's thesis, for the bench's two fills, and in addition the error within the band
-of the bench's sweeps.
+It needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
+The picture is figure 4.4 of Rubaga's thesis for both fills of the bench. It also has the error
+within the frequency band of the sweeps.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ BELOW = 3.5  # Hz, the end of the sweeps
 
 
 def draw(picture: Path) -> None:
-    """Compute, print and draw."""
+    """Compute the errors, print them, and draw the picture."""
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
     for fill, color in ((0.1, plot.COLORS[0]), (0.05, plot.COLORS[1])):

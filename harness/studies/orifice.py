@@ -1,4 +1,4 @@
-"""A tank that drains through an orifice, an FMU by the exporter PythonFMU.
+"""A tank that drains through an orifice, exported as an FMU by PythonFMU.
 
 python -m pythonfmu build -f orifice.py
 """
@@ -9,7 +9,7 @@ from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Re
 
 
 class Orifice(Fmi2Slave):
-    """area h' = q - c sqrt(h), by Runge-Kutta's rule in steps of 10 ms."""
+    """Tank with area · h' = q - c sqrt(h), solved by Runge–Kutta in steps of 10 ms."""
 
     def __init__(self, **kwargs: object) -> None:
         """Declare area (m²), c (m^2.5/s), inflow q (m³/s) and level h (m)."""
@@ -23,11 +23,11 @@ class Orifice(Fmi2Slave):
         self.register_variable(Real("h", **output))
 
     def rate(self, h: float) -> float:
-        """Return h'."""
+        """Return the derivative of the level, h', m/s."""
         return (self.q - self.c * sqrt(max(h, 0.0))) / self.area
 
     def do_step(self, _: float, step: float) -> bool:
-        """Make a step."""
+        """Advance the tank by ``step``, s."""
         n = max(1, round(step / 0.01))
         d = step / n
         for _ in range(n):

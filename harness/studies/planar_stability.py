@@ -1,13 +1,14 @@
-"""Compute where planar slosh on the bench loses its stability, independently of the FMU.
+"""Computes the torque at which planar slosh on the bench becomes unstable, without the FMU.
 
     python3 harness/studies/planar_stability.py
 
-The plant is written here from the equations of a spherical pendulum on a turning hub (Newton's
-equations, projected on the sphere) and shares no code with the FMU. Shooting finds the periodic
-motion under a sinusoidal torque. Continuation follows the motion along its amplitude, which passes
-folds, at each frequency. Planar slosh becomes rotary where a Floquet multiplier of the half period
-passes −1. A dwell from rest gets there when the torque exceeds every torque of a smaller amplitude.
-The smallest such torque at any frequency is the onset of rotary slosh.
+The model here is a spherical pendulum on a turning hub (Newton's equations, projected on the
+sphere); it shares no code with the FMU. At each frequency, a shooting method finds the periodic
+motion under a sinusoidal torque, for amplitudes of the motion in ascending order, because several
+motions can exist for the same torque (folds). Planar slosh becomes rotary at the amplitude at which
+a Floquet multiplier of half a period passes −1. A dwell from rest reaches this amplitude if the
+torque exceeds the torques of all smaller amplitudes. The smallest such torque at any frequency is
+the onset of rotary slosh.
 """
 
 import numpy as np
@@ -17,23 +18,23 @@ GRAVITY, DENSITY, VISCOSITY = 9.81, 1000.0, 9.1312e-7  # m/s², kg/m³, m²/s
 ROOT = 1.8411837813406593  # first zero of J1'
 VISCOUS, COULOMB = 0.03793, 0.003498  # N·m·s, N·m
 STRIBECK, STRIBECK_RATE = 0.002423, 0.08581  # N·m, rad/s
-SMOOTH = 1e-3  # width of the friction's sign, rad/s
+SMOOTH = 1e-3  # width over which the sign function of the friction is smoothed, rad/s
 
 DEPTH = 0.08  # m, as in the plan t5_near_resonance
 FREQUENCIES = np.arange(2.38, 2.4201, 0.0025)  # Hz
 ANGLES = np.radians(np.arange(6.0, 24.1, 1.0))  # amplitudes of the slosh angle
 
-STEPS = 200  # of Runge-Kutta in half a period
-NUDGE = 1e-6  # for derivatives
-MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0])  # of rate, x, y, x', y' after half a period
-UNKNOWN = [0, 1, 3]  # places of the unknown rate, x and x' in the state
+STEPS = 200  # number of Runge–Kutta steps in half a period
+NUDGE = 1e-6  # step of difference quotients
+MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0])  # signs of rate, x, y, x', y' after half a period
+UNKNOWN = [0, 1, 3]  # indices of the unknown rate, x and x' in the state
 
 
 class Plant:
-    """Hub with one mode of liquid in an upright cylinder; state: rate, x, y, x', y'."""
+    """Hub with one slosh mode in an upright cylinder; the state is rate, x, y, x', y'."""
 
     def __init__(self, depth: float):
-        """depth: of the liquid, m."""
+        """Compute the pendulum for the depth of the liquid, m."""
         radius = DIAMETER / 2
         u = ROOT * depth / radius
         liquid = DENSITY * np.pi * radius**2 * depth
@@ -47,7 +48,7 @@ class Plant:
         self.drag = 2 * zeta * np.sqrt(GRAVITY / self.length)  # 1/s
 
     def slope(self, state: np.ndarray, torque: np.ndarray) -> np.ndarray:
-        """Time derivative of states (5, n) under torques (n)."""
+        """Return the time derivatives of states (5, n) under torques (n)."""
         rate, x, y, vx, vy = state
         square, mass = self.length**2, self.mass
         stribeck = STRIBECK * np.exp(-((rate / STRIBECK_RATE) ** 2))
@@ -66,7 +67,7 @@ class Plant:
     def half_period(
         self, state: np.ndarray, torque: np.ndarray, phase: np.ndarray, frequency: np.ndarray
     ) -> np.ndarray:
-        """States half a period later, mirrored; a symmetric motion returns to its start."""
+        """Return the states half a period later, mirrored; symmetric motion returns to its start."""
         step = 0.5 / (frequency * STEPS)
         turn = np.pi / STEPS
         push = torque * np.sin(phase)
@@ -82,7 +83,7 @@ class Plant:
         return MIRROR[:, None] * state
 
     def guess(self, angle: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-        """Estimate rate, x, x', torque and phase of nearly linear motion as it turns (5, n)."""
+        """Estimate rate, x, x', torque and phase (5, n) of nearly linear motion at its extreme."""
         speed, natural = 2j * np.pi * frequency, GRAVITY / self.length
         y = self.length * np.sin(angle)
         rate = -(natural * (1 - angle**2 / 8) + speed**2 + speed * self.drag) * y / (ARM * speed)
@@ -93,9 +94,9 @@ class Plant:
         return np.array([rate.real, zero, zero, np.abs(torque), np.angle(torque) + np.pi / 2])
 
     def periodic(self, angle: np.ndarray, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Torques of the symmetric motions with these slosh amplitudes, and their multipliers.
+        """Return torques and Floquet multipliers of symmetric motions with given slosh amplitudes.
 
-        Motion that Newton's method does not find is NaN.
+        They are NaN if Newton's method does not converge.
         """
         count, unknown = len(angle), self.guess(angle, frequency)
         turning = self.length * np.sin(angle)
@@ -104,7 +105,7 @@ class Plant:
             state = np.stack([unknown[0], unknown[1], y, unknown[2], vy])
             return self.half_period(state, unknown[3], unknown[4], f)
 
-        # the unknowns as they are, each of them nudged, then y and y' nudged
+        # states for difference quotients: unperturbed; each unknown perturbed; y and y' perturbed
         nudged = NUDGE * np.hstack([np.zeros((7, 1)), np.eye(7)])[:, :, None]
         with np.errstate(all="ignore"):
             for _ in range(9):
@@ -130,12 +131,12 @@ class Plant:
 
 
 def onsets(plant: Plant, frequencies: np.ndarray) -> np.ndarray:
-    """Torque at which planar slosh loses its stability at each frequency, N·m; NaN without one."""
+    """Return the torque at which planar slosh becomes unstable at each frequency, N·m, or NaN."""
     shape = (len(frequencies), len(ANGLES))
     angle = np.tile(ANGLES, shape[0])
     torque, multipliers = plant.periodic(angle, np.repeat(frequencies, shape[1]))
     torque = torque.reshape(shape)
-    # complex multipliers belong to motion in the plane
+    # ignore complex multipliers, which belong to motion in the plane
     real = np.where(np.abs(multipliers.imag) < 1e-9, multipliers.real, 0).min(axis=1)
     margin = (real + 1).reshape(shape)
     found = np.full(shape[0], np.nan)
@@ -150,7 +151,7 @@ def onsets(plant: Plant, frequencies: np.ndarray) -> np.ndarray:
 
 
 def onset(depth: float = DEPTH) -> tuple[float, float]:
-    """Frequency (Hz) and torque (N·m) of the onset of rotary slosh at a depth (m)."""
+    """Return frequency (Hz) and torque (N·m) of the onset of rotary slosh at a depth (m)."""
     torques = onsets(Plant(depth), FREQUENCIES)
     least = int(np.nanargmin(torques))
     return float(FREQUENCIES[least]), float(torques[least])

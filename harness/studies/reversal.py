@@ -1,10 +1,11 @@
-"""Draw what a thrust reversal does to the liquid of Spacecraft: book/ball.svg.
+"""Draws the motion of the liquid of Spacecraft during thrust reversals, book/ball.svg.
 
     PYTHONPATH=harness/python python3 harness/studies/reversal.py
 
-needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft``) and the packages in
-requirements.txt. The default craft, 1180 kg with 382 kg of liquid in a half-full upright cylinder
-1.2 m high: thrust forwards, backwards with 0.01 m/s² of the dry craft, forwards again.
+It needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft``) and the packages
+in requirements.txt. The craft is the FMU's default, 1180 kg with 382 kg of liquid in a half-full
+upright cylinder, 1.2 m high. The thrust is forwards, then backwards with 0.01 m/s² of the dry
+craft, then forwards again.
 """
 
 from pathlib import Path
@@ -35,14 +36,14 @@ OUTPUTS = [
 def simulate() -> pd.DataFrame:
     """Return the simulated run, with a row every 0.1 s."""
     times = [0.0, REVERSED, REVERSED, RESUMED, RESUMED, END]
-    # Off the axis by 0.2 % forwards, so that the liquid does not come back in the middle.
+    # The forward thrust is tilted by 0.2 %, so that the liquid does not return along the axis.
     along = [FORWARD, FORWARD, BACK, BACK, FORWARD, FORWARD]
     inputs = pd.DataFrame({"time": times, "force[3]": along, "force[1]": 0.002 * np.abs(along)})
     return hubslosh.simulate(FMU, PARAMETERS, inputs, step=0.1, outputs=OUTPUTS, tolerance=1e-8)
 
 
 def draw(picture: Path) -> None:
-    """Compute, print and draw."""
+    """Simulate the run, print the energy balance, and draw the picture."""
     run = simulate()
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     figure, axes = plt.subplots(3, figsize=(7.2, 7.2), sharex=True, layout="constrained")

@@ -1,10 +1,10 @@
-"""Draw what rotary slosh does to the bench: book/rotary.svg, the picture in README.
+"""Draws the effect of rotary slosh on the bench, book/rotary.svg, the picture in the README.
 
     PYTHONPATH=harness/python python3 harness/studies/rotary_branch.py
 
-needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt. One
-sine sweep of 0.2 N·m, 1.25 to 3.5 Hz in 2700 s, through the linear and the spherical model; seconds
-of work.
+It needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
+It simulates one sine sweep of 0.2 N·m, 1.25 to 3.5 Hz in 2700 s, with the linear and the spherical
+model, in some seconds.
 """
 
 from pathlib import Path
@@ -21,9 +21,9 @@ PICTURE = ROOT / "book" / "rotary.svg"
 AMPLITUDE = 0.2  # N·m
 FIRST, LAST, DURATION = 1.25, 3.5, 2700.0  # Hz, Hz, s
 STEP = 0.02  # s
-WINDOW = 2.0  # s, several cycles of the sweep; it passes 2 mHz in that time
-SHOWN = (2.2, 3.1)  # Hz
-PATHS = (2.3, 2.6, 2.85, 3.05)  # Hz
+WINDOW = 2.0  # window of several cycles, s, in which the frequency changes by 2 mHz
+SHOWN = (2.2, 3.1)  # frequency range of the picture, Hz
+PATHS = (2.3, 2.6, 2.85, 3.05)  # frequencies at which paths of the liquid are drawn, Hz
 
 SIZE = (880, 560)
 STYLE = """
@@ -42,7 +42,7 @@ text.a{fill:var(--a);stroke:none}text.b{fill:var(--b);stroke:none}text.c{fill:va
 
 
 def sweep(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency (Hz) and torque (N·m) of the sweep, exponential in time."""
+    """Return frequency (Hz) and torque (N·m) of the sweep, whose frequency grows exponentially."""
     rate = np.log(LAST / FIRST) / DURATION
     phase = 2 * np.pi * FIRST * np.expm1(rate * time) / rate
     return FIRST * np.exp(rate * time), AMPLITUDE * np.sin(phase)
@@ -62,10 +62,13 @@ def envelope(signal: pd.Series) -> np.ndarray:
 
 
 class Panel:
-    """A pair of linear axes at a place of the drawing."""
+    """A pair of linear axes in the drawing."""
 
     def __init__(self, box: tuple, x: tuple, y: tuple, ticks: tuple, labels: tuple):
-        """box: left, top, right, bottom, px; x, y: ranges; ticks, labels: of both axes."""
+        """Create the axes in ``box`` (left, top, right, bottom, px).
+
+        ``x`` and ``y`` are the ranges; ``ticks`` and ``labels`` have entries for both axes.
+        """
         (self.left, self.top, self.right, self.bottom), self.x, self.y = box, x, y
         self.parts = []
         for value in ticks[0]:
@@ -87,7 +90,7 @@ class Panel:
         self.parts.append(f'<path class="frame" d="{frame}"/>')
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Return the place of a point on the drawing, px."""
+        """Return the coordinates of a point in the drawing, px."""
         across = (x - self.x[0]) / (self.x[1] - self.x[0])
         up = (y - self.y[0]) / (self.y[1] - self.y[0])
         width, height = self.right - self.left, self.bottom - self.top
@@ -100,12 +103,12 @@ class Panel:
         self.parts.append(f'<path class="{style}" d="M{path}"/>')
 
     def text(self, x: float, y: float, words: str, style: str) -> None:
-        """Write at a place in px."""
+        """Write text at the coordinates ``x`` and ``y``, px."""
         self.parts.append(f'<text class="{style}" x="{x:.1f}" y="{y:.1f}">{words}</text>')
 
 
 def picture(frequency: np.ndarray, linear: pd.DataFrame, spherical: pd.DataFrame) -> str:
-    """Draw the sweeps."""
+    """Return the picture of both sweeps as SVG text."""
     middle = frequency[round(WINDOW / STEP / 2) :: round(WINDOW / STEP)]
     seen = (middle >= SHOWN[0]) & (middle <= SHOWN[1])
 
@@ -165,7 +168,7 @@ def picture(frequency: np.ndarray, linear: pd.DataFrame, spherical: pd.DataFrame
 
 
 def draw() -> str:
-    """Simulate and draw."""
+    """Simulate both sweeps, and return the picture as SVG text."""
     time = np.arange(round(DURATION / STEP) + 1) * STEP
     frequency, torque = sweep(time)
     inputs = pd.DataFrame({"time": time, "tau_cmd": torque})

@@ -1,21 +1,21 @@
-"""The instructions of fmi2DoStep in one and in six axes, as a table in Markdown.
+"""Counts the processor instructions of fmi2DoStep of HubSlosh and Spacecraft; prints a table.
 
     python3 harness/studies/six_axes.py [--short] dist/HubSlosh.fmu dist/Spacecraft.fmu
 
-needs Linux, a C compiler, Python 3.11 or newer and valgrind. FMUs packed from older source will
-do, too: what they have no name for is left out. The host of step_cost.py sets a torque and its
-slope and calls fmi2DoStep with 20 ms, 1000 times after 100; the table has the mean. With --short
-two rows are counted and compared with the page: 10 % apart at most, since compilers differ by some
-per cent.
+It needs Linux, a C compiler, Python 3.11 or newer and valgrind. FMUs of older versions are
+accepted, too; parameters that they do not have are left out. The host of step_cost.py sets a torque
+and its slope and calls fmi2DoStep with 20 ms; the table has the mean over 1000 steps, after the
+first 100 steps. With --short only two rows are counted, and compared with the page. They may differ
+by 10 %, because compilers differ by some per cent.
 
 | case | what |
 | --- | --- |
 | hub | HubSlosh's bench, spherical model, no friction |
-| held | a craft with the same liquid, one tank and mode, under 1 g, held to one axis by its mass |
-| one | 1180 kg under 2400 N, one tank, one mode, drag by the constant law, as in all releases |
+| held | a craft with the same liquid, one tank and mode, under 1 g, whose large mass leaves one axis |
+| one | 1180 kg under 2400 N, one tank, one mode, constant damping law, as in all releases |
 | two | the same, two tanks of one mode, as in the comparison with Basilisk |
 | four | the same, four tanks of three modes each |
-| planar | one tank, one mode that swings in one plane alone |
+| planar | one tank, one mode that swings in only one plane |
 | curved | one tank, one mode with s = 1.408, kappa = 0.734 |
 """
 
@@ -30,7 +30,7 @@ import step_cost
 
 PAGE = Path(__file__).resolve().parents[2] / "modelDescription/Spacecraft/documentation/model.md"
 STEP = 0.02  # s
-STEPS = (100, 1100)  # between which instructions are counted
+STEPS = (100, 1100)  # first and last step whose instructions are counted
 HELD_MASS = 1e9  # kg
 
 # case, tolerance, row of the table
@@ -47,7 +47,7 @@ ROWS = [
 
 
 def parameters(case: str) -> dict[str, float | str]:
-    """Return the start values that a case sets."""
+    """Return the start values of a case."""
     if case == "hub":
         return {
             "slosh.model": "spherical",
@@ -96,7 +96,7 @@ def parameters(case: str) -> dict[str, float | str]:
 
 
 def count_instructions(program: Path, folder: Path, case: str, tolerance: float) -> float:
-    """Return the number of instructions of one fmi2DoStep, the mean of 1000."""
+    """Return the mean number of instructions of one fmi2DoStep, over 1000 steps."""
     values = parameters(case)
     if case == "hub":
         w, swing = 13.0, {"tau_cmd": 0.05}

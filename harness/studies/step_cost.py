@@ -1,15 +1,16 @@
-"""The instructions of one fmi2DoStep, counted by callgrind: median, largest, and of a bounded step.
+"""Counts the instructions of fmi2DoStep by callgrind: median, largest, and of a bounded step.
 
     python3 harness/studies/step_cost.py dist/HubSlosh.fmu --step 0.001 --swing tau_cmd=0.1 \
         --set slosh.model=spherical --max-steps 1000
     python3 harness/studies/step_cost.py dist/HubSlosh.fmu --table
 
-Needs Linux on x86-64, a C compiler and valgrind. A host in C (step_cost.c) calls fmi2DoStep with
-inputs that swing through a sweep in straight lines. callgrind counts the instructions of each call,
-the same on every machine. With ``--max-steps`` the FMU gets this ``solver.max_steps`` and, at the
-end, a step of 1e6 s, which it refuses after so many internal steps: what a step costs at most.
-Divide it by the instructions per second of your processor (about 2e9) to compare with a deadline.
-``--table`` prints the table of the page "Bound on a step" of HubSlosh.
+It needs Linux on x86-64, a C compiler and valgrind. A host in C (step_cost.c) calls fmi2DoStep with
+inputs that follow a sine sweep, linear within steps. callgrind counts the instructions of each
+call, which are the same on every machine. With ``--max-steps`` the FMU gets this
+``solver.max_steps`` and, at the end, a step of 1e6 s, which it refuses after so many internal
+steps. The instructions of this step are the largest possible number in a step; divide them by the
+instructions per second of your processor (about 2e9) to compare with a deadline. ``--table`` prints
+the table of the page "Bound on a step" of HubSlosh.
 """
 
 import argparse
@@ -24,8 +25,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
-WARM = 20  # steps before those that count
-LONG = 1e6  # s
+WARM = 20  # number of first steps that are not counted
+LONG = 1e6  # length of the step that the FMU refuses, s
 
 # slosh model, modes, friction law, step in s
 CASES = [
@@ -38,7 +39,7 @@ CASES = [
 
 
 def build_host(folder: Path) -> Path:
-    """Compile step_cost.c; return the program."""
+    """Compile step_cost.c; return the path of the program."""
     program = folder / "step_cost"
     source = Path(__file__).with_suffix(".c")
     options = ["-std=gnu11", "-O2", "-Wall", "-Wextra"]
@@ -64,13 +65,13 @@ def arguments(
     tolerance: float = 1e-6,
     long: float = 0.0,
 ) -> list[str]:
-    """Return the arguments of the host.
+    """Return the command-line arguments of the host.
 
-    * ``values``: Start values; enumerations by the names of their items. Names that the FMU does
-      not have are left out, so that older FMUs will do, too.
-    * ``swing``: Sizes of the inputs that swing.
-    * ``frequencies``: First and last angular frequency of the sweep, rad/s.
-    * ``long``: Length of a last step, s; 0: none.
+    * ``values``: start values by name; enumerations by the names of their items. Names that the FMU
+      does not have are left out, so that older FMUs are accepted, too.
+    * ``swing``: amplitudes of the inputs that follow the sweep.
+    * ``frequencies``: first and last angular frequency of the sweep, rad/s.
+    * ``long``: length of a last step, s; 0 for none.
     """
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     variables = {v.get("name"): v for v in root.iter("ScalarVariable")}
@@ -102,7 +103,7 @@ def count_instructions(program: Path, told: Iterable[str]) -> list[int]:
         done = subprocess.run([*tool, program, *told], capture_output=True, text=True)
         if done.returncode:
             sys.exit(done.stderr)
-        # a file for each call, and one for the end of the program
+        # callgrind writes a file for each call, and one for the end of the program
         dumps = sorted(out.parent.glob("out.*"), key=lambda file: int(file.suffix[1:]))
         texts = (file.read_text(encoding="utf-8", errors="replace") for file in dumps)
         totals = (re.search(r"^(?:totals|summary): (\d+)", text, re.MULTILINE) for text in texts)
@@ -110,7 +111,7 @@ def count_instructions(program: Path, told: Iterable[str]) -> list[int]:
 
 
 def words(counts: list[int]) -> tuple[str, str]:
-    """Return the median and the largest count after the first steps."""
+    """Return the median and the largest count after the first steps as text."""
     counted = counts[WARM:]
     return f"{statistics.median(counted):.0f}", str(max(counted))
 
@@ -152,7 +153,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("fmu")
-    parser.add_argument("--table", action="store_true", help="the table of HubSlosh's page")
+    parser.add_argument("--table", action="store_true", help="print the table of HubSlosh's page")
     parser.add_argument("--step", type=float, default=0.001, help="communication step, s")
     parser.add_argument("--steps", type=int, default=2000, help="number of steps")
     parser.add_argument("--set", type=setting, action="append", default=[], metavar="NAME=VALUE")

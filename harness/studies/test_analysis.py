@@ -1,4 +1,4 @@
-"""The harness's features are those of an independent analysis of the same stored runs."""
+"""Features by the harness equal features by an independent analysis of the same stored runs."""
 
 import csv
 import functools
@@ -10,7 +10,8 @@ import pytest
 import check_analysis
 from check_analysis import TOLERANCES
 
-# Around antiresonance and resonance at about the thesis's rate; 0.16 N·m brings rotary slosh.
+# Sweeps around antiresonance and resonance, about as slow as in the thesis; with 0.16 N·m the slosh
+# becomes rotary.
 PLAN = """
 title = "For the analysis"
 profile = "exp-sweep:f0=2.1,f1=2.8,duration=800"
@@ -24,7 +25,7 @@ imu.seed = 1
 """
 
 
-# the two tests look at the same four runs
+# cache the results, because both tests analyse the same four runs
 analyse = functools.cache(check_analysis.analyse)
 
 
@@ -44,7 +45,7 @@ def test_every_feature_is_reproduced_from_its_definition(campaign: Path) -> None
     assert check_analysis.compare(campaign, analyse) == []
     with (campaign / "features.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    # every feature was there to be compared, the rotary ones too
+    # all features exist, also those of rotary slosh
     turning = rows[-1]
     assert [turning[column] for column in TOLERANCES if turning[column] == ""] == []
     assert rows[0]["rotary_from_hz"] == ""

@@ -1,4 +1,4 @@
-"""HubSlosh has the scores of the slosh benchmark's table; score.py says what is wrong."""
+"""Slosh benchmark: the scores of HubSlosh equal the table; score.py reports wrong results."""
 
 import math
 import sys
@@ -20,18 +20,18 @@ import plain  # noqa: E402
 import score  # noqa: E402
 
 SHOWN = 0.1
-"""Digits of the table are rounded to this; sums of NumPy differ by less."""
+"""Resolution of the correct digits in the table; differences between NumPy's sums are smaller."""
 
 
 def kept(name: str) -> dict[str, dict[str, str]]:
-    """Return the rows that the stored table has for an implementation, by case."""
+    """Return the rows of the stored table for an implementation, by case."""
     return {row["case"]: row for row in compare.read_scores() if row["implementation"] == name}
 
 
 def test_hubslosh_has_the_scores_of_the_table(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Results of all ten cases have the scores of the table, from 12 digits on to one digit."""
+    """The results of all ten cases have the scores of the table, to one digit."""
     monkeypatch.setattr(hubslosh_fmus, "FOLDER", fmu.parent)
     for case, run in hubslosh_fmus.CASES.items():
         cases.write(tmp_path, case, run())
@@ -46,7 +46,7 @@ def test_hubslosh_has_the_scores_of_the_table(
         assert each.digits == pytest.approx(float(row["digits"]), abs=slack), each
 
 
-def test_the_table_is_made_of_the_scores() -> None:
+def test_the_table_in_the_readme_equals_the_stored_scores() -> None:
     """The table in the README of the benchmark equals the file scores.csv."""
     text = compare.PAGE.read_text(encoding="utf-8")
     assert text == compare.with_table(text, compare.read_scores())
@@ -54,7 +54,7 @@ def test_the_table_is_made_of_the_scores() -> None:
 
 @pytest.mark.parametrize("case", ["linearisation", "backbones"])
 def test_a_plain_script_has_the_scores_of_the_table(case: str, tmp_path: Path) -> None:
-    """The script with SciPy reaches the scores of the table in the quick cases."""
+    """The script uses SciPy; cases that take long are left out."""
     cases.write(tmp_path, case, plain.CASES[case]())
     found = score.score(case, tmp_path / case / "results.csv")
     row = kept("SciPy")[case]
@@ -65,7 +65,7 @@ def test_a_plain_script_has_the_scores_of_the_table(case: str, tmp_path: Path) -
 
 @pytest.mark.parametrize("case", list(score.specification()))
 def test_a_page_has_every_number_of_its_parameters_and_inputs(case: str) -> None:
-    """Programs read the files, people the page; the page names every column with its unit."""
+    """The page repeats the numbers of the files, and names every column with its unit."""
     page = BENCHMARK.joinpath(case, "page.md").read_text(encoding="utf-8")
     parameters = BENCHMARK / case / "parameters.toml"
     if parameters.exists():
@@ -79,8 +79,8 @@ def test_a_page_has_every_number_of_its_parameters_and_inputs(case: str) -> None
     assert ",".join(score.header(*column) for column in columns.items()) in page
 
 
-def test_the_benchmark_is_small() -> None:
-    """All files of the benchmark together have at most 2 MB."""
+def test_all_files_of_the_benchmark_together_have_at_most_2_mb() -> None:
+    """A copy of the benchmark is therefore small."""
     files = [path for path in BENCHMARK.rglob("*") if path.is_file() and path.suffix != ".pyc"]
     assert sum(path.stat().st_size for path in files) < 2e6
 
@@ -100,12 +100,12 @@ def scored(lines: list[str], folder: Path, case: str = "bench_linear") -> score.
 
 
 def changed(change: Callable[[list[float]], list[float]]) -> list[str]:
-    """Return the reference result of bench_linear with changed rows."""
+    """Return the lines of the reference result of bench_linear with changed rows."""
     head, *rows = reference("bench_linear")
     return [head, *(",".join(map(repr, change([*map(float, row.split(","))]))) for row in rows)]
 
 
-def test_a_reference_scores_all_digits(tmp_path: Path) -> None:
+def test_a_reference_result_has_the_largest_score(tmp_path: Path) -> None:
     """Columns in another order, further times, comments and spaces are allowed."""
     lines = reference("bench_linear")
     assert scored(lines, tmp_path).digits == score.MOST_DIGITS
@@ -134,7 +134,7 @@ def test_correct_digits_are_computed_from_the_error_over_the_largest_value(
 @pytest.mark.parametrize(
     ("factor", "hint"), [(180 / math.pi, "degrees for radians"), (-1.0, "the opposite sign")]
 )
-def test_a_common_factor_is_named(factor: float, hint: str, tmp_path: Path) -> None:
+def test_a_hint_names_a_wrong_unit_or_sign(factor: float, hint: str, tmp_path: Path) -> None:
     """The message names a column that is in degrees, or that has the opposite sign."""
     found = scored(changed(lambda row: [row[0], factor * row[1], *row[2:]]), tmp_path)
     assert not found.passed
@@ -163,10 +163,10 @@ HEAD = "time [s],theta [rad],omega [rad/s],alpha [rad]"
         ([HEAD, "0,0,nan,0.05"], "no row with time = 0.1 s"),
     ],
 )
-def test_a_file_that_cannot_be_scored_says_why(
+def test_the_error_about_a_file_that_cannot_be_scored_names_the_reason(
     lines: list[str], words: str, tmp_path: Path
 ) -> None:
-    """The message names the place of the fault and the allowed values."""
+    """The message names the line or column, and the allowed values."""
     with pytest.raises(score.ResultsError) as error:
         scored(lines, tmp_path)
     assert words in str(error.value)
@@ -183,7 +183,7 @@ def test_rows_with_wrong_times_and_values_that_are_not_finite_are_refused(tmp_pa
 
 
 def test_measurements_that_are_missing_count_as_failed(tmp_path: Path) -> None:
-    """A file with only one of 24 rows, or with a row that does not exist, is scored."""
+    """A file with only one of 24 rows is scored; a row that does not exist is an error."""
     found = scored(["row [1],value [various]", "4,7.8"], tmp_path, "measured")
     assert (found.digits, found.needed, found.passed) == (1.0, 24.0, False)
     with pytest.raises(score.ResultsError, match="there is no row 25"):

@@ -1,4 +1,4 @@
-"""A plan's runs on a Dask cluster: the harness's tables, whatever happens to runs and workers."""
+"""Runs on a Dask cluster equal runs of the harness, also if runs fail or workers are killed."""
 
 import sys
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ def client() -> Iterator[Client]:
 
 @pytest.fixture
 def harness(program: Path, fmu: Path, tmp_path: Path):
-    """Return a function that makes a `cluster.Harness` of a plan's text and a directory's name."""
+    """Return a function that creates a `cluster.Harness` from a plan's text and a directory name."""
 
     def make(plan: str, out: str) -> cluster.Harness:
         path = tmp_path / "plan.toml"
@@ -52,7 +52,7 @@ def harness(program: Path, fmu: Path, tmp_path: Path):
 
 @pytest.fixture
 def long_runs(monkeypatch) -> None:
-    """Let a run last half a second, so that a worker can be killed in the middle of one."""
+    """Make each run last half a second, so that a worker can be killed in the middle of a run."""
     right = cluster.drive_here
 
     def drive_here(fmu, run, torque, columns):
@@ -67,7 +67,7 @@ def long_runs(monkeypatch) -> None:
 
 @pytest.mark.usefixtures("long_runs")
 def test_runs_of_a_cluster_with_a_killed_worker_equal_runs_of_the_harness(client, harness) -> None:
-    """Runs on a cluster with a killed worker are bit-identical to runs of `hubslosh campaign`."""
+    """The results are bit-identical to those of `hubslosh campaign`."""
     theirs = harness(PLAN, "theirs")
     worst, killer = compare(client, harness(PLAN, "ours"), theirs)
     assert len(worst) > 80
@@ -88,10 +88,10 @@ def test_a_new_worker_receives_fmu_and_torque_after_the_only_worker_was_killed(h
     assert killer.interrupted
 
 
-def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
+def test_a_refused_run_and_a_run_that_kills_its_workers_do_not_affect_other_runs(
     client, harness, monkeypatch
 ) -> None:
-    """A second start simulates only runs that are missing, damaged, or of another recipe."""
+    """A second start simulates only runs that are missing, damaged, or have other settings."""
     plan = 'profile = "sine:duration=2"\n[vary]\ntank.h = [0.05, -1, 0.07, 0.09, 0.11]\n'
     ours = harness(plan, "c")
     right = cluster.drive_here
@@ -104,7 +104,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
             os._exit(1)
         return right(fmu, run, torque, columns)
 
-    # one death is enough; four, as usual, take longer
+    # give up after one killed worker instead of four, which saves time
     monkeypatch.setattr(client.cluster.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(cluster, "drive_here", drive_here)
     made: list[str] = []
@@ -112,7 +112,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
     assert sorted(made) == ["linear_110mm_100", "linear_50mm_100", "linear_90mm_100"]
     assert sorted(failed) == ["linear_-1000mm_100", "linear_70mm_100"]
     assert "tank.h = -1" in failed["linear_-1000mm_100"]
-    assert failed["linear_70mm_100"] == "1 workers died while they made it"
+    assert failed["linear_70mm_100"] == "1 workers died while they simulated it"
     monkeypatch.undo()
 
     whole = ours.out / "runs" / "linear_50mm_100.parquet"
@@ -135,7 +135,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
     assert len(made) == 4
 
 
-def test_errors_are_reported_before_a_worker_starts(monkeypatch, capsys, fmu, tmp_path) -> None:
+def test_errors_are_reported_before_workers_are_started(monkeypatch, capsys, fmu, tmp_path) -> None:
     """A wrong plan, program or number of workers gives one sentence, and no file is written."""
     monkeypatch.chdir(tmp_path)
     for flags, words in (
@@ -151,8 +151,8 @@ def test_errors_are_reported_before_a_worker_starts(monkeypatch, capsys, fmu, tm
     assert not list(tmp_path.iterdir())
 
 
-def test_differences_of_cells_are_relative_and_a_text_differs_or_not() -> None:
-    """An empty cell compared with a number counts as a large difference."""
+def test_differences_of_numbers_are_relative_and_of_texts_zero_or_infinite() -> None:
+    """The difference between an empty cell and a number is infinite."""
     assert difference("1.5", "1.50") == 0.0
     assert difference("2.0", "2.000000002") == pytest.approx(1e-9)
     assert difference("", "0.1") == difference("a", "b") == float("inf")

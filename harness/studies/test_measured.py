@@ -12,13 +12,13 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture
 def built(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the script take FMUs of this build."""
+    """Make the script use the FMUs of this build."""
     built = {name: fmu.with_name(f"{name}.fmu") for name in measured.FMUS}
     monkeypatch.setattr(measured, "FMUS", built)
 
 
 @pytest.mark.usefixtures("built")
-def test_the_page_is_made_of_the_results() -> None:
+def test_the_page_equals_the_stored_results() -> None:
     """Page, README and verification state how many of the stored comparisons pass."""
     rows = measured.read_results()
     assert measured.PAGE.read_text(encoding="utf-8") == measured.page(rows, measured.computed())
@@ -43,7 +43,7 @@ def test_the_comparisons_reproduce_the_stored_values_and_pictures(name: str) -> 
 
 
 def test_every_measurement_has_its_source() -> None:
-    """A file of numbers has its source, its licence and its error."""
+    """Each file of numbers states its source, its licence and its error."""
     files = [file for file in measured.DATA.glob("*.csv") if file != measured.RESULTS]
     assert len(files) >= 6
     for file in files:

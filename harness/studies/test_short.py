@@ -1,7 +1,7 @@
-"""Short forms of the studies: the book's numbers and pictures are those that the studies compute.
+"""Short forms of the studies: numbers and pictures of the book equal those that studies compute.
 
-Studies that run as a whole within seconds have their own files: `test_measured`, `test_cluster`,
-`test_analysis`. `.ci/long-tests` runs all but the last.
+Studies that take only seconds have files of their own: `test_measured`, `test_cluster` and
+`test_analysis`. `cargo test` runs `test_analysis`, and `.ci/long-tests` runs all others.
 """
 
 import json
@@ -49,7 +49,7 @@ def lines(page: str) -> list[str]:
 
 
 def cells(page: str, first: str) -> list[str]:
-    """Return the cells of the page's only table row that begins with ``first``, without those."""
+    """Return the cells after ``first`` in the only table row of a page that begins with it."""
     (row,) = (line for line in lines(page) if line.startswith(f"| {first} |"))
     return [cell.strip() for cell in row.removeprefix(f"| {first} |").strip("| ").split("|")]
 
@@ -65,8 +65,8 @@ def style() -> None:
     plt.rcdefaults()
 
 
-def test_rotary_slosh_of_the_readme(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The picture of two sweeps of 2700 s in the README is reproduced."""
+def test_the_picture_of_rotary_slosh_in_the_readme_is_reproduced(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It shows two sweeps of 2700 s."""
     monkeypatch.setattr(rotary_branch, "FMU", fmu)
     same_picture(rotary_branch.draw(), rotary_branch.PICTURE)
 
@@ -92,17 +92,17 @@ def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
 
 
 @pytest.mark.parametrize(("study", "model"), [(mode_errors, "HubSlosh"), (reversal, "Spacecraft")])
-def test_a_picture_of_the_book(
+def test_the_studies_reproduce_two_pictures_of_the_book(
     study, model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Pictures that the studies `mode_errors` and `reversal` draw equal those of the book."""
+    """The studies are `mode_errors` and `reversal`."""
     monkeypatch.setattr(study, "FMU", fmu.with_name(f"{model}.fmu"))
     study.draw(tmp_path / "picture.svg")
     same_picture((tmp_path / "picture.svg").read_text(encoding="utf-8"), study.PICTURE)
 
 
 def test_damping_over_the_fill_of_a_capsule_has_no_step() -> None:
-    """Damping ratios equal the numbers printed in book/damping.md, to their last digits."""
+    """Damping ratios equal the numbers in book/damping.md in all printed digits."""
     text = " ".join(lines("damping.md"))
     at_tangent = re.search(r"where the ratio is ([\d.]+) %", text)
     ends = re.search(r"From 24 to 29 % it stays between ([\d.]+) and ([\d.]+) %", text)
@@ -115,10 +115,7 @@ def test_damping_over_the_fill_of_a_capsule_has_no_step() -> None:
 
 
 def slowed(depth: float) -> float:
-    """Return by how much, in %, a tilt of 60 degrees lowers the frequency along the slope.
-
-    It is one of the study's eleven tilts.
-    """
+    """Return the decrease of the frequency along the slope by a tilt of 60 degrees, %."""
     upright, tilted = (tilted_tank.frequencies(depth, tilt)[0] for tilt in (0, 60))
     return 100 * (1 - tilted / upright)
 
@@ -140,13 +137,15 @@ def test_tilt_slows_slosh_of_deeper_liquid() -> None:
 @pytest.mark.parametrize(
     "case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "noise")]
 )
-def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_rows_on_damping_of_the_bench_are_reproduced(
+    case, fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Two simulated rows equal the rows of book/damping.md in all printed digits."""
     monkeypatch.setattr(bench_damping, "FMU", fmu)
     table = bench_damping.text(pd.DataFrame([bench_damping.case(case)])).splitlines()
     (row,) = (line for line in table if line.startswith(f"| {case[0]} |"))
     page = lines("damping.md")
-    # the rows of 5 cm stand before those of 10 cm
+    # rows of the 5 cm fill come before rows of the 10 cm fill
     start = page.index(next(line for line in page if line.startswith("| 10 cm fill:")))
     assert row in (page[:start] if case[2] == 0.05 else page[start:])
 
@@ -154,21 +153,22 @@ def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_the_motion_equals_that_of_the_last_release(
     fmu: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    """Every slosh model and friction law moves as in release 0.1.0 over 300 s.
+    """All slosh models and friction laws give the motion of the last release over 300 s.
 
-    The 2700 s and release 0.1.0 are by hand.
+    Runs of 2700 s, and comparisons with release 0.1.0, are started by hand.
     """
     monkeypatch.setattr(sys, "argv", ["", "--short", "--now", os.fspath(fmu)])
     assert compare_releases.main() == 0, capsys.readouterr().out
 
 
 @pytest.mark.parametrize("model", ["linear", "spherical"])
-def test_errors_of_work_and_precision(
+def test_the_errors_in_the_work_precision_tables_are_reproduced(
     model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The FMU's errors over 2700 s at two tolerances equal the digits printed in the book.
 
-    Costs depend on the machine; other methods and instructions are by hand.
+    CPU times are not tested, because they depend on the machine; other methods and the counts of
+    instructions take too long for a test.
     """
     program = work_precision.build()
     (tmp_path / "dist").mkdir()
@@ -182,11 +182,11 @@ def test_errors_of_work_and_precision(
         assert error == pytest.approx(float(printed), abs=1.01 * half_digit(printed))
 
 
-def test_a_flight_identifies_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
+def test_a_simulated_flight_identifies_slosh_as_in_the_book(fmu: Path, program: Path, tmp_path: Path) -> None:
     """The estimates of one simulated flight equal the table of one flight in book/flight.md.
 
-    The flight has the seed 1 and the good gyro. Beyond the printed digits estimates may differ by
-    0.1 of their standard deviations, and these by 5 %: far below what decides an interval.
+    The flight has the seed 1 and the good gyro. Beyond the printed digits, estimates may differ by
+    0.1 of their standard deviations, and standard deviations by 5 %, which hardly changes intervals.
     """
     spacecraft = os.fspath(fmu.with_name("Spacecraft.fmu"))
     truth, found, _ = flight_twin.twin(1, "good", os.fspath(program), spacecraft, tmp_path)
@@ -208,11 +208,14 @@ def test_a_flight_identifies_slosh(fmu: Path, program: Path, tmp_path: Path) -> 
         assert estimate["value"] == pytest.approx(float(value), abs=slack)
 
 
-def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Of 20 intervals from five simulated recordings of HubSlosh 17 contain the true value.
+def test_at_least_17_of_20_intervals_of_a_sticking_hub_contain_the_true_value(
+    fmu: Path, program: Path, tmp_path: Path
+) -> None:
+    """The intervals are from five simulated recordings of HubSlosh.
 
-    Chance makes 17 or more of 20 of 95 % in 98 of 100 cases; seeds are fixed. Stated deviations
-    are within a factor of two of the page's medians: inertia and friction are drawn within 30 %.
+    Of 20 correct 95 % intervals, 17 or more contain the true value with a probability of 98 %; the
+    seeds are fixed. Standard deviations are within a factor of two of the medians on the page,
+    because inertia and friction are drawn within 30 %.
     """
     case = identify_twins.CASES["Hub"]
     case.fmu = os.fspath(fmu)
@@ -236,7 +239,7 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a plant for Linux")
 @pytest.mark.parametrize("liquid", foreign_plants.LIQUIDS)
-def test_the_foreign_plant_without_effects_is_hubslosh(
+def test_the_foreign_plant_without_effects_equals_hubslosh(
     liquid: str, fmu: Path, tmp_path: Path
 ) -> None:
     """The second simulator and HubSlosh agree to 1e-7 of the largest rate, also with stops.
@@ -267,11 +270,10 @@ def test_the_foreign_plant_without_effects_is_hubslosh(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
 @pytest.mark.parametrize("only", ["decay", "gyro", "tank", "design --free"])
-def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Of four 95 % intervals at most one misses the true value.
-
-    Correct intervals would fail this test with a probability of 1.4 %.
-    """
+def test_at_most_one_of_four_intervals_misses_the_true_value(
+    only: str, fmu: Path, program: Path, tmp_path: Path
+) -> None:
+    """Correct 95 % intervals fail this test with a probability of 1.4 %."""
     bench = intervals.Bench(os.fspath(program), os.fspath(fmu), tmp_path)
     rows = list(intervals.census(bench, only, 4))
     assert rows
@@ -281,12 +283,14 @@ def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: 
         held, without, of_fit = found.groups()
         assert int(held) >= 3
         assert without == "0", row
-        # a width that was foretold is that of the fit
+        # the width that `design` predicts is the width of the fit
         assert of_fit == "-" or abs(float(of_fit.split()[0]) - 1) < 0.2, row
 
 
-def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
-    """The check of an FMU with 1000 variables, as in book/check_ci.md, finds no error."""
+def test_the_check_of_an_fmu_with_many_variables_finds_no_error(
+    program: Path, tmp_path: Path
+) -> None:
+    """The FMU is that of book/check_ci.md, with 1000 variables."""
     fmu = tmp_path / "large.fmu"
     large_fmu.write(fmu, 1000)
     done = subprocess.run([program, "check", fmu, "--json"], capture_output=True, check=False)
@@ -297,10 +301,10 @@ def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:tank.*outside the measured")
-def test_the_times_of_a_design_review_count_its_tasks(
+def test_the_table_of_design_times_has_every_step_with_its_number_of_tasks(
     fmu: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The table has a row for each step of a design review with its number of tasks."""
+    """The short form measures few tasks."""
     import hubslosh
 
     telecom, _ = design_times.satellite()

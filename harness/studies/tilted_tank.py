@@ -1,9 +1,9 @@
-"""Draw how tilt changes the slosh frequencies of an upright cylinder: book/tilted_tank.svg.
+"""Draws slosh frequencies of a cylinder over the tilt of its axis, book/tilted_tank.svg.
 
     PYTHONPATH=harness/python python3 harness/studies/tilted_tank.py
 
-Needs gmsh, scikit-fem and matplotlib (``requirements.txt``). Three fills, each at eleven angles
-between the tank's axis and gravity; a minute of work.
+It needs gmsh, scikit-fem and matplotlib (``requirements.txt``). It computes three fills, each at
+eleven angles between the tank's axis and gravity, in a minute.
 """
 
 from pathlib import Path
@@ -15,13 +15,13 @@ import numpy as np
 import hubslosh
 
 PICTURE = Path(__file__).resolve().parents[2] / "book" / "tilted_tank.svg"
-RADIUS, HEIGHT = 0.1, 2.0  # m; the tank is high enough for any tilt here
-DEPTHS = (0.5, 1.0, 2.0)  # of the upright liquid, of the radius
+RADIUS, HEIGHT = 0.1, 2.0  # m; the liquid does not reach the top at any tilt
+DEPTHS = (0.5, 1.0, 2.0)  # depth of the liquid in the upright tank, radii
 TILTS = np.linspace(0, 60, 11)  # degrees
 
 
 def frequencies(depth: float, tilt: float) -> tuple[float, float]:
-    """Lowest frequencies (Hz) along the slope of the tank and across it."""
+    """Return the lowest slosh frequencies (Hz) along the slope of the tank and across it."""
     angle = np.radians(tilt)
     found = hubslosh.liquid_modes(
         {"cylinder": {"radius": RADIUS, "height": HEIGHT}}, f"{100 * depth * RADIUS / HEIGHT}%",
@@ -34,7 +34,7 @@ def frequencies(depth: float, tilt: float) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Compute and draw."""
+    """Compute the frequencies, and draw the picture."""
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
     for depth, color in zip(DEPTHS, ("#0072b2", "#d55e00", "#009e73"), strict=True):

@@ -1,11 +1,11 @@
-"""Draws the work-precision diagram: error over the thesis's sweep against cost.
+"""Draws the work-precision diagram of a sweep of the thesis: error over CPU time of integrators.
 
     PYTHONPATH=harness/python python3 harness/studies/work_precision.py
 
-needs Rust, dist/HubSlosh.fmu (``cargo run --release -- pack``), Python 3.11 or newer and, for
-the instruction counts, valgrind; the first run makes a virtual environment in the target
-directory and needs the network. It takes some ten minutes, most of them SciPy's. Better leave the
-machine alone meanwhile: times are compared with each other. Then it runs work_precision_six.py.
+It needs Rust, dist/HubSlosh.fmu (``cargo run --release -- pack``), Python 3.11 or newer and, for
+the instruction counts, valgrind. The first run creates a virtual environment in the target
+directory and needs the network. It takes some ten minutes, mostly for SciPy. Use the machine for
+nothing else meanwhile, because CPU times are compared. Finally it runs work_precision_six.py.
 
 All methods solve one motion of the bench: an exponential sweep of 2700 s with
 0.1 N·m at a fill of 10 cm. The torque is given at times 20 ms apart and is
@@ -38,13 +38,13 @@ except ModuleNotFoundError as missing:
     environment.run_again_in("work-precision", missing)
 
 matplotlib.use("svg")
-import matplotlib.pyplot as plt  # the backend is chosen first
+import matplotlib.pyplot as plt  # import after the backend is chosen
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "book"
 SWEEP = 2700.0  # s
 STEP = 0.02  # s
-COUNTED = (10.0, 30.0)  # s of sweep between which instructions are counted
+COUNTED = (10.0, 30.0)  # part of the sweep in which instructions are counted, s
 
 TOLERANCES = ["1e-2", "1e-3", "1e-4", "3e-5", *(f"1e-{n}" for n in range(5, 11))]
 RUST = {
@@ -59,20 +59,23 @@ RUST = {
     "RK4, fixed step": ("rk4", ["5e-3", "1e-3", "2e-4"]),
 }
 RUNS = {"dopri5": 3, "dopri5@1e-8": 3, "dop853": 3}
-"""Number of solutions of each motion, 10 by default."""
+"""Number of repetitions of each measurement, by method; 10 by default."""
 PRINTED = {"1e-2", "1e-4", "1e-6", "1e-8", "1e-10"}
-"""Tolerances in the page's table, of a method with more than three; the picture has all."""
+"""Tolerances in the table, for methods with more than three; the picture has all tolerances."""
 SCIPY = {"SciPy RK45": ("RK45", [1e-4, 1e-6]), "SciPy LSODA": ("LSODA", [1e-5, 1e-7])}
 
 
 def build() -> Path:
-    """Build the Rust side and return its program; not by ``-p``, which compiles most again."""
+    """Build the Rust program and return its path.
+
+    The build does not use ``-p``, which would compile most crates again.
+    """
     command = ["cargo", "build", "--release", "--workspace", "--example", "work_precision"]
     done = subprocess.run(
         [*command, "--message-format=json"], cwd=ROOT, stdout=subprocess.PIPE, text=True
     )
     if done.returncode:
-        sys.exit("error: the Rust side did not build")
+        sys.exit("error: the Rust program could not be built")
     messages = (json.loads(line) for line in done.stdout.splitlines())
     found = [m["executable"] for m in messages if m.get("executable")]
     return Path(found[-1])
@@ -88,10 +91,9 @@ def run(program: Path, *arguments: str) -> tuple[float, float]:
 
 
 def instructions(program: Path, method: str, tolerance: str) -> float:
-    """Return a method's instructions per 20 ms, without those for the torque; nan without valgrind.
+    """Return the instructions of a method per 20 ms, without the torque; NaN without valgrind.
 
-    Of the FMU only the instructions of its own functions are counted, not those of the host's
-    calls.
+    For the FMU, only instructions within its functions are counted.
     """
     if method in ("linear", "spherical"):
         return counted(program, method, tolerance, "--toggle-collect=fmi2*")
@@ -100,7 +102,7 @@ def instructions(program: Path, method: str, tolerance: str) -> float:
 
 @functools.cache
 def counted(program: Path, method: str, tolerance: str, *options: str) -> float:
-    """Return instructions per 20 ms, counted by callgrind; nan without valgrind."""
+    """Return the instructions per 20 ms that callgrind counts; NaN without valgrind."""
     counts = []
     for seconds in COUNTED:
         command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
@@ -119,7 +121,7 @@ def counted(program: Path, method: str, tolerance: str, *options: str) -> float:
 
 
 def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, float]:
-    """Solve the smoothed equations by SciPy; returns the same quantities as ``run``."""
+    """Solve the smoothed equations by SciPy; return the same quantities as ``run``."""
     m, length, r, g = 0.756293271862872, 0.045241351252659934, 0.225, 9.81
     i0, c = 0.322414 + 1.3304311084678084 * r * r, 0.06627875369876737
     rate = math.log(3.5 / 1.25) / SWEEP
@@ -151,7 +153,7 @@ def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, floa
 
 
 def basilisk() -> list[tuple[str, float, float]]:
-    """Return the row of RK4 in basilisk.md: step in ms, cost relative to ours at 1e-8, error."""
+    """Return the rows of RK4 in basilisk.md: step (ms), CPU time relative to the FMU, error."""
     rows = re.findall(
         r"^\| Basilisk's RK4 \| (\S+) \| (\S+) \| (\S+) \|$",
         (PAGES / "basilisk.md").read_text(),
@@ -168,7 +170,7 @@ def at_error(points: list[tuple], error: float) -> float:
 def draw(all_points: dict[str, list[tuple]], unit: float) -> None:
     """Draw the diagram.
 
-    Basilisk's costs are given relative to those of our spherical model at 1e-8.
+    CPU times of Basilisk are known relative to the spherical model of the FMU at 1e-8.
     """
     plt.rcParams.update({"svg.hashsalt": "hubslosh", "font.size": 10})
     figure, axes = plt.subplots(figsize=(8, 5.2), layout="constrained")
@@ -200,7 +202,7 @@ def draw(all_points: dict[str, list[tuple]], unit: float) -> None:
 
 
 def table(all_points: dict[str, list[tuple]], unit: float) -> str:
-    """Return the page's table."""
+    """Return the table of the page in Markdown."""
     rows = [
         "| method (eps: width of smoothed friction, 1e-5 rad/s unless stated) "
         "| tolerance (RK4: step, s) | error of the hub's rate, rad/s "
@@ -217,7 +219,7 @@ def table(all_points: dict[str, list[tuple]], unit: float) -> str:
 
 
 def main() -> None:
-    """Measure, draw, write the page."""
+    """Measure all methods, draw the diagram, and write the page."""
     if not (ROOT / "dist" / "HubSlosh.fmu").exists():
         sys.exit("error: dist/HubSlosh.fmu is missing: cargo run --release -- pack")
     program = build()

@@ -1,11 +1,11 @@
-"""Measures error against cost of six axes: Spacecraft.fmu, heyoka, SUNDIALS, SciPy and Basilisk.
+"""Measures error and CPU time of Spacecraft.fmu, heyoka, SUNDIALS, SciPy and Basilisk.
 
     PYTHONPATH=harness/python python3 harness/studies/work_precision_six.py
 
-needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft --out
-dist/Spacecraft.fmu``) and Python 3.11 or newer; the first run makes a virtual environment in the
-target directory and needs the network. It writes its section of book/work_precision.md and takes
-some minutes. Better leave the machine alone meanwhile: times are compared with each other.
+It needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft --out
+dist/Spacecraft.fmu``) and Python 3.11 or newer. The first run creates a virtual environment in the
+target directory and needs the network. It writes its section of book/work_precision.md in some
+minutes. Use the machine for nothing else meanwhile, because CPU times are compared.
 
 The spacecraft is taken from [a case of the slosh
 benchmark](../harness/benchmark/thrust/page.md). It has two pendulums, under
@@ -46,16 +46,16 @@ MARKS = ("<!-- six axes: written by harness/studies/work_precision_six.py -->", 
 FMU = ROOT / "dist" / "Spacecraft.fmu"
 CASE = "thrust"
 ROUNDS = 20
-"""Repetitions of the inputs, every second one with the opposite torque and lateral force."""
+"""Repetitions of the inputs; in every second one torque and lateral force have opposite signs."""
 RUNS = 7
-"""Number of solutions of each motion; the least time counts."""
+"""Number of repetitions of each measurement; the shortest time counts."""
 
 Solution = Callable[[list], np.ndarray]
-"""Returns the states at the rows' times of pieces: begin, end, wrench, times of rows."""
+"""Function from pieces (begin, end, force and torque, times of rows) to the states at all rows."""
 
 
 def pieces(rounds: int, every: float) -> list[tuple[float, float, np.ndarray, np.ndarray]]:
-    """Return the stretches of time in which the inputs are constant, and the rows in each."""
+    """Return the pieces of time in which inputs are constant, with the times of their rows."""
     made = []
     for k in range(rounds):
         turned = np.array([1, 1, 1, 1, 1, 1.0]) if k % 2 == 0 else np.array([-1, -1, 1, -1, -1, -1])
@@ -67,7 +67,7 @@ def pieces(rounds: int, every: float) -> list[tuple[float, float, np.ndarray, np
 
 
 class Heyoka:
-    """heyoka's Taylor integrator, dense output between its steps."""
+    """heyoka's Taylor integrator, with dense output at the rows."""
 
     def __init__(self, tolerance: float) -> None:
         """Compile the integrator."""
@@ -77,7 +77,7 @@ class Heyoka:
         )
 
     def __call__(self, given: list) -> np.ndarray:
-        """Solve the motion for the given rows."""
+        """Return the states at the rows of the given pieces."""
         ta, found = self.taylor, []
         ta.time = 0.0
         ta.state[:] = self.start
@@ -89,7 +89,7 @@ class Heyoka:
 
 
 def compiling() -> float:
-    """Return the CPU time, s, that heyoka takes to compile a craft that is in no cache."""
+    """Return the CPU time, s, in which heyoka compiles a craft that is not in its cache."""
     p = cases.parameters(CASE)
     p["mass"] *= 1 + 1e-9 * np.random.default_rng().random()
     begin = time.process_time()
@@ -99,7 +99,7 @@ def compiling() -> float:
 
 
 class Compiled:
-    """The right-hand side, compiled by heyoka, for integrators that call it."""
+    """Right-hand side of the equations, compiled by heyoka, for other integrators."""
 
     def __init__(self) -> None:
         """Compile the right-hand side."""
@@ -108,7 +108,7 @@ class Compiled:
         self.rates = hy.cfunc([hy.expression(rate) for _, rate in equations], variables)
 
     def of(self, wrench: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
-        """Return a function that computes the rates under this force and torque."""
+        """Return the right-hand side as a function for constant force and torque."""
         rates = self.rates
 
         def written(t: float, y: np.ndarray, y_d: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ class Compiled:
 
 
 def sundials(right: Compiled, tolerance: float) -> Solution:
-    """Return CVODE (Adams), restarted where the inputs jump."""
+    """Return a solution by CVODE (Adams), which is restarted where the inputs jump."""
 
     def solution(given: list) -> np.ndarray:
         y, found = np.array(right.start), []
@@ -136,7 +136,7 @@ def sundials(right: Compiled, tolerance: float) -> Solution:
 
 
 def dop853(right: Compiled, tolerance: float) -> Solution:
-    """Return SciPy's DOP853, restarted where the inputs jump."""
+    """Return a solution by SciPy's DOP853, which is restarted where the inputs jump."""
 
     def solution(given: list) -> np.ndarray:
         y, found = np.array(right.start), []
@@ -154,7 +154,7 @@ def dop853(right: Compiled, tolerance: float) -> Solution:
 
 
 def fmu(tolerance: float) -> Solution:
-    """Return Spacecraft.fmu in steps from row to row; the time for its set-up is included."""
+    """Return a solution by Spacecraft.fmu in steps from row to row, including its set-up."""
     p = cases.parameters(CASE)
     settings, axes = hubslosh_fmus.with_tanks(p)
     names = hubslosh_fmus.columns_of(len(axes))
@@ -173,9 +173,9 @@ def fmu(tolerance: float) -> Solution:
 
 
 def error(found: np.ndarray) -> float:
-    """Return the largest error of 20 s with rows every 0.1 s, relative to the largest values.
+    """Return the largest error over 20 s with rows every 0.1 s, relative to the largest values.
 
-    Solutions have rate, velocity, and for each bob its direction first.
+    Columns of ``found`` are the rate, the velocity, and the direction of each bob.
     """
     columns = score.specification()[CASE]["columns"]
     wanted = score.read(score.HERE / CASE / "results.csv", columns)
@@ -186,12 +186,12 @@ def error(found: np.ndarray) -> float:
 
 
 def without_rates(found: np.ndarray) -> np.ndarray:
-    """Return the columns of a row of the benchmark from omega, velocity, p, p', p, p'."""
+    """Return the columns of the benchmark from omega, velocity, and p and p' of both bobs."""
     return np.hstack([found[:, :9], found[:, 12:15]]) if found.shape[1] == 18 else found
 
 
 def cost(solution: Solution, every: float, rounds: int, runs: int) -> float:
-    """Return CPU time per simulated second, µs; the time of the first round is subtracted."""
+    """Return the CPU time per simulated second, µs, without the time of the first round."""
     long, short = pieces(rounds, every), pieces(1, every)
     solution(short)
 
@@ -207,7 +207,7 @@ def cost(solution: Solution, every: float, rounds: int, runs: int) -> float:
 
 
 def basilisk_row(step: float) -> tuple[float, float]:
-    """Return the error and the cost of Basilisk's RK4 with this step, s."""
+    """Return error and CPU time of Basilisk's RK4 with a step in s."""
     begin = time.process_time()
     found = basilisk.run(CASE, "RK4", step)
     spent = time.process_time() - begin
@@ -215,9 +215,9 @@ def basilisk_row(step: float) -> tuple[float, float]:
 
 
 def measure() -> list[tuple[str, str, float, list[float]]]:
-    """Return for each method tolerance, error, and costs.
+    """Return for each method its name, tolerance, error, and CPU times.
 
-    Costs are with rows every 1 s and every 50 ms.
+    The CPU times are for rows every 1 s and every 50 ms.
     """
     rows = []
     right = Compiled()
@@ -242,14 +242,14 @@ def measure() -> list[tuple[str, str, float, list[float]]]:
 
 
 UNPRINTED = {"1e-6", "1e-10", "1e-15"}
-"""Tolerances that the page's table leaves out."""
+"""Tolerances that the table of the page leaves out."""
 
 AT = 1e-10
-"""Error at which the page's first sentence compares the methods."""
+"""Error at which the first sentence of the page compares the methods."""
 
 
 def at_error(rows: list[tuple[str, str, float, list[float]]]) -> str:
-    """Return in words the smallest cost of each method at this error or a smaller one."""
+    """Return in words the smallest CPU time of each method with an error of at most `AT`."""
     least: dict[str, float] = {}
     for name, _, wrong, (_, fine) in rows:
         if wrong <= AT:
@@ -259,7 +259,7 @@ def at_error(rows: list[tuple[str, str, float, list[float]]]) -> str:
 
 
 def section(rows: list[tuple[str, str, float, list[float]]], compiled: float) -> str:
-    """Return the section of the page."""
+    """Return the section of the page in Markdown."""
 
     def number(x: float) -> str:
         return "–" if math.isnan(x) else f"{x:.3g}"
@@ -301,7 +301,7 @@ def section(rows: list[tuple[str, str, float, list[float]]], compiled: float) ->
 
 
 def with_section(text: str, written: str) -> str:
-    """Return the page with this section between its marks, or at its end."""
+    """Return the page in which this section replaces the old one, or is appended."""
     if MARKS[0] not in text:
         return f"{text.rstrip()}\n\n{written}\n"
     pattern = re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1])
@@ -309,7 +309,7 @@ def with_section(text: str, written: str) -> str:
 
 
 def main() -> None:
-    """Measure and write the section."""
+    """Measure all methods and write the section."""
     written = section(measure(), compiling())
     text = with_section(PAGE.read_text(encoding="utf-8"), written)
     PAGE.write_text(text, encoding="utf-8")
