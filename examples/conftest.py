@@ -1,10 +1,10 @@
-"""Fixtures of the examples' tests: the packed FMU.
+"""Fixtures of the tests of the examples: packed FMUs. To run the tests by hand:
 
     cargo run --release -- pack
     cargo run --release -p one-loop -- dist/HubSlosh.fmu dist
     pytest -c harness/python/pyproject.toml examples
 
-``cargo test --release`` runs them with the FMU that it packs.
+``cargo test --release`` runs the tests with the FMUs that it packs.
 """
 
 from pathlib import Path
@@ -13,13 +13,13 @@ import pytest
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make a warning that an example leaves the range of its model an error."""
+    """Turn warnings that a run leaves the range of its model into errors."""
     config.addinivalue_line("filterwarnings", "error::hubslosh.FmuWarning")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options for the paths of the FMU and of the harness's files of example 7."""
-    parser.addoption("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    """Add options for the paths of the FMU, and of the files that the harness writes in example 7."""
+    parser.addoption("--fmu", default="HubSlosh", help="FMU file, or name of an FMU of the package")
     parser.addoption("--folder", type=Path, default=Path("dist"))
 
 
@@ -32,5 +32,5 @@ def fmu(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def spacecraft(fmu: str) -> str:
-    """Return Spacecraft.fmu; SloshTank.fmu is in the same folder."""
+    """Return the path of Spacecraft.fmu; SloshTank.fmu is in the same folder."""
     return str(Path(fmu).with_name("Spacecraft.fmu")) if fmu.endswith(".fmu") else "Spacecraft"

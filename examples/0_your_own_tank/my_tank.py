@@ -1,4 +1,4 @@
-"""Your own tank: change the numbers, run, look at my_tank.png.
+"""Simulates your own tank: change the numbers, run the script, and look at my_tank.png.
 
 python examples/0_your_own_tank/my_tank.py
 """
@@ -14,19 +14,20 @@ import pandas as pd
 import hubslosh
 from hubslosh.plot import COLORS, save
 
-# An upright cylinder on a craft that turns about one axis. Any parameter by its name, in SI units
-# or with a unit; `hubslosh variables` lists them.
+# Parameters of an upright cylinder on a craft that turns about one axis, in SI units or with a unit.
+# You can add any parameter of the FMU; `hubslosh variables` lists all parameters.
 MY_TANK = {
     "hub.I": 40.0,  # kg·m², craft and dry tank about the axis of rotation
     "tank.d": (600, "mm"),  # inner diameter
     "tank.h": (400, "mm"),  # fill height
-    "tank.r": (500, "mm"),  # from the axis of rotation to the tank's axis
+    "tank.r": (500, "mm"),  # distance from the axis of rotation to the tank's axis
     "fluid.rho": 1010.0,  # kg/m³
     "fluid.nu": 0.9e-6,  # m2/s
     "g_axial": 9.81,  # m/s² along the tank's axis: gravity, or thrust over mass
     "friction.model": "none",
 }
-# The manoeuvre: rows of time (s) and torque (N·m), joined by straight lines; two rows make a jump.
+# The manoeuvre: pairs of time (s) and torque (N·m), interpolated linearly; two pairs at the same
+# time are a jump.
 TORQUE = [(0, 10), (2, 10), (2, -10), (4, -10), (4, 0), (20, 0)]
 
 
@@ -51,18 +52,18 @@ def pointing_error(runs: dict[str, hubslosh.Run]) -> pd.Series:
 
 
 def summary(runs: dict[str, hubslosh.Run]) -> str:
-    """Return what the liquid does after the manoeuvre, and whether the model holds for it."""
+    """Return sentences on the motion after the manoeuvre, and on the validity of the model."""
     end = max((time for time, torque in TORQUE if torque), default=0)
     late = runs["spherical"]["time"] > end
     error, wave = pointing_error(runs)[late], 1e3 * runs["spherical"]["wave_height"][late]
-    # the swing about its own middle: a torque that ends at rest may still leave another angle
+    # amplitude about the mean, because the mean angle may differ from that of a rigid liquid
     swing = (error.max() - error.min()) / 2
     answer = (
         f"After the manoeuvre the liquid swings the craft by ±{swing:.0f} millidegrees,\n"
         f"with a wave of up to {wave.max():.1f} mm"
     )
-    # if the liquid moves too much for the model, the numbers above are not to be trusted
-    # the package 0.6.1 has no sentences on what was out of the models' range
+    # If the liquid moves too much for the model, the numbers above cannot be trusted. Package 0.6.1
+    # does not have the attribute out_of_range.
     beyond = getattr(runs["spherical"], "out_of_range", [])
     return "\n".join([answer, *(fill(text, 80) for text in beyond)])
 

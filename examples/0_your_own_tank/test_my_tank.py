@@ -1,4 +1,4 @@
-"""The statements of README about the manoeuvre."""
+"""The statements of the README about the manoeuvre are true."""
 
 import my_tank
 import pytest
@@ -6,9 +6,9 @@ from my_tank import MY_TANK, compare, summary
 
 
 def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> None:
-    """A rest-to-rest torque leaves a rigid craft at rest, except for rounding.
+    """With sloshing liquid, the numbers are those of the README.
 
-    With sloshing liquid the numbers are those of the README.
+    A rigid craft is at rest after the manoeuvre, except for rounding errors.
     """
     runs = compare(fmu)
     last = {liquid: run["omega"].iloc[-500:].abs().max() for liquid, run in runs.items()}
@@ -23,6 +23,6 @@ def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> Non
 def test_the_summary_reports_that_the_liquid_leaves_the_range_of_its_model(
     fmu: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With a hundredth of the thrust the wave is so large that the model no longer holds."""
+    """With a hundredth of the thrust, the wave is too large for the model."""
     monkeypatch.setattr(my_tank, "MY_TANK", MY_TANK | {"g_axial": 0.1})
     assert "out of range for" in summary(compare(fmu))

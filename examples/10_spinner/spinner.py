@@ -1,4 +1,4 @@
-"""Nutation of a spinning craft with sloshing tanks: it grows about the axis of least inertia.
+"""Simulates nutation of a spinning craft with slosh, which grows about the axis of least inertia.
 
 python examples/10_spinner/spinner.py
 """
@@ -14,12 +14,12 @@ import hubslosh
 from hubslosh.plot import COLORS, save
 
 SPIN = 1.1  # rad/s, about z
-DAMPED = 31.7569  # N·s/m, drag coefficient of each mode
+DAMPED = 31.7569  # viscous damping coefficient of each mode, N·s/m
 MASS, LENGTH = 38.3866, 0.163644
 """Mass and length of each mode: kg, m."""
 PROLATE, OBLATE = 71.0, 240.0
-"""Moment of inertia of the dry craft about z, kg·m²: less or more than across, 152 and 148."""
-START = (0.06, 0.02, SPIN)  # rad/s
+"""Moment of inertia of the dry craft about z, kg·m², below and above those about x (152), y (148)."""
+START = (0.06, 0.02, SPIN)  # angular velocity at the start, rad/s
 
 
 def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[str, float | int]:
@@ -40,7 +40,7 @@ def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[st
             f"{tank}.zeta[1]": DAMPED / (2 * MASS * np.sqrt(1.0 / LENGTH)),
         }  # fmt: skip
         if not slosh:
-            # The bob as a part of the rigid liquid, where it hangs.
+            # add the slosh mass to the rigid liquid at its position
             bob, total = hinge - LENGTH, m_0 + MASS
             centre = (m_0 * H_0 + MASS * bob) / total
             inertia = 0.780463 + m_0 * (H_0 - centre) ** 2 + MASS * (bob - centre) ** 2
@@ -52,7 +52,7 @@ def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[st
 def nutation_pole(fmu: str, j_zz: float) -> complex:
     """Return the pole of the nutation about the steady spin, body axes, 1/s.
 
-    It is the one whose eigenvector is the transverse rate.
+    Among all poles, this is the pole whose eigenvector has the largest transverse rate.
     """
     spin = parameters(j_zz, omega=(0, 0, SPIN))
     model = hubslosh.linearize(fmu, spin, ["torque[1]"], ["omega[1]"], all_states=True)
@@ -65,7 +65,7 @@ def nutation_pole(fmu: str, j_zz: float) -> complex:
 
 
 def nutation(fmu: str, j_zz: float, stop: float, slosh: bool = True) -> pd.DataFrame:
-    """Return time (s), nutation angle (rad) and dissipated energy (J)."""
+    """Simulate the craft; return time (s), nutation angle (rad) and dissipated energy (J)."""
     names = [f"q[{i}]" for i in range(1, 5)] + [f"angular_momentum[{i}]" for i in (1, 2, 3)]
     run = hubslosh.simulate(
         fmu, parameters(j_zz, slosh), stop=stop, step=0.1, outputs=[*names, "dissipated"],
@@ -79,7 +79,7 @@ def nutation(fmu: str, j_zz: float, stop: float, slosh: bool = True) -> pd.DataF
 
 
 def mean_growth(history: pd.DataFrame, until: float = np.inf) -> float:
-    """Return the mean growth rate of the nutation angle, 1/s, over whole periods of its wobble."""
+    """Return the mean growth rate of the nutation angle over whole periods of its variation, 1/s."""
     part = history[(history["time"] > 60) & (history["time"] < until)]
     return float(np.polyfit(part["time"], np.log(part["angle"]), 1)[0])
 

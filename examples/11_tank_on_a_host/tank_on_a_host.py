@@ -1,4 +1,4 @@
-"""SloshTank.fmu hung on a rigid body: in Python, as SSP in libcosim, on Basilisk's spacecraft.
+"""Couples SloshTank.fmu with a rigid body: in Python, as SSP in libcosim, and in Basilisk.
 
 python examples/11_tank_on_a_host/tank_on_a_host.py --ssp dist/TankOnHost.ssp
 """
@@ -21,26 +21,26 @@ STEPS = (0.04, 0.02, 0.01, 0.005)
 """Communication steps, s."""
 RECORDED = [f"omega[{i}]" for i in (1, 2, 3)]
 MASS, CENTRE = 300.0, np.array([0.02, -0.01, 0.1])
-"""Mass and centre of mass of the host: kg, m from O. The tank with its 382 kg is heavier."""
+"""Mass (kg) and centre of mass from O (m) of the host. The tank, with 382 kg, is heavier."""
 INERTIA = np.diag([210.0, 190.0, 150.0])
 """Inertia of the host about its centre of mass, kg·m²."""
 POSITION = np.array([0.3, 0.1, -0.2])
-"""The tank's origin from O, m."""
+"""Position of the tank's origin from O, m."""
 M_0, H_0, I_0 = 253.493, 0.0563967, 3.67522
-"""The rigid liquid: kg, m above the tank's origin, kg·m² across the tank's axis."""
+"""Rigid liquid: mass (kg), height above the tank's origin (m), inertia across the axis (kg·m²)."""
 BOB, LENGTH, HINGE = 128.211, 0.248039, 0.136534
-"""The mode: kg, m, m."""
+"""Slosh mode: mass (kg), length (m) and height of the hinge (m)."""
 STIFFNESS, ZETA = 40.0, 0.03
-"""Centring by a diaphragm in weightlessness, N/m; damping ratio."""
+"""Centring stiffness by a diaphragm in weightlessness (N/m), and damping ratio."""
 START = {"init.omega[1]": 0.15, "init.omega[2]": -0.1, "init.omega[3]": 0.25}
 SIGNALS = {
     **{f"specific_force[{i}]": f"a[{i}]" for i in (1, 2, 3)},
     **{f"omega[{i}]": f"omega[{i}]" for i in (1, 2, 3)},
     **{f"omega_dot[{i}]": f"omega_dot[{i}]" for i in (1, 2, 3)},
 }
-"""Inputs of the tank, each with the host's signal."""
+"""Inputs of the tank, each with the output of the host that is connected to it."""
 LOADS = {f"bias[{i}]": f"{'force' if i < 4 else 'torque'}[{(i - 1) % 3 + 1}]" for i in range(1, 7)}
-"""Inputs of the host, each with the tank's signal."""
+"""Inputs of the host, each with the output of the tank that is connected to it."""
 
 Values = dict[str, float | int]
 
@@ -56,7 +56,7 @@ def body(mass: float, centre: np.ndarray, inertia: np.ndarray) -> Values:
 
 
 def tank(name: str) -> Values:
-    """Return the tank's parameters; ``tank`` is SloshTank's name, ``tank[1]`` Spacecraft's."""
+    """Return the parameters of the tank, named ``tank`` in SloshTank or ``tank[1]`` in Spacecraft."""
     values: Values = {f"{name}.position[{i}]": float(x) for i, x in enumerate(POSITION, 1)}
     values |= {
         f"{name}.m_0": M_0, f"{name}.H_0": H_0, f"{name}.I_0": I_0, f"{name}.mass[1]": BOB,
@@ -68,7 +68,7 @@ def tank(name: str) -> Values:
 
 
 def lumped() -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass, centre of mass and inertia of the host with the liquid lumped into it.
+    """Return mass, centre of mass and inertia of host and liquid as one rigid body.
 
     The liquid is the rigid liquid and the bob at its hinge, as coupling = rigid_body expects.
     """
@@ -86,7 +86,7 @@ def lumped() -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def simulate_whole(folder: Path | None) -> pd.DataFrame:
-    """Return the motion of host and tank that Spacecraft.fmu computes, the reference."""
+    """Return the reference: the motion of host and tank, simulated by Spacecraft.fmu."""
     settings = body(MASS, CENTRE, INERTIA) | tank("tank[1]") | {"tanks": 1} | START
     return hubslosh.simulate(
         fmu(folder, "Spacecraft"), settings, stop=STOP, step=STEPS[0], outputs=RECORDED,
@@ -95,14 +95,15 @@ def simulate_whole(folder: Path | None) -> pd.DataFrame:
 
 
 def fmu(folder: Path | None, name: str) -> str | Path:
-    """Return the FMU's file in a folder, or its name among those of the package."""
+    """Return the file of an FMU in a folder, or its name in the package."""
     return folder / f"{name}.fmu" if folder else name
 
 
 def coupled(folder: Path | None, step: float, wrench: bool = False) -> pd.DataFrame:
-    """Simulate both FMUs coupled: the host steps first, and values are held over the step.
+    """Simulate the coupled FMUs; the host steps first, and values are held over the step.
 
-    With ``wrench`` the host receives the tank's total force and torque, the naive way.
+    If ``wrench`` is true, the host receives the total force and torque of the tank, which is the
+    obvious coupling, but diverges.
     """
     if wrench:
         host_settings, loads = body(MASS, CENTRE, INERTIA), {p: p for p in LOADS.values()}
@@ -129,7 +130,7 @@ def coupled(folder: Path | None, step: float, wrench: bool = False) -> pd.DataFr
 
 
 def pack_ssp(folder: Path | None, archive: Path, step: float) -> None:
-    """Write the system of both FMUs as SSP 1.0."""
+    """Write the system with both FMUs as SSP 1.0."""
 
     def component(name: str, source: str, ins: Mapping[str, str], outs: list[str],
                   settings: Values) -> str:  # fmt: skip
@@ -189,7 +190,7 @@ absoluteTolerance="1e-8" relativeTolerance="1e-8"/></oms:SimulationInformation>
 
 
 def in_libcosim(folder: Path | None, step: float) -> pd.DataFrame:
-    """Run the SSP in libcosim; it exchanges held values after both have stepped (Jacobi)."""
+    """Simulate the SSP in libcosim, which exchanges values after both FMUs have stepped (Jacobi)."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
     from libcosimpy.CosimObserver import CosimObserver
@@ -208,14 +209,14 @@ def in_libcosim(folder: Path | None, step: float) -> pd.DataFrame:
         rows = []
         for n in range(1, round(STOP / step) + 1):
             if not run.step():
-                sys.exit("error: libcosim could not go on")
+                sys.exit("error: libcosim could not continue the simulation")
             found = observer.last_real_values(host, [reference[name] for name in RECORDED])
             rows.append([n * step, *found])
     return pd.DataFrame(rows, columns=["time", *RECORDED])
 
 
 def on_basilisk(folder: Path | None, step: float) -> pd.DataFrame:
-    """Hang the tank on Basilisk's spacecraft (PyPI: bsk), whose hub is the lumped rigid body."""
+    """Simulate the tank on Basilisk's spacecraft (PyPI: bsk), whose hub is the lumped body."""
     from Basilisk.simulation import extForceTorque, spacecraft
     from Basilisk.utilities import SimulationBaseClass, macros
 
@@ -245,7 +246,7 @@ def on_basilisk(folder: Path | None, step: float) -> pd.DataFrame:
             simulation.ExecuteSimulation()
             state = craft.scStateOutMsg.read()
             omega, omega_dot = np.array(state.omega_BN_B), np.array(state.omegaDot_BN_B)
-            # In free fall the specific force at B follows from force and motion of the body.
+            # in free flight the specific force at B follows from force and motion of the body
             at_centre = np.array(bias[:3]) / mass
             a = at_centre - np.cross(omega_dot, centre) - np.cross(omega, np.cross(omega, centre))
             for name, value in zip(SIGNALS.values(), [*a, *omega, *omega_dot], strict=True):
@@ -256,7 +257,7 @@ def on_basilisk(folder: Path | None, step: float) -> pd.DataFrame:
 
 
 def error(found: pd.DataFrame, reference: pd.DataFrame) -> float:
-    """Return the largest difference of the angular rate at common times, over its largest value."""
+    """Return the largest difference of the angular rate, relative to its largest value."""
     at = np.interp(reference["time"], found["time"], np.arange(len(found)))
     rows = np.rint(at).astype(int)
     aligned = np.abs(found["time"].to_numpy()[rows] - reference["time"].to_numpy()) < 1e-9
@@ -265,7 +266,7 @@ def error(found: pd.DataFrame, reference: pd.DataFrame) -> float:
 
 
 def table(folder: Path | None) -> dict[str, dict[float, float]]:
-    """Return the errors by host and step, of those hosts that are installed."""
+    """Return the errors by host and step, for all hosts that are installed."""
     reference = simulate_whole(folder)
     hosts = {"fmpy, host first": coupled, "libcosim (SSP)": in_libcosim, "Basilisk": on_basilisk}
     found: dict[str, dict[float, float]] = {}
@@ -273,7 +274,7 @@ def table(folder: Path | None) -> dict[str, dict[float, float]]:
         try:
             found[name] = {step: error(run(folder, step), reference) for step in STEPS}
         except ModuleNotFoundError as missing:
-            print(f"{name}: not here ({missing})")
+            print(f"{name}: not installed ({missing})")
     return found
 
 
@@ -284,7 +285,7 @@ def main() -> None:
     from hubslosh.plot import COLORS, save
 
     parser = argparse.ArgumentParser(description="SloshTank.fmu on a rigid body in several hosts.")
-    parser.add_argument("--folder", type=Path, help="where the FMUs are, if not in the package")
+    parser.add_argument("--folder", type=Path, help="folder of the FMUs, if not those of the package")
     parser.add_argument("--ssp", type=Path, help="write the system as SSP, too")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()

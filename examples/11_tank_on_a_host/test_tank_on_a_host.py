@@ -1,6 +1,6 @@
-"""The numbers of README for the two FMUs in Python, and the SSP's form.
+"""The numbers of the README for the two FMUs in Python are reproduced, and the SSP is valid.
 
-libcosim and Basilisk need packages of their own.
+libcosim and Basilisk are not tested, because they need further packages.
 """
 
 import zipfile
@@ -15,28 +15,25 @@ from hubslosh import FmuWarning
 
 @pytest.fixture
 def both(spacecraft: str) -> Path | None:
-    """Return the folder of the FMUs, or nothing if they are the package's."""
+    """Return the folder of the FMUs, or None to use the FMUs of the package."""
     return Path(spacecraft).parent if spacecraft.endswith(".fmu") else None
 
 
 def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
-    """The error is proportional to the step, on a tumbling host that is lighter than its tank."""
+    """The error is proportional to the step, for a tumbling host that is lighter than its tank."""
     reference = simulate_whole(both)
     errors = [error(coupled(both, step), reference) for step in STEPS[:3]]
     assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
 
 
 def test_coupling_by_the_total_wrench_diverges(both: Path | None) -> None:
-    """With steps of 20 ms it diverges within a second; the FMU reports a pendulum turned over."""
+    """With steps of 20 ms it diverges within a second; the FMU reports that a pendulum turns over."""
     with pytest.warns(FmuWarning, match="leaves its range"):
         assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
 
 
 def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:
-    """The file is valid by fmpy's copy of the schema.
-
-    Nine signals go from the host to the tank and six back.
-    """
+    """Fmpy validates the file. Nine signals go from host to tank, and six from tank to host."""
     archive = tmp_path / "TankOnHost.ssp"
     pack_ssp(both, archive, 0.02)
     system = read_ssd(str(archive), validate=True).system

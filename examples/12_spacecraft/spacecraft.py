@@ -1,4 +1,4 @@
-"""From a drawing to margins: 650 kg, two spherical tanks, a 30° slew, 200 runs at random."""
+"""Designs a loop for 650 kg with two spherical tanks: margins, a 30° slew, 200 random runs."""
 
 import numpy as np
 from scipy import stats
@@ -24,7 +24,7 @@ slew = attitude.slew(np.radians(30), DURATION, axis=(0, 0, 1), inertia=J)
 
 
 def after_slew(values: dict, loop: hubslosh.Loop = loop) -> dict[str, float]:
-    """Return the largest pointing error after the slew (deg), and when it stays below 0.1° (s)."""
+    """Return the largest pointing error after the slew (deg), and the time to stay below 0.1° (s)."""
     run = loop.simulate(300, values, reference=slew, outputs=attitude.NAMES)
     error = np.degrees(np.linalg.norm(attitude.error(run, slew.iloc[-1:]), axis=1))
     settled = run["time"][error > 0.1].max() - DURATION

@@ -1,4 +1,4 @@
-"""The numbers of README: drawing, margins, slew, runs at random; a loop that slosh drives."""
+"""The numbers of the README are reproduced: margins, slew, random runs, an unstable loop."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +10,8 @@ from spacecraft import TANK, after_slew, craft, full, loop, slew
 import hubslosh
 
 
-def test_the_script_is_as_short_as_its_page_says() -> None:
-    """The script goes from the drawing of the tank to the pictures of the slew."""
+def test_the_script_is_as_short_as_its_readme_says() -> None:
+    """The script contains all steps from the drawing of the tank to the pictures of the slew."""
     script = Path(__file__).with_name("spacecraft.py").read_text()
     assert len(script.splitlines()) <= 45
 
@@ -55,9 +55,9 @@ def test_random_runs_have_the_numbers_of_the_readme(spacecraft: str) -> None:
 
 
 def test_the_tank_is_a_half_open_sphere_by_its_closed_form() -> None:
-    """In a sphere all hinges are at the centre.
+    """In a sphere, all hinges are at the centre.
 
-    At half fill the first eigenvalue is 1.5602 (NASA SP-106, 2.15).
+    For half a fill the first eigenvalue is 1.5602 (NASA SP-106, 2.15).
     """
     assert full.modes["hinge"][0] == pytest.approx(0.35, abs=1e-9)
     half = hubslosh.tank(TANK, fill="50%", modes=1, gravity=1.0)

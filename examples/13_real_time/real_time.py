@@ -1,4 +1,4 @@
-"""The FMU at 1 kHz against a controller in another process, by UDP: missed deadlines and jitter.
+"""Runs the FMU at 1 kHz with a controller in another process, over UDP; counts missed deadlines.
 
 python examples/13_real_time/real_time.py
 """
@@ -24,9 +24,9 @@ ANGLE = 0.2
 GAINS = 0.6, 0.7
 """Gains of the controller: N·m/rad, N·m·s/rad."""
 STATE, TORQUE = struct.Struct("<Idd"), struct.Struct("<Id")
-"""Datagrams: cycle, angle, rate; cycle, torque."""
+"""Formats of datagrams: cycle, angle (rad) and rate (rad/s); cycle and torque (N·m)."""
 SILENCE = 5.0
-"""Time after which the controller ends when it hears nothing, s."""
+"""Time without a datagram after which the controller ends, s."""
 
 
 def controller(port: int) -> None:
@@ -34,7 +34,7 @@ def controller(port: int) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
         peer.bind(("127.0.0.1", 0))
         peer.settimeout(SILENCE)
-        peer.sendto(b"", ("127.0.0.1", port))  # says where it is
+        peer.sendto(b"", ("127.0.0.1", port))  # tells the simulator the controller's port
         try:
             while data := peer.recv(64):
                 cycle, theta, omega = STATE.unpack(data)
@@ -45,7 +45,7 @@ def controller(port: int) -> None:
 
 
 def wait(until: float) -> None:
-    """Sleep until shortly before a time, then read the clock, because a sleep may end late."""
+    """Wait until a time: sleep, then poll the clock, because a sleep may end late."""
     rest = until - time.perf_counter() - 2e-4
     if rest > 0:
         time.sleep(rest)
@@ -54,20 +54,20 @@ def wait(until: float) -> None:
 
 
 def run(fmu: str | Path, cycles: int) -> pd.DataFrame:
-    """Simulate this number of cycles in real time.
+    """Simulate a number of cycles in real time.
 
-    The table has one row for each cycle: ``start`` (s after it was due), ``work`` (s that it took:
-    newest torque in, a step, state out), ``missed`` (it ended after the next was due), ``age``
-    (cycles between a torque and the state that it answers; -1 before the first answer), ``theta``
-    (rad) and ``time`` of the FMU (s). A late cycle is not skipped but begins at once, so that the
-    time of the FMU falls behind only for a while.
+    The table has one row for each cycle: ``start``, its delay, s; ``work``, the time to receive the
+    newest torque, make a step and send the state, s; ``missed``, true if the cycle ended after the
+    next cycle was due; ``age``, the number of cycles between the state and the torque that answers
+    it, or -1 before the first answer; ``theta`` (rad) and ``time`` of the FMU (s). A late cycle is
+    not skipped but begins at once, so that the FMU catches up.
     """
     rows = np.empty((cycles, 6))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         link.bind(("127.0.0.1", 0))
         link.settimeout(30)
         arguments = [sys.executable, __file__, "--controller", str(link.getsockname()[1])]
-        # it finds packages where this process does
+        # the controller gets the import path of this process
         peer = subprocess.Popen(
             arguments, env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
         )

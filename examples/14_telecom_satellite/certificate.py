@@ -1,4 +1,4 @@
-"""Up to which changes of slosh and inertia the loop of the satellite is proved to be stable."""
+"""Proves that the loop of the satellite is stable for certain changes of slosh and inertia."""
 
 import warnings
 
@@ -13,7 +13,7 @@ RANGES = {
 
 
 def certificate(fill: str, of: hubslosh.Craft | None = None) -> hubslosh.Certificate:
-    """Return the certificate at a fill of both tanks, of this satellite or another craft."""
+    """Return the certificate at a fill of both tanks, for this satellite or another craft."""
     loop = telecom.loop(fill, of)
     model = (of or telecom.craft).uncertain(fill, RANGES, outputs=loop.names[0])
     return model.certify(loop, largest=9)

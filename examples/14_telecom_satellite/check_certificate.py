@@ -1,4 +1,4 @@
-"""Checks a certificate of robust stability with NumPy alone: python check_certificate.py FILE."""
+"""Checks a certificate of robust stability with only NumPy: python check_certificate.py FILE."""
 
 import sys
 from math import comb
@@ -21,7 +21,7 @@ def check(path: str | Path) -> float:
     A, B, C, D = (c[f"L_{part}"] for part in "ABCD")
     if abs(np.linalg.eigvals(A - B @ np.linalg.solve(np.eye(len(D)) + D, C))).max() > 1 + 1e-9:
         raise ValueError("the loop is unstable at Δ = 0")
-    # intervals of frequency times boxes of Δ must fill the whole without a gap or an overlap
+    # intervals of frequency times boxes of Δ must cover everything without a gap or an overlap
     whole = np.maximum(-c["size"], c["least"]), np.full(len(c["counts"]), c["size"])
     low, high = (np.column_stack([c[f], c[f"box_{f}"]]) for f in ("low", "high"))
     ends = np.append(0.0, whole[0]), np.append(0.5 / period, whole[1])
@@ -44,7 +44,7 @@ def check(path: str | Path) -> float:
     rows = zip(low[:, 0], high[:, 0], low[:, 1:], high[:, 1:], strict=True)
     for k, (a, b, l, h) in enumerate(rows):
         f = a + (b - a) * x
-        # D and G are straight lines from one frequency to another
+        # D and G are interpolated linearly over an interval of frequency
         t = ((f - c["start"][k]) / (c["stop"][k] - c["start"][k]))[:, None, None]
         D, G = ((1 - t) * c[m][c["first"][k]] + t * c[m][c["last"][k]] for m in "DG")
         if t.min() < 0 or t.max() > 1:

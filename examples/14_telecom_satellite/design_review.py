@@ -1,4 +1,4 @@
-"""The design review of the satellite: a page, and its answer."""
+"""Reviews the design of the satellite's loop; prints the summary and writes a page."""
 
 import warnings
 
@@ -10,7 +10,7 @@ import hubslosh
 def review(fills: list[str] = telecom.FILLS, draws: int = 200) -> hubslosh.Review:
     """Return the design review with uncertain inertia, tank position and delay.
 
-    The inertia varies by 5 %, a tank's position by 10 mm, and the delay by 50 ms.
+    Inertia varies by 5 %, the position of a tank by 10 mm, and the delay by 50 ms.
     """
     return telecom.craft.review(
         telecom.controller(), telecom.PERIOD, fills, measured=telecom.MEASURED,

@@ -1,4 +1,4 @@
-"""A satellite of one's own: mass properties, margins over the fill, and a burn that drains it."""
+"""Defines a satellite; prints mass properties and margins over the fill, and simulates a burn."""
 
 import warnings
 
@@ -31,7 +31,7 @@ MEASURED = ["q[2]", "omega[1]", "q[3]", "omega[2]", "q[4]", "omega[3]"]
 
 
 def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpace:
-    """Return a PID for each axis, with a notch and a roll-off (Hz), from half angles and rates."""
+    """Return a PID for each axis, from half angles and rates, with notch and roll-off (Hz)."""
     s = control.tf("s")
     w, n, r = (2 * np.pi * f for f in (bandwidth, notch, 25 * bandwidth))
     filters = (s**2 + 0.2 * n * s + n**2) / (s**2 + 1.2 * n * s + n**2)
@@ -45,7 +45,7 @@ def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpa
 
 
 def loop(fill: str, of: hubslosh.Craft | None = None) -> hubslosh.Loop:
-    """Return the three-axis loop at a fill of both tanks, of this satellite or another craft."""
+    """Return the three-axis loop at a fill of both tanks, for this satellite or another craft."""
     return (of or craft).loop(controller(), PERIOD, fill, measured=MEASURED, delay=DELAY)
 
 
@@ -64,7 +64,7 @@ def over_fills() -> pd.DataFrame:
 
 
 if __name__ == "__main__":
-    # the damping of spheres was measured in smaller or more viscous ones
+    # damping of spheres was measured in smaller spheres or more viscous liquids
     warnings.filterwarnings("ignore", "tank NTO: damping", hubslosh.FmuWarning)
     print(craft, craft.mass_properties("60%"), over_fills().to_string(index=False), sep="\n\n")
     burn = craft.drain({"NTO": 0.083, "MMH": 0.05}, "60%")  # kg/s

@@ -1,4 +1,4 @@
-"""Mass properties and margins at 20 fills against the same numbers put together by hand."""
+"""Mass properties and margins at 20 fills equal a calculation by hand; review and certificate."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +19,7 @@ DRY |= {"craft.Jxx": 1150.0, "craft.Jyy": 980.0, "craft.Jzz": 870.0}
 DRY |= {"craft.Jxy": -14.0, "craft.Jxz": 22.0, "craft.Jyz": 9.0}
 PLACES = {"NTO": (0.06, 0.42, 0.2), "MMH": (-0.05, -0.62, 0.1)}
 
-# in low gravity the tanks are larger than those whose damping was measured
+# in this low gravity the tanks are larger than the tanks whose damping was measured
 pytestmark = pytest.mark.filterwarnings("ignore:(tank|damping).*outside the measured")
 
 
@@ -56,7 +56,7 @@ def test_mass_properties_and_margins_equal_a_hand_calculation(spacecraft: str) -
         assert found.inertia == pytest.approx(inertia, abs=1e-12 * inertia.max())
 
         mine = telecom.loop(fill, craft)
-        # O, where the thrust along z acts, moves to the centre of mass
+        # trimming moves O, where the thrust along z acts, below the centre of mass
         across = np.array([*center[:2], 0.0])
         hand = DRY | {f"craft.r[{i + 1}]": DRY[f"craft.r[{i + 1}]"] - across[i] for i in range(3)}
         for number, (name, of) in enumerate(craft.tanks.items(), 1):
@@ -71,8 +71,8 @@ def test_mass_properties_and_margins_equal_a_hand_calculation(spacecraft: str) -
         )
 
 
-def test_the_numbers_of_the_readme() -> None:
-    """The craft is defined in ten lines at most; its mass at 60 % is the README's."""
+def test_the_definition_of_the_craft_has_the_numbers_of_the_readme() -> None:
+    """The craft is defined in at most ten lines; its mass at 60 % is that of the README."""
     assert len(str(telecom.craft).splitlines()) <= 10
     at = telecom.craft.mass_properties("60%")
     assert at.mass == pytest.approx(2503.1, abs=0.1)
@@ -94,7 +94,7 @@ def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
 
 
 def test_the_worst_case_at_97_percent_is_found_where_two_frequencies_meet(spacecraft: str) -> None:
-    """The loop is unstable in a thousandth of the box only, where NTO is undamped."""
+    """The loop is unstable in only a thousandth of the box, where NTO is undamped."""
     craft = replace(telecom.craft, model=spacecraft)
     loop = telecom.loop("97%", craft)
     model = craft.uncertain("97%", certificate.RANGES, outputs=loop.names[0])
@@ -107,9 +107,9 @@ def test_the_worst_case_at_97_percent_is_found_where_two_frequencies_meet(spacec
 def test_a_certificate_is_checked_by_numpy_and_a_changed_one_is_refused(
     spacecraft: str, tmp_path: Path
 ) -> None:
-    """Changed are the size, the list of intervals, the loop, or the scalings that prove it."""
+    """The changes are in the size, the list of intervals, the loop, or the scalings."""
     found = certificate.certificate("40%", replace(telecom.craft, model=spacecraft))
-    # µ is between both
+    # the size of the worst case is at most 4.01 % larger than the certified size
     assert found.size == pytest.approx(1.81, rel=0.01) and found.gap < 1.0401
     found.save(tmp_path / "certificate.npz")
     with np.load(tmp_path / "certificate.npz") as file:

@@ -1,4 +1,4 @@
-"""The first torque: a pulse on the hub, with sloshing and with rigid liquid.
+"""Simulates a pulse of torque on the hub, with sloshing and with rigid liquid.
 
 python examples/1_first_torque/first_torque.py
 """
@@ -13,11 +13,11 @@ import hubslosh
 PULSE = pd.DataFrame(
     {"time": [0, 1, 1, 2, 2, 40], "tau_cmd": [0, 0, 0.1, 0.1, 0, 0]}  # s, N·m
 )
-"""Straight lines between the rows; two rows at one time are a jump."""
+"""Torque over time, interpolated linearly; two rows at the same time are a jump."""
 
 
 def run(fmu: str | Path, model: str) -> pd.DataFrame:
-    """Return the response to the pulse, on the bench with its sticking bearing."""
+    """Simulate the pulse on the bench, whose bearing sticks."""
     outputs = ["omega", "omega_dot", "slosh_angle", "stuck"]
     return hubslosh.simulate(fmu, {"slosh.model": model}, PULSE, step=0.01, outputs=outputs)
 

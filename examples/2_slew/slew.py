@@ -1,4 +1,4 @@
-"""Rest-to-rest slew by 90 degrees: what bang-stop-bang and a smoothed profile leave of slosh.
+"""Simulates a rest-to-rest slew by 90 degrees with a bang-stop-bang and with a smoothed profile.
 
 python examples/2_slew/slew.py
 """
@@ -15,7 +15,7 @@ import hubslosh
 from hubslosh.plot import COLORS, save
 
 ANGLE = np.pi / 2
-"""rad."""
+"""Angle of the slew, rad."""
 PERIOD, LATENCY = 0.02, 1
 """Cycle time and delay of the controller: s, cycles."""
 BANDWIDTH, ZETA = 0.3, 0.7
@@ -24,14 +24,14 @@ TOLERANCE = np.radians(0.001)
 """The slew is over when the pointing error stays below this, rad."""
 STOP = 40.0  # s
 FREE = {"friction.model": "none"}
-"""A spacecraft has no bearing."""
+"""Parameters without friction, because a spacecraft has no bearing."""
 
 Profile = Callable[[float], tuple[float, float, float]]
-"""Angle (rad), rate (rad/s) and acceleration (rad/s²) that are wanted at a time (s)."""
+"""Function from time (s) to commanded angle (rad), rate (rad/s) and acceleration (rad/s²)."""
 
 
 def bang_stop_bang(time: float, push: float = 1.2, coast: float = 1.2) -> tuple[float, ...]:
-    """Return the profile with constant acceleration, none, and constant deceleration."""
+    """Return the profile of constant acceleration, coasting, and constant deceleration."""
     a = ANGLE / (push * (push + coast))
     end = 2 * push + coast
     if time < push:
@@ -45,11 +45,11 @@ def bang_stop_bang(time: float, push: float = 1.2, coast: float = 1.2) -> tuple[
 
 
 def smoothed(time: float, push: float = 2.4) -> tuple[float, ...]:
-    """Return the profile of the same largest rate and torque with accelerations 1 - cos.
+    """Return the profile with the same largest rate and torque, and accelerations like 1 - cos.
 
     A rest-to-rest slew of this angle is then two pulses, without coasting between them.
     """
-    a = ANGLE / (1.2 * (1.2 + 1.2)) / 2  # half of the largest acceleration
+    a = ANGLE / (1.2 * (1.2 + 1.2)) / 2  # half the largest acceleration
     w = 2 * np.pi / push
 
     def pulse(t: float) -> tuple[float, float, float]:
@@ -67,7 +67,7 @@ def smoothed(time: float, push: float = 2.4) -> tuple[float, ...]:
 
 PROFILES = {"bang-stop-bang": bang_stop_bang, "smoothed": smoothed}
 DURATION = {"bang-stop-bang": 3.6, "smoothed": 4.8}
-"""s."""
+"""Duration of the slew by profile, s."""
 
 
 def inertia(fmu: str | Path) -> float:
@@ -102,13 +102,13 @@ def settling_time(run: pd.DataFrame, profile: str) -> float:
 
 
 def results(fmu: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
-    """Return the runs by profile and model."""
+    """Simulate all runs; return them by profile and slosh model."""
     models = ("frozen", "linear", "spherical")
     return {(p, m): slew(fmu, PROFILES[p], m) for p in PROFILES for m in models}
 
 
 def title(runs: dict[tuple[str, str], pd.DataFrame], profile: str) -> str:
-    """Return a title that says how long the slew takes and when the craft has settled."""
+    """Return a title with the duration of the slew and the settling time."""
     settled = settling_time(runs[profile, "spherical"], profile)
     over = f"{profile.capitalize()}: over at {DURATION[profile]} s"
     return f"{over}, settled at {settled:.1f} s"
@@ -145,7 +145,7 @@ def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
 
 
 def main() -> None:
-    """Print the settling times, draw the figure."""
+    """Print the settling times and draw the figure."""
     parser = argparse.ArgumentParser(description="A slew with slosh, two profiles.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

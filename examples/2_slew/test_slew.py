@@ -1,4 +1,4 @@
-"""The numbers of README."""
+"""The numbers of the README are reproduced."""
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ SETTLED = {
     ("smoothed", "linear"): 6.3,
     ("smoothed", "spherical"): 6.4,
 }
-"""s."""
+"""Settling times, s."""
 
 ERRORS = {
     ("bang-stop-bang", "frozen"): 0.0032,
@@ -23,21 +23,18 @@ ERRORS = {
     ("smoothed", "linear"): 0.0026,
     ("smoothed", "spherical"): 0.0038,
 }
-"""After the slew, deg."""
+"""Largest pointing errors after the slew, deg."""
 
 
 @pytest.fixture(scope="module")
 def runs(fmu: str) -> dict[tuple[str, str], pd.DataFrame]:
-    """Return all runs, as the script makes them."""
+    """Return all runs of the script."""
     return results(fmu)
 
 
 @pytest.mark.parametrize("name", PROFILES)
 def test_a_profile_is_the_integral_of_its_acceleration(name: str) -> None:
-    """Sums over steps of 0.1 ms agree with rate and angle to 1e-7.
-
-    Where the acceleration jumps they agree to 5e-5.
-    """
+    """Sums over steps of 0.1 ms agree with rate and angle to 1e-7, or to 5e-5 if it has jumps."""
     time = np.linspace(0, 6, 60001)
     angle, rate, acceleration = np.array([PROFILES[name](t) for t in time]).T
     step = time[1]
@@ -59,7 +56,7 @@ def test_settling_times_and_errors_have_the_numbers_of_the_readme(runs: dict) ->
 
 
 def test_a_swing_keeps_its_direction_in_space(runs: dict) -> None:
-    """After the turn the liquid swings radially, which a planar model cannot."""
+    """After the turn the liquid swings radially, which a planar model cannot reproduce."""
     end = runs["bang-stop-bang", "spherical"].query("time > 5")
     radial, tangential = (end[f"slosh_angle{s}"].abs().max() for s in ("_radial", ""))
     assert radial > 2 * tangential

@@ -2,12 +2,12 @@
 
     PYTHONPATH=harness/python python3 harness/benchmark/compare.py
 
-needs the FMUs in dist/ (``cargo run --release -- pack``), the compiled half of the package
-(``cargo build --release -p hubslosh-native``) and Python 3.11 or newer. The first run makes a
+It needs the FMUs in dist/ (``cargo run --release -- pack``), the compiled part of the package
+(``cargo build --release -p hubslosh-native``) and Python 3.11 or newer. The first run creates a
 virtual environment in the target directory and needs the network. It takes a minute of CPU time.
 
-``--only NAME`` runs one implementation and takes the results of the others from the last run;
-``--references`` writes the references anew: the means of SciPy's and heyoka's results.
+``--only NAME`` runs one implementation, and takes the results of the others from the last run.
+``--references`` writes new references, the means of the results of SciPy and heyoka.
 """
 
 import argparse
@@ -38,19 +38,19 @@ INDEPENDENT = ("SciPy", "heyoka")
 """Implementations whose mean is the reference of a trajectory or response."""
 AGREEING = ("HubSlosh", *INDEPENDENT)
 PUBLISHED = ("backbones", "forced", "measured")
-"""Cases whose references others computed or measured."""
+"""Cases whose references are published computations or measurements."""
 
 
 def run(name: str, folder: Path) -> None:
-    """Run an implementation."""
+    """Run an implementation, which writes its results below ``folder``."""
     script, *options = IMPLEMENTATIONS[name]
     command = [sys.executable, HERE / "implementations" / script, folder / name, *options]
     if subprocess.run(command, check=False).returncode:
-        sys.exit(f"error: {name} did not run")
+        sys.exit(f"error: the implementation {name} failed")
 
 
 def write_references(folder: Path) -> None:
-    """Write the references: the mean of independent implementations."""
+    """Write the references, the means of the independent implementations."""
     for case, specified in score.specification().items():
         if case in PUBLISHED:
             continue
@@ -66,7 +66,7 @@ def write_references(folder: Path) -> None:
 
 
 def agreement(case: str, folder: Path) -> float:
-    """Return the digits to which HubSlosh and the independent implementations agree."""
+    """Return the number of digits to which HubSlosh and the independent implementations agree."""
     specified = score.specification()[case]
     if specified["kind"] == "intervals":
         return math.nan
@@ -79,7 +79,7 @@ def agreement(case: str, folder: Path) -> float:
 
 
 def write_scores(folder: Path) -> None:
-    """Score the results and keep the scores."""
+    """Score the results, and write the scores to scores.csv."""
     agreed = {case: agreement(case, folder) for case in score.specification()}
     with SCORES.open("w", newline="", encoding="utf-8") as file:
         file.write("# Written by harness/benchmark/compare.py.\n")
@@ -95,13 +95,13 @@ def write_scores(folder: Path) -> None:
 
 
 def read_scores() -> list[dict[str, str]]:
-    """Return the scores that were kept."""
+    """Return the scores in scores.csv."""
     with SCORES.open(encoding="utf-8") as file:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 def table(rows: Iterable[dict[str, str]]) -> str:
-    """Return the table of scores."""
+    """Return the table of scores in Markdown."""
     kept = {(row["case"], row["implementation"]): row for row in rows}
     names = list(IMPLEMENTATIONS)
     lines = [
@@ -132,10 +132,10 @@ def with_table(text: str, rows: list[dict[str, str]]) -> str:
 
 
 def main() -> None:
-    """Run, score, write."""
+    """Run the implementations, score their results, and write the table."""
     parser = argparse.ArgumentParser(description="Runs the slosh benchmark.")
     parser.add_argument("--only", choices=IMPLEMENTATIONS, help="run one implementation")
-    parser.add_argument("--references", action="store_true", help="write the references anew")
+    parser.add_argument("--references", action="store_true", help="write new references")
     args = parser.parse_args()
     try:
         import heyoka  # noqa: F401

@@ -1,14 +1,14 @@
-"""Scores results of the slosh benchmark; needs nothing but Python 3.11.
+"""Scores results of the slosh benchmark; needs only Python 3.11.
 
     python3 score.py RESULTS_FOLDER
 
-RESULTS_FOLDER contains a folder for each case that you have run, named like the case, with your
-results.csv in it. The benchmark's own results.csv of the case is the reference and shows the form:
-the same columns with the same units, and the same rows. Cases that you have not run are left out.
+RESULTS_FOLDER contains a folder for each case that you have run, which has the name of the case and
+contains your results.csv. It must have the same columns, units and rows as the results.csv of this
+benchmark, which is the reference. Cases that you have not run are left out.
 
-Prints a line for each case: digits, the column and row with the largest error, pass or fail.
-The exit status is 0 if every case that is there has a score, passed or not, and 1 if a file has
-an error. ``--json`` prints the scores as JSON.
+The program prints a line for each case: the number of correct digits, the column and row with the
+largest error, and pass or fail. The exit code is 0 if every case in the folder has a score, even if
+it fails, and 1 if a file has an error. ``--json`` prints the scores as JSON.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 MOST_DIGITS = 15.0
-"""Digits of a result without any error: references have about as many."""
+"""Number of digits of a result without error; references have about as many correct digits."""
 HINTS = {
     math.degrees(1): "degrees for radians",
     math.radians(1): "radians for degrees",
@@ -30,16 +30,16 @@ HINTS = {
     1e-3: "thousands of the unit, such as m for mm",
     -1.0: "the opposite sign",
 }
-"""Factors between a column and its reference that have a common cause."""
+"""Frequent mistakes, by the factor between a column and its reference that they cause."""
 
 
 class ResultsError(Exception):
-    """A results.csv that cannot be scored."""
+    """Raised if a results.csv cannot be scored."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """The rows of a results.csv: values of a row by column."""
+    """Rows of a results.csv, each with its values by column."""
 
     columns: dict[str, str]
     rows: list[dict[str, float]]
@@ -52,26 +52,26 @@ class Score:
     case: str
     title: str
     digits: float
-    """-log10 of the largest relative error; of intervals the share of rows that pass."""
+    """-log10 of the largest relative error; for measurements, the number of rows that pass."""
     needed: float
     passed: bool
     worst: str
-    """Where the largest error is, in words."""
+    """Column and row of the largest error, in words."""
     hint: str = ""
 
 
 def specification() -> dict[str, dict]:
-    """Return what is demanded of each case."""
+    """Return the specification of each case from specification.toml."""
     return tomllib.loads((HERE / "specification.toml").read_text(encoding="utf-8"))
 
 
 def header(name: str, unit: str) -> str:
-    """Return the head of a column."""
+    """Return the header of a column, such as ``omega [rad/s]``."""
     return f"{name} [{unit}]"
 
 
 def split(head: str) -> tuple[str, str | None]:
-    """Return name and unit of a column's head."""
+    """Return name and unit of a column from its header; the unit is None if it has none."""
     name, bracket, rest = head.strip().partition("[")
     return name.strip(), rest.strip().removesuffix("]").strip() if bracket else None
 
@@ -79,8 +79,8 @@ def split(head: str) -> tuple[str, str | None]:
 def read(path: Path, columns: dict[str, str]) -> Table:
     """Read a results.csv with these columns.
 
-    Lines that begin with # are comments. An empty cell is NaN. Raises ResultsError with the place
-    and what is allowed.
+    Lines that begin with # are comments. An empty cell is NaN. Raises ResultsError that names the
+    place of the error and the allowed values.
     """
     if not path.is_file():
         raise ResultsError(f"{path} is missing")
@@ -141,9 +141,9 @@ def reference(case: str, specified: dict) -> Table:
 
 
 def match(path: Path, table: Table, wanted: Table) -> list[dict[str, float]]:
-    """Return the rows of a table in the order of the reference's, matched by the first column.
+    """Return the rows of a table that match the reference by the first column, in its order.
 
-    Rows that the reference does not have may be there: results with more times are fine.
+    The table may have further rows, for example at more times.
     """
     key = next(iter(wanted.columns))
     keys = sorted((row[key], i) for i, row in enumerate(table.rows))
@@ -167,12 +167,12 @@ def match(path: Path, table: Table, wanted: Table) -> list[dict[str, float]]:
 
 
 def group(name: str) -> str:
-    """Return the group of a column: its name up to the last underscore."""
+    """Return the group of a column, which is its name up to the last underscore."""
     return name.rpartition("_")[0] or name
 
 
 def score(case: str, path: Path) -> Score:
-    """Return the score of a results.csv. Raises ResultsError if it cannot be scored."""
+    """Return the score of a results.csv; raise ResultsError if it cannot be scored."""
     known = specification()
     if case not in known:
         raise ResultsError(f"{case} is no case of the benchmark (cases: {', '.join(known)})")
@@ -193,7 +193,7 @@ def score(case: str, path: Path) -> Score:
 def largest_error(
     rows: list[dict[str, float]], wanted: Table, scale: str
 ) -> tuple[float, str, str]:
-    """Return the largest relative error of rows, where it is, and what may be its cause.
+    """Return the largest relative error of rows, its column and row, and its possible cause.
 
     Raises ValueError if a value is not finite.
     """
@@ -223,12 +223,12 @@ def largest_error(
 
 
 def same(found: list[float], factor: float) -> bool:
-    """Return true if nearly all of these quotients are the factor."""
+    """Return True if nearly all quotients in ``found`` equal ``factor``."""
     return sum(abs(x / factor - 1) < 0.05 for x in found) > 0.9 * len(found)
 
 
 def scales(rows: list[dict[str, float]], names: list[str]) -> dict[str, float]:
-    """Return the largest length of each group of columns over these rows."""
+    """Return the largest norm of each group of columns over all rows."""
     largest: dict[str, float] = {}
     for row in rows:
         squares: dict[str, float] = {}
@@ -241,7 +241,7 @@ def scales(rows: list[dict[str, float]], names: list[str]) -> dict[str, float]:
 
 
 def score_intervals(case: str, title: str, path: Path, table: Table, wanted: Table) -> Score:
-    """Count the rows whose value meets its measurement."""
+    """Return the score of a case with measurements: the number of rows within their errors."""
     values = {}
     for row in table.rows:
         if row["row"] not in {exact["row"] for exact in wanted.rows}:
@@ -250,7 +250,7 @@ def score_intervals(case: str, title: str, path: Path, table: Table, wanted: Tab
     missed = []
     for exact in wanted.rows:
         value = values.get(exact["row"], math.nan)
-        # six digits of a share are kept
+        # the tolerance allows rounding, because stored fractions have six digits
         if not abs(value - exact["measured"]) <= exact["error"] + exact["band"] + 1e-5:
             missed.append(f"{exact['row']:g}")
     count = len(wanted.rows)
@@ -259,7 +259,7 @@ def score_intervals(case: str, title: str, path: Path, table: Table, wanted: Tab
 
 
 def collect(folder: Path) -> tuple[list[Score], list[str]]:
-    """Return scores and errors of a folder with results."""
+    """Return all scores and all error messages of a folder with results."""
     if not folder.is_dir():
         return [], [f"{folder} is no folder"]
     known = specification()
@@ -277,7 +277,7 @@ def collect(folder: Path) -> tuple[list[Score], list[str]]:
 
 
 def line(score: Score) -> str:
-    """Return a score as a line."""
+    """Return a score as a line of text."""
     verdict = "pass" if score.passed else "FAIL"
     if score.needed > MOST_DIGITS:
         text = f"{score.digits:.0f} of {score.needed:.0f} rows pass"
@@ -290,7 +290,7 @@ def line(score: Score) -> str:
 
 
 def main() -> None:
-    """Score a folder."""
+    """Score all results in a folder, and print the scores."""
     parser = argparse.ArgumentParser(description="Scores results of the slosh benchmark.")
     parser.add_argument("folder", type=Path, help="a folder with CASE/results.csv")
     parser.add_argument("--json", action="store_true", help="print the scores as JSON")

@@ -1,10 +1,10 @@
-"""Compares a host's results with what fmpy gets from the FMU for the same motion.
+"""Compares the results of a host with a simulation of the same motion by fmpy.
 
     pip install -r harness/python/requirements.txt
     python harness/hosts/compare.py RESULTS.csv dist/HubSlosh.fmu init.slosh_angle=0.3
 
-The table needs the columns time, omega and slosh_angle. Prints the largest differences; 1e-6 is
-what to expect of Model Exchange at a tolerance of 1e-9.
+The table needs the columns time, omega and slosh_angle. The program prints the largest differences.
+With Model Exchange and a tolerance of 1e-9, differences of about 1e-6 are normal.
 """
 
 import argparse
@@ -22,14 +22,14 @@ from hubslosh import TORQUE, FmuError, Plant
 SIGNALS = ["omega", "slosh_angle"]
 
 STEP = 0.02
-"""Duration for hosts that are driven by `sine`, s."""
+"""Communication step of hosts that are driven by `sine`, s."""
 
 Signals = Mapping[str, np.ndarray]
 """Histories by the names of the FMU's variables, SI units."""
 
 
 def sine(duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return times (s) and a torque near the slosh frequency, held from each to the next (N·m)."""
+    """Return times (s) and a held torque (N·m), a sine near the slosh frequency."""
     time = np.arange(round(duration / STEP) + 1) * STEP
     return time, 0.05 * np.sin(2 * math.pi * 2.4 * time)
 
@@ -42,9 +42,9 @@ def drive(
     columns: list[str],
     tolerance: float | None = None,
 ) -> Signals:
-    """Return ``columns`` at the times (s), under a torque (N·m) that is held to the next time.
+    """Simulate the FMU by fmpy under a held torque (N·m); return ``columns`` at the times (s).
 
-    ``tolerance`` is that of the FMU's solver, by default its own choice.
+    ``tolerance`` is the tolerance of the FMU's solver; by default the FMU chooses it.
     """
     start, stop = float(time[0]), float(time[-1])
     with Plant(
@@ -54,9 +54,9 @@ def drive(
 
 
 def compare(here: Signals, there: Signals, allowed: float | None = None) -> None:
-    """Print the largest difference of each of a host's signals from fmpy's.
+    """Print the largest difference between the signals of a host (``there``) and of fmpy (``here``).
 
-    allowed: leave with 1 beyond this part of the signal's largest value; None: print only.
+    If a difference exceeds ``allowed`` times the largest value of its signal, exit with an error.
     """
     for name, values in here.items():
         largest, difference = np.abs(there[name]).max(), np.abs(values - there[name]).max()
@@ -66,12 +66,12 @@ def compare(here: Signals, there: Signals, allowed: float | None = None) -> None
 
 
 def main() -> None:
-    """Compare a table."""
+    """Compare the table of a host with a simulation by fmpy."""
     parser = argparse.ArgumentParser(description="Compares a host's results with fmpy's.")
     parser.add_argument("results", type=Path, help="table of the host, .csv or .parquet")
     parser.add_argument("fmu", type=Path, help="the FMU that it ran")
     parser.add_argument("settings", nargs="*", metavar="NAME=VALUE")
-    parser.add_argument("--prefix", default="", help="what the host puts before the FMU's names")
+    parser.add_argument("--prefix", default="", help="text before the FMU's names in the columns")
     parser.add_argument(
         "--driven", action="store_true",
         help=f"the table has {TORQUE}, held from row to row; else nothing drives the hub",
@@ -82,7 +82,7 @@ def main() -> None:
         columns = ["time", *(args.prefix + name for name in names)]
         read = pd.read_parquet if args.results.suffix == ".parquet" else pd.read_csv
         table = {name: values.to_numpy() for name, values in read(args.results)[columns].items()}
-        # Hosts write a row before and one after an event: the last of a time counts.
+        # Hosts write a row before and a row after an event; use the last row of each time.
         _, last = np.unique(table["time"][::-1].round(6), return_index=True)
         time = table["time"][::-1][last]
         found = {name: table[args.prefix + name][::-1][last] for name in names}

@@ -1,14 +1,16 @@
-"""HubSlosh as SSP in libcosim (PyPI: libcosimpy 0.0.6), tried on Linux.
+"""Runs HubSlosh as SSP in libcosim (PyPI: libcosimpy 0.0.6); tried on Linux.
 
-libcosim is the Open Simulation Platform's master; it reads FMUs with Modelon's FMI Library.
+libcosim is the co-simulation master of the Open Simulation Platform; it loads FMUs with Modelon's
+FMI Library.
 
     pip install libcosimpy==0.0.6 fmpy==0.3.32 numpy
     python harness/hosts/cosim.py dist/HubSlosh.fmu
 
-Packs the system of ssp/, checks its XML against the schemas of SSP 1.0 and drives it with a sine
-for a minute. Prints the largest difference from fmpy with the FMU alone. Limitations: libcosim
-ignores enumerations (`slosh.model`, `friction.model`), so the model is linear. If an FMU returns an
-error, libcosim prints the FMU's message and ends the process.
+This program packs the system of ssp/, checks its XML against the schemas of SSP 1.0, and drives the
+system with a sine for a minute. It prints the largest difference from a simulation of only the FMU
+by fmpy. libcosim has limitations: it ignores enumerations (`slosh.model`, `friction.model`), so
+that the slosh model is linear. If an FMU returns an error, libcosim prints the FMU's message and
+ends the process.
 """
 
 import sys
@@ -30,7 +32,7 @@ SIGNALS = ["theta", "omega", "slosh_angle", "omega_imu"]
 
 
 def libcosim(folder: Path, time: np.ndarray, torque: np.ndarray) -> dict[str, np.ndarray]:
-    """Drive an unpacked SSP; torque: N·m, held from each time to the next."""
+    """Simulate an unpacked SSP under a torque (N·m) that is held between the times (s)."""
     log_output_level(CosimLogLevel.ERROR)
     run = CosimExecution.from_ssp_file(str(folder), step_size=round(STEP * 1e9))
     plant = run.slave_index_from_instance_name("plant")
@@ -43,7 +45,7 @@ def libcosim(folder: Path, time: np.ndarray, torque: np.ndarray) -> dict[str, np
     for value in torque[:-1]:
         manipulator.slave_real_values(plant, [reference["tau_cmd"]], [value])
         if not run.step():
-            sys.exit("error: libcosim could not go on")
+            sys.exit("error: libcosim could not continue the simulation")
         rows.append(observer.last_real_values(plant, wanted))
     end = run.status().current_time * 1e-9
     if abs(end - time[-1]) > 1e-9:
@@ -52,7 +54,7 @@ def libcosim(folder: Path, time: np.ndarray, torque: np.ndarray) -> dict[str, np
 
 
 def main() -> None:
-    """Pack, check, run, compare."""
+    """Pack and check the SSP, simulate it, and compare the results."""
     if len(sys.argv) != 2:
         sys.exit("usage: python cosim.py FMU")
     fmu = Path(sys.argv[1]).resolve()
@@ -62,13 +64,13 @@ def main() -> None:
         pack(fmu, system)
         read_ssd(str(system), validate=True)
         release = read_ssv(str(system), "resources/release.ssv", validate=True)
-        # libcosim takes the archive's folder.
+        # libcosim needs an unpacked archive.
         with zipfile.ZipFile(system) as archive:
             archive.extractall(folder)
         here = libcosim(folder, time, torque)
     settings = {parameter.name: parameter.value for parameter in release.parameters}
     there = drive(fmu, time, torque, settings, SIGNALS)
-    # libcosim's observer sees the ends of steps.
+    # libcosim's observer records only the ends of steps, not the start.
     compare(here, {signal: values[1:] for signal, values in there.items()}, allowed=1e-9)
 
 

@@ -1,11 +1,12 @@
-"""HubSlosh in ecos (PyPI: ecospy 0.7), a co-simulation master of its own; tried on Linux.
+"""Runs HubSlosh in the co-simulation master ecos (PyPI: ecospy 0.7); tried on Linux.
 
     pip install ecospy==0.7.2 fmpy==0.3.32 numpy     # and Debian's libtbb12 for ecospy
     python harness/hosts/ecos.py dist/HubSlosh.fmu
 
-Drives the FMU with a sine for a minute and prints by how much the motion differs from what fmpy
-gets for the same steps. Limitations: ecos can't set enumerations (`slosh.model`, `friction.model`),
-so the model is linear. It does not report an FMU's errors: check the values, as here.
+This program drives the FMU with a sine for a minute, and prints the largest difference from a
+simulation by fmpy with the same steps. ecos has limitations: it cannot set enumerations
+(`slosh.model`, `friction.model`), so that the slosh model is linear, and it does not report errors
+of an FMU, so that the values must be checked, as here.
 """
 
 import sys

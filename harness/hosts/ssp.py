@@ -1,9 +1,9 @@
-"""Packs a system of one HubSlosh as SSP 1.0, for OMSimulator, libcosim and other masters.
+"""Packs a system with one HubSlosh.fmu as SSP 1.0, for OMSimulator, libcosim and other masters.
 
     python harness/hosts/ssp.py dist/HubSlosh.fmu dist/HubSlosh.ssp
 
-The folder ssp/ next to this file is the archive without the FMU: edit its texts for a system of
-your own. Needs nothing but Python.
+The folder ssp/ next to this file has the content of the archive without the FMU; edit its files for
+a system of your own. The program needs only Python.
 """
 
 import sys
@@ -16,7 +16,7 @@ TEXTS = Path(__file__).resolve().parent / "ssp"
 def pack(fmu: Path, archive: Path) -> None:
     """Write the system's description, its parameters and the FMU into one archive."""
     if not zipfile.is_zipfile(fmu):
-        sys.exit(f"error: {fmu} is not an FMU; cargo run --release -- pack makes one")
+        sys.exit(f"error: {fmu} is not an FMU; cargo run --release -- pack builds one")
     members = {path.relative_to(TEXTS).as_posix(): path for path in TEXTS.rglob("*.ss?")}
     members["resources/HubSlosh.fmu"] = fmu
     archive.parent.mkdir(parents=True, exist_ok=True)
@@ -24,7 +24,7 @@ def pack(fmu: Path, archive: Path) -> None:
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as out:
             for name, path in sorted(members.items()):
-                # Without a date: the same texts and FMU make the same bytes.
+                # Entries have no date, so that the same files always give the same bytes.
                 entry = zipfile.ZipInfo(name)
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 out.writestr(entry, path.read_bytes())

@@ -281,7 +281,7 @@ def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]
 
 
 def integrators_table(fmu: Path) -> list[str]:
-    """Return a table of errors of Basilisk's integrators and their CPU times relative to the FMU."""
+    """Return a table with error and CPU time, relative to the FMU, of Basilisk's integrators."""
     given = case(fmu, "release far", 0.10, 0.003)
     own = ours(fmu, given)
     rows = []

@@ -52,7 +52,7 @@ WINDOW, SHARE, LEAST = 2.0, 0.5, np.radians(3.0)
 
 
 def sweep(amplitude: float, noise: float) -> pd.DataFrame:
-    """Return the inputs: the thesis's sweep of the torque, linear in frequency, and torque noise."""
+    """Return the inputs: a torque sweep as in the thesis, linear in frequency, and torque noise."""
     time = np.arange(round(DURATION / STEP)) * STEP
     phase = 2 * np.pi * (FIRST * time + (LAST - FIRST) / (2 * DURATION) * time**2)
     columns = {"time": time, "tau_cmd": amplitude * np.sin(phase)}

@@ -136,8 +136,7 @@ def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Comp
 
 
 def features(grid: Real, response: Complex) -> Features:
-    """Return antiresonance and resonance, the ends of the largest rise of |H| (dB) over frequency.
-    """
+    """Return antiresonance and resonance, both ends of the largest rise of |H| in dB."""
     level = 20 * np.log10(np.abs(response))
     lowest = np.minimum.accumulate(level)
     high = int(np.argmax(level - lowest))

@@ -323,7 +323,7 @@ DEPTH = 0.078  # m
 
 
 def cylinder_decay() -> tuple[list[Row], str]:
-    """Compare frequency and damping of water in a cylinder after a motion, from measured moments."""
+    """Compare frequency and damping of water in a cylinder after a motion, by measured moments."""
     name = "Soprani, Di Leva et al. (2025), free decay"
     of, _ = tank(CYLINDER, DEPTH, sigma=TENSION)
     omega, zeta = frequency(of), of["zeta[1]"]
@@ -583,7 +583,7 @@ SEEDS = range(1, 11)  # seeds of the gyro's noise
 
 
 def built_sweep(fill: dict, amplitude: float, gyro: str = "omega") -> tuple[float, bool]:
-    """Return the peak acceleration (rad/s²) of a sweep of the bench as built, and True if rotary."""
+    """Return the peak acceleration (rad/s²) in a sweep of the bench as built, and True if rotary."""
     plan = tomllib.loads(PLAN.read_text(encoding="utf-8"))
     run = hubslosh.simulate(
         FMUS["HubSlosh"],

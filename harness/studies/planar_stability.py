@@ -67,7 +67,7 @@ class Plant:
     def half_period(
         self, state: np.ndarray, torque: np.ndarray, phase: np.ndarray, frequency: np.ndarray
     ) -> np.ndarray:
-        """Return the states half a period later, mirrored; symmetric motion returns to its start."""
+        """Return the mirrored states half a period later; symmetric motion returns to its start."""
         step = 0.5 / (frequency * STEPS)
         turn = np.pi / STEPS
         push = torque * np.sin(phase)

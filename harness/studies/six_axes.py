@@ -11,7 +11,7 @@ by 10 %, because compilers differ by some per cent.
 | case | what |
 | --- | --- |
 | hub | HubSlosh's bench, spherical model, no friction |
-| held | a craft with the same liquid, one tank and mode, under 1 g, whose large mass leaves one axis |
+| held | a craft with the same liquid, one tank and mode, under 1 g, which turns about one axis |
 | one | 1180 kg under 2400 N, one tank, one mode, constant damping law, as in all releases |
 | two | the same, two tanks of one mode, as in the comparison with Basilisk |
 | four | the same, four tanks of three modes each |

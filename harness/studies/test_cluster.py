@@ -40,7 +40,7 @@ def client() -> Iterator[Client]:
 
 @pytest.fixture
 def harness(program: Path, fmu: Path, tmp_path: Path):
-    """Return a function that creates a `cluster.Harness` from a plan's text and a directory name."""
+    """Return a function from the text of a plan and a directory name to a `cluster.Harness`."""
 
     def make(plan: str, out: str) -> cluster.Harness:
         path = tmp_path / "plan.toml"

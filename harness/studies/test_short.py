@@ -65,7 +65,9 @@ def style() -> None:
     plt.rcdefaults()
 
 
-def test_the_picture_of_rotary_slosh_in_the_readme_is_reproduced(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_picture_of_rotary_slosh_in_the_readme_is_reproduced(
+    fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It shows two sweeps of 2700 s."""
     monkeypatch.setattr(rotary_branch, "FMU", fmu)
     same_picture(rotary_branch.draw(), rotary_branch.PICTURE)
@@ -182,11 +184,13 @@ def test_the_errors_in_the_work_precision_tables_are_reproduced(
         assert error == pytest.approx(float(printed), abs=1.01 * half_digit(printed))
 
 
-def test_a_simulated_flight_identifies_slosh_as_in_the_book(fmu: Path, program: Path, tmp_path: Path) -> None:
+def test_a_simulated_flight_identifies_slosh_as_in_the_book(
+    fmu: Path, program: Path, tmp_path: Path
+) -> None:
     """The estimates of one simulated flight equal the table of one flight in book/flight.md.
 
     The flight has the seed 1 and the good gyro. Beyond the printed digits, estimates may differ by
-    0.1 of their standard deviations, and standard deviations by 5 %, which hardly changes intervals.
+    0.1 of their standard deviations, and standard deviations by 5 %, which hardly matters.
     """
     spacecraft = os.fspath(fmu.with_name("Spacecraft.fmu"))
     truth, found, _ = flight_twin.twin(1, "good", os.fspath(program), spacecraft, tmp_path)

@@ -1,8 +1,9 @@
-"""The cases that Basilisk's spherical pendulums can do: no friction, no stiffness, no draining.
+"""Computes the cases that Basilisk can simulate: no friction, no centring stiffness, no draining.
 
     python3 basilisk.py RESULTS_FOLDER [CASE ...]
 
-Basilisk's `sphericalPendulum` and RKF78, in steps of 1 ms, and of 5 ms in the long spin-up.
+It uses Basilisk's `sphericalPendulum` and the integrator RKF78 with steps of 1 ms, or 5 ms in the
+long spin-up.
 """
 
 import numpy as np
@@ -15,12 +16,12 @@ STEP = {"thrust": 1e-3, "spinner": 5e-3}
 
 
 def column(values) -> list[list[float]]:
-    """Return a vector as Basilisk takes it."""
+    """Return a vector in the form that Basilisk expects, a column matrix."""
     return [[float(x)] for x in values]
 
 
 def pendulum_of(tank: dict) -> sphericalPendulum.SphericalPendulum:
-    """Return a pendulum whose angles start at 0: its first axis points to the bob's start."""
+    """Return a pendulum whose angles are 0 at the start; its first axis points to the bob."""
     first = tank["p_0"] / np.linalg.norm(tank["p_0"])
     third = np.cross(first, [0.6, 0.48, 0.64])
     third /= np.linalg.norm(third)
@@ -37,7 +38,7 @@ def pendulum_of(tank: dict) -> sphericalPendulum.SphericalPendulum:
 
 
 def bob(craft, pendulum) -> np.ndarray:
-    """Return the bob's direction; Basilisk turns the pendulum's frame while it runs."""
+    """Return the direction of the bob; Basilisk rotates the pendulum's frame during a run."""
     state = craft.dynManager.getStateObject
     phi = state(pendulum.nameOfPhiState).getState()[0][0]
     theta = state(pendulum.nameOfThetaState).getState()[0][0]
@@ -47,7 +48,10 @@ def bob(craft, pendulum) -> np.ndarray:
 
 
 def run(case: str, integrator: str = "RKF78", step: float | None = None) -> np.ndarray:
-    """Return the rows of a case; integrator: its name in Basilisk. step: s."""
+    """Return the rows of a case.
+
+    ``integrator`` is the name of the integrator in Basilisk, and ``step`` its step, s.
+    """
     p = cases.parameters(case)
     step = step or STEP[case]
     simulation = SimulationBaseClass.SimBaseClass()
@@ -58,7 +62,7 @@ def run(case: str, integrator: str = "RKF78", step: float | None = None) -> np.n
     craft.hub.r_BcB_B = column(p["center"])
     craft.hub.IHubPntBc_B = cases.inertia(p).tolist()
     craft.hub.omega_BN_BInit = column(p["omega_0"])
-    # the start velocity is that of the common centre of mass; O is at rest
+    # O is at rest at the start; Basilisk needs the velocity of the common centre of mass
     total = p["mass"] + sum(tank["m"] for tank in p["tank"])
     first = p["mass"] * p["center"] + sum(
         tank["m"] * (tank["hinge"] + tank["l"] * tank["p_0"]) for tank in p["tank"]

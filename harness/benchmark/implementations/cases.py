@@ -1,4 +1,4 @@
-"""What all implementations share: parameters, inputs, and how results.csv is written."""
+"""Functions of all implementations: they read parameters and inputs, and write results.csv."""
 
 import csv
 import sys
@@ -33,7 +33,7 @@ def parameters(case: str) -> dict:
 
 
 def inputs(case: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and values of the inputs, each row held to the time of the next."""
+    """Return times and values of the inputs; each row is held until the next row."""
     with HERE.joinpath(case, "input.csv").open(encoding="utf-8") as file:
         rows = list(csv.reader(line for line in file if not line.startswith("#")))
     values = np.array(rows[1:], float)
@@ -41,7 +41,7 @@ def inputs(case: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def segments(case: str) -> list[tuple[float, float, np.ndarray]]:
-    """Return begin, end and input of each piece of time in which the inputs stand still."""
+    """Return begin, end and input of each piece of time in which the inputs are constant."""
     p = parameters(case)
     if case == "draining":
         return [(0.0, p["end"], np.hstack([p["force"], p["torque"]]))]
@@ -66,7 +66,7 @@ def inertia(p: dict) -> np.ndarray:
 
 
 def linearised_craft() -> dict:
-    """Return the craft of the case linearisation in the form of those in six axes."""
+    """Return the craft of the case linearisation in the form of the cases in six axes."""
     p = parameters("linearisation")
     tank = {"hinge": np.array([0, 0, p["hinge"]]), "axis": np.array([0, 0, 1.0]), "m": p["m"],
             "l": p["l"], "c": p["c"], "k": 0.0, "p_0": np.array([0, 0, -1.0]),
@@ -82,7 +82,7 @@ def frequencies() -> np.ndarray:
 
 
 def write(folder: Path, case: str, rows: np.ndarray, comment: str = "") -> None:
-    """Write results.csv of a case: key and values of each row."""
+    """Write results.csv of a case."""
     columns = score.specification()[case]["columns"]
     path = folder / case / "results.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -97,7 +97,7 @@ def write(folder: Path, case: str, rows: np.ndarray, comment: str = "") -> None:
 
 
 def run(cases: Mapping[str, Callable[[], np.ndarray]]) -> None:
-    """Run cases from the command line, FOLDER [CASE …], and write their results."""
+    """Run the cases that the command line names, FOLDER [CASE …], and write their results."""
     for name in sys.argv[2:] or cases:
         write(Path(sys.argv[1]), name, cases[name]())
         print(f"{name}: written", flush=True)

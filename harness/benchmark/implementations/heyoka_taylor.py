@@ -1,10 +1,10 @@
-"""The cases by heyoka's Taylor integrator, in other coordinates and equations than the pages'.
+"""Computes the cases by heyoka's Taylor integrator, with other equations than those of the pages.
 
     python3 heyoka_taylor.py RESULTS_FOLDER [CASE ...]
 
-Bench and waves: Lagrange's equations, differentiated by heyoka. Six axes: the bobs' velocities as
-seen from axes that do not turn, and the rods' pulls as unknowns. Draining: balances of momentum and
-moment of momentum, differentiated by heyoka.
+Bench and waves: Lagrange's equations, differentiated by heyoka. Six axes: the unknowns include the
+inertial velocities of the bobs and the tensions of the rods. Draining: balances of linear and
+angular momentum, differentiated by heyoka.
 """
 
 import heyoka as hy
@@ -14,7 +14,7 @@ import cases
 
 Matrix = list[list]
 BREAKS_AWAY = 1e-4
-"""Time after the beginning of sliding in which the hub does not stop again, s."""
+"""Time after the beginning of sliding in which no stop of the hub is searched, s."""
 
 
 def dot(a, b):
@@ -38,12 +38,12 @@ def scale(factor, a):
 
 
 def is_zero(x) -> bool:
-    """Return true for a number 0."""
+    """Return True for the number 0."""
     return isinstance(x, (int, float)) and x == 0.0
 
 
 def solve(matrix: Matrix, right: list) -> list:
-    """Return the solution of linear equations by Gauss's elimination without pivots."""
+    """Solve linear equations by Gaussian elimination without pivoting."""
     n = len(right)
     a = [[*row, b] for row, b in zip(matrix, right, strict=True)]
     for i in range(n):
@@ -63,7 +63,7 @@ def solve(matrix: Matrix, right: list) -> list:
 
 
 def names(*groups: str) -> list:
-    """Return variables: a:3 makes a_0, a_1, a_2."""
+    """Return variables by name; "a:3" stands for a_0, a_1, a_2."""
     made = []
     for each in groups:
         name, _, count = each.partition(":")
@@ -72,7 +72,7 @@ def names(*groups: str) -> list:
 
 
 def attitude(q, w, a):
-    """Return q' and the vector a in inertial axes."""
+    """Return q', and the vector ``a`` transformed to inertial axes."""
     s, v = q[0], q[1:]
     q_d = [-0.5 * dot(v, w), *(0.5 * x for x in add(scale(s, w), cross(v, w)))]
     t = scale(2.0, cross(v, a))
@@ -83,7 +83,7 @@ def attitude(q, w, a):
 
 
 def lagrange(lagrangian, force, coordinates, rates):
-    """Return matrix and right-hand side of Lagrange's equations for the accelerations."""
+    """Return matrix and right-hand side of the linear equations for the accelerations (Lagrange)."""
     matrix, right = [], []
     for q, v, f in zip(coordinates, rates, force, strict=True):
         momentum = hy.diff(lagrangian, v)
@@ -97,10 +97,10 @@ def lagrange(lagrangian, force, coordinates, rates):
 
 
 class Bench:
-    """Hub and bob: theta and alpha, or theta and the bob's stereographic coordinates."""
+    """Hub and bob; coordinates are theta and alpha, or theta and the bob's stereographic ones."""
 
     def __init__(self, case: str):
-        """Make integrators for the three contacts."""
+        """Create an integrator for each contact: sliding forwards, sliding backwards, sticking."""
         p = cases.parameters(case)
         self.spherical = case == "bench_spherical"
         c = 2 * p["zeta"] * p["m"] * np.sqrt(p["g"] / p["l"])
@@ -117,7 +117,7 @@ class Bench:
             velocity = [swing[0] - w * place[1], swing[1] + w * place[0], swing[2]]
             energy = 0.5 * m * dot(velocity, velocity) - m * g * place[2]
             coordinates, rates = [theta, x, y], [w, x_d, y_d]
-            # drag by Rayleigh's function of the swing; its reaction is inside the system
+            # damping by Rayleigh's dissipation function; its reaction is internal to the system
             rayleigh = 0.5 * c * dot(swing, swing)
         else:
             theta, x, w, x_d = names("theta", "x", "w", "u")
@@ -130,7 +130,7 @@ class Bench:
         matrix, right = lagrange(energy, force, coordinates, rates)
         free = solve(matrix, right)
         held = solve([row[1:] for row in matrix[1:]], right[1:])
-        # load on a hub at rest: what it would take to hold it
+        # torque that holds a hub at rest
         held_load = right[0] - dot(matrix[0][1:], held)
         load = hy.subs(held_load, {w: hy.expression(0.0), sign: hy.expression(0.0)})
         most = p["c_f"] + p["d_f"]
@@ -154,7 +154,7 @@ class Bench:
             )
             for side, way in ((1, down), (-1, up))
         }
-        # at the start of sliding the acceleration is 0, which an event could take for its end
+        # separate integrator for the start of sliding, where an event could find rate 0 as an end
         self.leave = hy.taylor_adaptive(sliding, zeros, pars=[0, 0], **options)
         self.stick = hy.taylor_adaptive(sticking, zeros, pars=[0], t_events=leave, **options)
         self.load = hy.cfunc([load], [*coordinates, *rates])
@@ -178,7 +178,7 @@ class Bench:
         return [y[0], y[3], k * y[1], k * y[2]]
 
     def run(self, case: str):
-        """Return the rows."""
+        """Simulate a case and return its rows."""
         times, rows = cases.row_times(case), []
         y, n = self.start(), self.n
         sign, breaks_away = 0, False
@@ -237,7 +237,7 @@ def rigid_rows(p: dict, first, origin) -> Matrix:
 
 
 def craft_system(p: dict):
-    """Return the equations of a craft with pendulums; the wrench is the parameters."""
+    """Return the equations of a craft with pendulums, with force and torque as parameters."""
     q, w, v = names("q:4"), names("w:3"), names("v:3")
     force, torque = hy.par[0], hy.par[3]
     force, torque = [hy.par[i] for i in range(3)], [hy.par[i] for i in range(3, 6)]
@@ -264,7 +264,7 @@ def craft_system(p: dict):
         )
         lever = cross(hinge, d)
         swirl = cross(w, cross(w, hinge))
-        # tension in place of one equation each; |p| = 1 makes p.(u' + w x u) = -|u|^2
+        # eliminate the tension of each rod by |p| = 1, which gives p.(u' + w x u) = -|u|^2
         row = [m * x for x in [*d, *lever]] + [0.0] * count
         row[6 + i] = 1.0
         held = m * (l * dot(u, u) - dot(d, swirl))
@@ -294,10 +294,11 @@ def craft_system(p: dict):
 
 
 def draining_system(p: dict):
-    """Return the equations of the craft that drains, from momentum and moment of momentum.
+    """Return the equations of the craft that drains, from linear and angular momentum about O.
 
-    P = m V + w x S + K + m_b rho', H = S x V + I w + L + m_b rho x rho' of the whole about O,
-    P' = F - f (V + w x r_o), H' = tau - f r_o x (V + w x r_o) - V x P, in body axes with - w x.
+    P = m V + w x S + K + m_b rho', H = S x V + I w + L + m_b rho x rho',
+    P' = F - f (V + w x r_o), H' = tau - f r_o x (V + w x r_o) - V x P; in body axes, derivatives
+    have the additional terms - w x P and - w x H.
     """
     q, w, vi = names("q:4"), names("w:3"), names("v:3")
     d, d_d, (liquid,) = names("p:3"), names("pd:3"), names("liquid")
@@ -344,8 +345,8 @@ def draining_system(p: dict):
         drift = sum((hy.diff(balance, x) * x_d for x, x_d in known), hy.expression(0.0))
         matrix.append([*per, 0.0])
         right.append(rate - drift)
-    # the bob: m (V' + w x V + w' x rho + ...) = -T p - drag; unknown: V', w', p'', T. The equations
-    # are the same in every inertial frame, so that V = 0 may stand for any V
+    # the bob: m (V' + w x V + w' x rho + ...) = -T p - damping; unknowns are V', w', p'' and T. The
+    # equations are the same in every inertial frame, so that V can be set to 0
     for i in range(3):
         row = [0.0] * 10
         row[i] = m
@@ -360,7 +361,7 @@ def draining_system(p: dict):
         right.append(-m * swirl[i] - m * p["gamma"] * l * d_d[i])
     matrix.append([0.0] * 6 + [*d, 0.0])
     right.append(-dot(d_d, d_d))
-    # the bobs' equations first: pivots of Gauss's elimination are then never 0
+    # the equations of the bobs come first, so that no pivot of the elimination is 0
     order = [6, 7, 8, 9, *range(6)]
     columns = [6, 7, 8, 9, *range(6)]
     still = {x: hy.expression(0.0) for x in vb}
@@ -425,7 +426,7 @@ def linearisation():
     jacobian = jacobian.reshape(len(rates), -1)
     n = len(rates)
     a, b = jacobian[:, :n], jacobian[:, n:]
-    # the specific force at O is the rate of the velocity with the attitude's share left out
+    # the specific force at O is the derivative of the velocity without the change of attitude
     at = [str(x) for x in variables].index("v_0")
     c = a[at].copy()
     c[:4] = 0.0
@@ -441,7 +442,7 @@ def linearisation():
 
 
 def wave(s, kappa, g, l):
-    """Return Lagrange's function of the bob over m l^2, with its coordinates and rates."""
+    """Return the Lagrangian of the bob divided by m l^2, its coordinates and their rates."""
     x, y, x_d, y_d = names("x", "y", "u", "v")
     u = x * x + y * y
     rise = 1.0 - hy.sqrt(1.0 - u) + (kappa - 1) / 8 * u * u
@@ -453,7 +454,7 @@ def wave(s, kappa, g, l):
 
 
 def backbones():
-    """Return frequencies by the time to the middle, and of circles by the balance of forces."""
+    """Return frequencies from the time to the middle, and of circles from the balance of forces."""
     rows = []
     s, kappa = hy.par[0], hy.par[1]
     lagrangian, _, places, rates = wave(s, kappa, 1.0, 1.0)
@@ -472,7 +473,7 @@ def backbones():
         ta.reset_cooldowns()
         ta.propagate_until(100.0)
 
-        # x'' is linear in the square of the speed, and on a circle it is -speed^2/A
+        # x'' is linear in the squared speed, and equals -speed^2/A on a circle of radius A
         def radial(speed, largest=largest, pair=pair):
             return rate_of(np.array([largest, 0, 0, speed]), pars=np.array(pair))[2]
 

@@ -1,9 +1,9 @@
-"""The cases by the FMUs of HubSlosh.
+"""Computes the cases by the FMUs of HubSlosh.
 
     python3 hubslosh_fmus.py RESULTS_FOLDER [CASE ...]
 
-needs the Python package (``pip install hubslosh``). With ``--fmus FOLDER`` the FMUs of this folder
-run in place of the package's.
+It needs the Python package (``pip install hubslosh``). ``--fmus FOLDER`` uses the FMUs in a folder
+instead of the FMUs of the package.
 """
 
 import argparse
@@ -23,12 +23,12 @@ MEASURED = Path(__file__).resolve().parents[2] / "studies" / "measured" / "resul
 
 
 def fmu(name: str) -> str | Path:
-    """Return an FMU."""
+    """Return the file of an FMU, or its name in the package."""
     return FOLDER / f"{name}.fmu" if FOLDER else name
 
 
 def put(settings: dict, name: str, values) -> None:
-    """Set a vector."""
+    """Store the components of a vector in ``settings``."""
     settings.update({f"{name}[{i}]": float(x) for i, x in enumerate(values, 1)})
 
 
@@ -36,7 +36,7 @@ def put(settings: dict, name: str, values) -> None:
 
 
 def bench(case: str) -> np.ndarray:
-    """Return the rows of a bench."""
+    """Simulate a case of the bench and return its rows."""
     p = cases.parameters(case)
     spherical = case == "bench_spherical"
     settings = {
@@ -78,13 +78,13 @@ def bench(case: str) -> np.ndarray:
 
 
 def turned(axis: np.ndarray) -> np.ndarray:
-    """Return the quaternion of the shortest turn from the z axis to this axis."""
+    """Return the quaternion of the shortest rotation from the z axis to ``axis``."""
     q = np.array([1 + axis[2], -axis[1], axis[0], 0.0])
     return q / np.linalg.norm(q)
 
 
 def matrix_of(q: np.ndarray) -> np.ndarray:
-    """Return the matrix of a quaternion."""
+    """Return the rotation matrix of a quaternion, scalar first."""
     w, x, y, z = q
     return np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -94,7 +94,7 @@ def matrix_of(q: np.ndarray) -> np.ndarray:
 
 
 def rigid(p: dict) -> dict:
-    """Return the settings of the rigid part."""
+    """Return the settings of the rigid part of a craft."""
     settings = {f"craft.J{a}": float(p[f"J_{a}"]) for a in ("xx", "yy", "zz", "xy", "xz", "yz")}
     settings["craft.mass"] = p["mass"]
     put(settings, "craft.r", p["center"])
@@ -105,7 +105,7 @@ def rigid(p: dict) -> dict:
 def with_tanks(p: dict) -> tuple[dict, list[np.ndarray]]:
     """Return the settings of a craft with pendulums, and the matrices from tank to body axes.
 
-    The page's rigid part contains the rigid liquid, so the tanks have none.
+    The tanks have no rigid liquid, because the rigid part on the page contains it.
     """
     settings = {**rigid(p), "tanks": len(p["tank"])}
     axes = []
@@ -157,13 +157,13 @@ WRENCH = [f"{port}[{i}]" for port in ("force", "torque") for i in (1, 2, 3)]
 
 
 def columns_of(count: int) -> list[str]:
-    """Return the FMU's names of rate, velocity and bobs."""
+    """Return the names of rate, velocity and directions of bobs in the FMU."""
     names = [f"{name}[{i}]" for name in ("omega", "velocity") for i in (1, 2, 3)]
     return names + [f"tank[{i}].p[1,{k}]" for i in range(1, count + 1) for k in (1, 2, 3)]
 
 
 def body(values: np.ndarray, axes: list[np.ndarray]) -> np.ndarray:
-    """Return rows with the bobs in body axes."""
+    """Return rows in which directions of bobs are transformed to body axes."""
     rows = [values[:, :6]]
     rows += [values[:, 6 + 3 * i : 9 + 3 * i] @ turn.T for i, turn in enumerate(axes)]
     return np.hstack(rows)
@@ -186,7 +186,7 @@ def craft(case: str) -> np.ndarray:
 
 
 def spinner() -> np.ndarray:
-    """Return the rows of the closed loop."""
+    """Simulate the closed loop of the spinner and return its rows."""
     p = cases.parameters("spinner")
     settings, axes = with_tanks(p)
     names, rows = columns_of(len(axes)), []
@@ -212,7 +212,7 @@ def spinner() -> np.ndarray:
 
 
 def linearisation() -> np.ndarray:
-    """Return the frequency responses by directional derivatives."""
+    """Return the frequency responses from directional derivatives of the FMU."""
     p = cases.parameters("linearisation")
     settings, _ = with_tanks(cases.linearised_craft())
     settings["force[3]"] = p["thrust"]
@@ -232,7 +232,7 @@ def linearisation() -> np.ndarray:
 
 
 def still_tank(s: float, kappa: float, g: float, place, rate=(0.0, 0.0, 0.0)) -> dict:
-    """Return the settings of a tank of which only the bob matters: mass 1, length 1 or given."""
+    """Return the settings of a tank at rest with only a bob, of mass 1 kg and length 1 m."""
     settings = {
         "tank.modes": 1, "tank.m_0": 0.0, "tank.I_0": 0.0, "tank.H_0": 0.0,
         "tank.position[3]": 0.0, "tank.mass[1]": 1.0, "tank.length[1]": 1.0, "tank.hinge[1]": 0.0,
@@ -257,7 +257,7 @@ def backbones() -> np.ndarray:
         )  # fmt: skip
         time, x, x_d = run[["time", *names]].to_numpy().T
         at = int(np.flatnonzero(np.diff(np.sign(x)))[0])
-        # the crossing by interpolation of the time over x
+        # time of the crossing, by interpolation of the time over x
         near = slice(at - 3, at + 5)
         quarter = hermite(x[near], time[near], 1 / x_d[near])
 
@@ -273,7 +273,7 @@ def backbones() -> np.ndarray:
 
 
 def hermite(x: np.ndarray, y: np.ndarray, slope: np.ndarray) -> float:
-    """Return y at x = 0 of the polynomial with these values and slopes, by divided differences."""
+    """Return y at x = 0 by Hermite interpolation of values and slopes (divided differences)."""
     z = np.repeat(x, 2)
     table = np.repeat(y, 2).astype(float)
     coefficients = [table[0]]
@@ -295,13 +295,13 @@ def forced() -> np.ndarray:
     """Return cosine and sine of the liquid's centre of mass over the last 15 of 150 periods."""
     p, rows = cases.parameters("forced"), []
     natural = math.sqrt(p["g"] / p["l"])
-    pieces = 384  # in a period, of a line each; 64 of them count, as on the page
+    pieces = 384  # linear pieces of the input per period; every sixth point is used, as on the page
     for number, forcing in enumerate(p["forcing"], 1):
         w = forcing["ratio"] * natural
         start = [0.0, p["across"], -math.sqrt(1 - p["across"] ** 2)]
         settings = still_tank(p["s"], p["kappa"], p["g"], start)
         settings |= {"tank.mass[1]": p["m"], "tank.length[1]": p["l"], "tank.zeta[1]": p["zeta"]}
-        # lines between knots have the fundamental sinc^2 of the sine's
+        # linear interpolation multiplies the fundamental of the sine by sinc^2, which is corrected
         turns = np.arange(150 * pieces + 1) / pieces
         raised = forcing["stroke"] * w * w / np.sinc(1 / pieces) ** 2
         time = 2 * math.pi / w * turns
@@ -319,7 +319,7 @@ def forced() -> np.ndarray:
 
 
 def measured() -> np.ndarray:
-    """Return what harness/studies/measured.py computes, of the benchmark's comparisons."""
+    """Return the results of harness/studies/measured.py for the comparisons in the benchmark."""
     with MEASURED.open(encoding="utf-8") as file:
         ours = {
             (row["experiment"], row["quantity"]): row
@@ -350,12 +350,12 @@ CASES = {
 
 
 def main() -> None:
-    """Run the cases."""
+    """Run the cases and write their results."""
     global FOLDER
     parser = argparse.ArgumentParser(description="Runs the slosh benchmark with HubSlosh's FMUs.")
     parser.add_argument("folder", type=Path, help="where to write CASE/results.csv")
     parser.add_argument("case", nargs="*", help="cases to run (all)")
-    parser.add_argument("--fmus", type=Path, help="folder with the FMUs, in place of the package's")
+    parser.add_argument("--fmus", type=Path, help="folder with FMUs to use instead of the package's")
     args = parser.parse_args()
     FOLDER = args.fmus
     for name in args.case or CASES:

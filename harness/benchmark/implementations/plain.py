@@ -1,4 +1,4 @@
-"""The cases by SciPy, from the equations of the pages alone.
+"""Computes the cases by SciPy, using only the equations of the pages.
 
 python3 plain.py RESULTS_FOLDER [CASE ...]
 """
@@ -13,19 +13,19 @@ METHOD = "DOP853"
 
 
 def cross(a, b):
-    """Return the cross product; np.cross takes longer."""
+    """Return the cross product of two vectors; np.cross takes longer."""
     return np.array([
         a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     ])  # fmt: skip
 
 
 def skew(a):
-    """Return the matrix of the cross product with a."""
+    """Return the matrix of the cross product with ``a``."""
     return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
 
 
 def rotation(q):
-    """Return the matrix from body to inertial axes, scalar first."""
+    """Return the matrix from body to inertial axes of a quaternion, scalar first."""
     w, x, y, z = q / np.linalg.norm(q)
     return np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -35,7 +35,7 @@ def rotation(q):
 
 
 def quaternion_rate(q, w):
-    """Return q' for the rate w in body axes."""
+    """Return q' for the angular velocity ``w``, body axes."""
     s, v = q[0], q[1:]
     return 0.5 * np.hstack([-v @ w, s * w + cross(v, w)])
 
@@ -44,10 +44,10 @@ def quaternion_rate(q, w):
 
 
 class Bench:
-    """A hub with dry friction; the liquid gives its inertia J and torque T, and its own rates."""
+    """A hub with dry friction and liquid; `liquid` has the equations of the liquid."""
 
     def __init__(self, case):
-        """Read the parameters."""
+        """Read the parameters of a case."""
         self.p = cases.parameters(case)
         p = self.p
         self.spherical = case == "bench_spherical"
@@ -86,12 +86,12 @@ class Bench:
         return m * r * r * d[1] ** 2, torque, np.hstack([d_d, v_d]), np.hstack([np.zeros(3), per])
 
     def friction(self, w, sign):
-        """Return the friction torque in sliding."""
+        """Return the friction torque of a sliding hub."""
         p = self.p
         return -p["b"] * w - sign * (p["c_f"] + p["d_f"] * np.exp(-((w / p["omega_s"]) ** 2)))
 
     def rates(self, y, tau, sign):
-        """Return the rates in contact `sign`: 1, -1, or 0 if the hub sticks."""
+        """Return the derivatives of the states; `sign` is 1 or -1 in sliding, 0 in sticking."""
         inertia, torque, free, per = self.liquid(y)
         acceleration = 0.0
         if sign:
@@ -100,12 +100,12 @@ class Bench:
         return np.hstack([y[1] if sign else 0.0, acceleration, free + per * acceleration])
 
     def contact(self, y, tau):
-        """Return the contact of a hub at rest."""
+        """Return 0 if a hub at rest sticks, or the sign of the sliding that begins."""
         load = tau + self.liquid(y)[1]
         return 0 if abs(load) <= self.p["c_f"] + self.p["d_f"] else int(np.sign(load))
 
     def run(self, case):
-        """Return the rows; stopping and breaking away are located as events."""
+        """Simulate a case and return its rows; stopping and breaking away are events."""
         times, rows = cases.row_times(case), []
         y, sign = self.start(), 0
         most = self.p["c_f"] + self.p["d_f"]
@@ -116,7 +116,7 @@ class Bench:
             inside = times[(times >= begin - 1e-9) & (times < end - 1e-9)]
             while t < end:
                 if sign:
-                    # positive while the hub slides on; starts at zero where it breaks away
+                    # positive while the hub slides; 0 at the start of sliding
                     def event(t, y, sign=sign):
                         return y[1] * sign
 
@@ -210,7 +210,7 @@ def draining_rates(p, y, force, torque):
     own = p["iota"] * liquid * np.diag([1.0, 1.0, 0.0])
     own_d = -p["iota"] * f * np.diag([1.0, 1.0, 0.0])
 
-    def moment(mass, a, b):  # of the integral of r x (w x r)
+    def moment(mass, a, b):  # term of the integral of r x (w x r)
         return -mass * skew(a) @ skew(b)
 
     rigid_inertia_d = own_d + moment(rigid_d, s, s) + moment(rigid, s_d, s) + moment(rigid, s, s_d)
@@ -296,7 +296,7 @@ def linearisation():
     origin = p["J"] + mass * z_c**2
     for frequency in cases.frequencies():
         s = 1j * frequency
-        pull = m * g + c * l * s  # of the bob on the craft, per p_x
+        pull = m * g + c * l * s  # force of the bob on the craft per p_x
         turn = m * g * z_p + c * l * s * z_b
         # unknowns: a_x, omega_y, p_x
         matrix = np.array([
@@ -345,14 +345,14 @@ def forced():
         w, stroke = forcing["ratio"] * natural, forcing["stroke"]
 
         def rates(t, y, w=w, stroke=stroke):
-            # q: the bob's displacement over l; z(u), u = |q|^2, its height over l
+            # q is the displacement of the bob over l; z(u) with u = |q|^2 is its height over l
             q, q_d = y[:2], y[2:]
             u = q @ q
             root = np.sqrt(1 - u)
             z1 = 1 / (2 * root) + (kappa - 1) / 4 * u  # dz/du
             z2 = 1 / (4 * root**3) + (kappa - 1) / 4
             v = q @ q_d
-            # drag acts on the velocity of p on its surface
+            # damping acts on the velocity of p along its surface
             lift = 2 * z1 * v
             n = 4 * z1 * z1 + (s - 1)
             # [1 + n q q^T] q'' = right
