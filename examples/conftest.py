@@ -18,7 +18,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add options for the paths of the FMU, and of the files that the harness writes in example 7."""
+    """Add options for the paths of the FMU, and of the files that example 7 writes."""
     parser.addoption("--fmu", default="HubSlosh", help="FMU file, or name of an FMU of the package")
     parser.addoption("--folder", type=Path, default=Path("dist"))
 

@@ -14,7 +14,7 @@ import pandas as pd
 import hubslosh
 from hubslosh.plot import COLORS, save
 
-# Parameters of an upright cylinder on a craft that turns about one axis, in SI units or with a unit.
+# Parameters of an upright cylinder on a craft that turns about one axis, in SI or with a unit.
 # You can add any parameter of the FMU; `hubslosh variables` lists all parameters.
 MY_TANK = {
     "hub.I": 40.0,  # kg·m², craft and dry tank about the axis of rotation
@@ -90,7 +90,7 @@ def figure(runs: dict[str, hubslosh.Run]) -> plt.Figure:
 def main() -> None:
     """Simulate the manoeuvre and draw how the liquid changes the pointing."""
     parser = argparse.ArgumentParser(description="What the liquid does to your craft.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path("my_tank.png"))
     args = parser.parse_args()
     runs = compare(args.fmu)

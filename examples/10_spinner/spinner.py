@@ -18,7 +18,7 @@ DAMPED = 31.7569  # viscous damping coefficient of each mode, N·s/m
 MASS, LENGTH = 38.3866, 0.163644
 """Mass and length of each mode: kg, m."""
 PROLATE, OBLATE = 71.0, 240.0
-"""Moment of inertia of the dry craft about z, kg·m², below and above those about x (152), y (148)."""
+"""Moment of inertia of the dry craft about z, kg·m², below and above those about x and y."""
 START = (0.06, 0.02, SPIN)  # angular velocity at the start, rad/s
 
 
@@ -79,7 +79,7 @@ def nutation(fmu: str, j_zz: float, stop: float, slosh: bool = True) -> pd.DataF
 
 
 def mean_growth(history: pd.DataFrame, until: float = np.inf) -> float:
-    """Return the mean growth rate of the nutation angle over whole periods of its variation, 1/s."""
+    """Return the mean growth rate of the nutation angle over whole periods of variation, 1/s."""
     part = history[(history["time"] > 60) & (history["time"] < until)]
     return float(np.polyfit(part["time"], np.log(part["angle"]), 1)[0])
 
@@ -109,7 +109,7 @@ def figure(fmu: str) -> plt.Figure:
 def main() -> None:
     """Print the numbers of README and draw its figure."""
     parser = argparse.ArgumentParser(description="Nutation of a spinner with slosh.")
-    parser.add_argument("--fmu", default="Spacecraft", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="Spacecraft", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     for j_zz in (PROLATE, OBLATE):

@@ -56,7 +56,7 @@ def body(mass: float, centre: np.ndarray, inertia: np.ndarray) -> Values:
 
 
 def tank(name: str) -> Values:
-    """Return the parameters of the tank, named ``tank`` in SloshTank or ``tank[1]`` in Spacecraft."""
+    """Return the parameters of the tank: ``tank`` in SloshTank or ``tank[1]`` in Spacecraft."""
     values: Values = {f"{name}.position[{i}]": float(x) for i, x in enumerate(POSITION, 1)}
     values |= {
         f"{name}.m_0": M_0, f"{name}.H_0": H_0, f"{name}.I_0": I_0, f"{name}.mass[1]": BOB,
@@ -190,7 +190,7 @@ absoluteTolerance="1e-8" relativeTolerance="1e-8"/></oms:SimulationInformation>
 
 
 def in_libcosim(folder: Path | None, step: float) -> pd.DataFrame:
-    """Simulate the SSP in libcosim, which exchanges values after both FMUs have stepped (Jacobi)."""
+    """Simulate the SSP in libcosim, which exchanges values after both FMUs step (Jacobi)."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
     from libcosimpy.CosimObserver import CosimObserver
@@ -285,7 +285,7 @@ def main() -> None:
     from hubslosh.plot import COLORS, save
 
     parser = argparse.ArgumentParser(description="SloshTank.fmu on a rigid body in several hosts.")
-    parser.add_argument("--folder", type=Path, help="folder of the FMUs, if not those of the package")
+    parser.add_argument("--folder", type=Path, help="folder with FMUs to use instead")
     parser.add_argument("--ssp", type=Path, help="write the system as SSP, too")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()

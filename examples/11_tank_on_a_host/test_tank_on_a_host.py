@@ -27,7 +27,7 @@ def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
 
 
 def test_coupling_by_the_total_wrench_diverges(both: Path | None) -> None:
-    """With steps of 20 ms it diverges within a second; the FMU reports that a pendulum turns over."""
+    """With 20 ms steps it diverges within a second; the FMU reports that a pendulum turns over."""
     with pytest.warns(FmuWarning, match="leaves its range"):
         assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
 

@@ -24,7 +24,7 @@ slew = attitude.slew(np.radians(30), DURATION, axis=(0, 0, 1), inertia=J)
 
 
 def after_slew(values: dict, loop: hubslosh.Loop = loop) -> dict[str, float]:
-    """Return the largest pointing error after the slew (deg), and the time to stay below 0.1° (s)."""
+    """Return the largest pointing error after the slew (deg), and the time to 0.1° for good (s)."""
     run = loop.simulate(300, values, reference=slew, outputs=attitude.NAMES)
     error = np.degrees(np.linalg.norm(attitude.error(run, slew.iloc[-1:]), axis=1))
     settled = run["time"][error > 0.1].max() - DURATION

@@ -147,7 +147,7 @@ def figure(table: pd.DataFrame, path: Path) -> None:
 def main() -> None:
     """Print the results of a run and draw the figure."""
     parser = argparse.ArgumentParser(description="The FMU at 1 kHz against a UDP peer.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--cycles", type=int, default=10_000, help="1 ms each, 60,000 at most")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     parser.add_argument("--controller", type=int, help=argparse.SUPPRESS)

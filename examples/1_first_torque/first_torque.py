@@ -25,7 +25,7 @@ def run(fmu: str | Path, model: str) -> pd.DataFrame:
 def main() -> None:
     """Print how the liquid changes the response, and draw the figure."""
     parser = argparse.ArgumentParser(description="A pulse of torque on the hub.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     axes = None

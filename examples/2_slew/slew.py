@@ -147,7 +147,7 @@ def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
 def main() -> None:
     """Print the settling times and draw the figure."""
     parser = argparse.ArgumentParser(description="A slew with slosh, two profiles.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     runs = results(args.fmu)

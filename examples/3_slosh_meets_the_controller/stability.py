@@ -1,9 +1,10 @@
-"""Slosh and delay in a PD loop: the delay decides whether the loop damps the liquid or drives it.
+"""Slosh in a PD loop with a delay, which decides whether the loop damps or drives the liquid.
 
     python examples/3_slosh_meets_the_controller/stability.py
 
-Predictions come from the FMU's directional derivatives (`linearize`) and, for limit cycles, from
-one harmonic of the planar pendulum's equations. Simulations run the FMU in closed loop.
+Predictions are computed from the FMU's directional derivatives (`linearize`). The amplitudes of
+limit cycles follow from the first harmonic of the planar pendulum's equations. Simulations run the
+FMU in closed loop.
 """
 
 import argparse
@@ -35,7 +36,7 @@ class Cycle:
     label: str
 
     def hold(self, frequency: np.ndarray) -> np.ndarray:
-        """Return the response of the hold at frequencies in Hz."""
+        """Return the frequency response of hold and delay at frequencies in Hz."""
         half = np.exp(-1j * np.pi * frequency * self.period)
         return half * np.sinc(frequency * self.period)
 
@@ -45,14 +46,14 @@ SLOW = Cycle(0.1, 1, "10 Hz, 150 ms")
 
 
 class Bench:
-    """The FMU at rest, with its linear models."""
+    """The bench at rest: its FMU, and linear models of it."""
 
     def __init__(self, fmu: str | Path = "HubSlosh", parameters: dict | None = None) -> None:
         """Store the FMU, and parameters that are set in addition to `VISCOUS`."""
         self.fmu = fmu
         self.parameters = VISCOUS | (parameters or {})
         self.linear = self._linearize({})
-        # the rigid body that the design assumes: tau = inertia omega_dot
+        # Inertia of the rigid body that the design assumes: tau = inertia omega_dot.
         self.inertia = 1 / self._linearize(FROZEN).B[1, 0]
 
     def _linearize(self, more: dict) -> hubslosh.LinearModel:
@@ -60,18 +61,18 @@ class Bench:
         return hubslosh.linearize(self.fmu, self.parameters | more, ["tau_cmd"], outputs)
 
     def gains(self, bandwidth: float) -> np.ndarray:
-        """Return [kp, kd] of a PD that puts the rigid body's poles at ``bandwidth``, Hz."""
+        """Return [kp, kd] of a PD law that puts the rigid body's poles at ``bandwidth``, Hz."""
         w = 2 * np.pi * bandwidth
         return self.inertia * np.array([w**2, 2 * ZETA * w])
 
     def loop(self, cycle: Cycle, bandwidth: float, filter: control.StateSpace | None = None):
-        """Return the sampled loop gain, from the error of the command back to the command."""
+        """Return the sampled loop gain; the loop is opened at the torque command."""
         plant = self.linear.sampled(cycle.period, cycle.latency).to_control()
         plant = plant if filter is None else plant * filter
         return control.ss(plant.A, plant.B, self.gains(bandwidth) @ plant.C, 0, cycle.period)
 
     def largest_pole(self, cycle: Cycle, bandwidth: float, filter=None) -> float:
-        """Return the magnitude of the closed loop's largest pole: below 1 is stable."""
+        """Return the magnitude of the closed loop's largest pole; below 1 the loop is stable."""
         loop = self.loop(cycle, bandwidth, filter)
         return np.abs(np.linalg.eigvals(loop.A - loop.B @ loop.C)).max()
 
@@ -116,7 +117,7 @@ def pd_law(gains: np.ndarray, filter: control.StateSpace | None = None) -> hubsl
 
 
 def notch(frequency: float, cycle: Cycle, deep: float = 0.05, wide: float = 0.3):
-    """Return (s² + 2·deep·w s + w²)/(s² + 2·wide·w s + w²), sampled so that w stays where it is."""
+    """Return (s² + 2·deep·w s + w²)/(s² + 2·wide·w s + w²), sampled without a shift of w."""
     w = 2 * np.pi * frequency
     continuous = control.tf([1, 2 * deep * w, w**2], [1, 2 * wide * w, w**2])
     return control.ss(
@@ -125,7 +126,7 @@ def notch(frequency: float, cycle: Cycle, deep: float = 0.05, wide: float = 0.3)
 
 
 def low_pass(frequency: float, cycle: Cycle):
-    """Return a Butterworth filter of second order."""
+    """Return a sampled Butterworth low-pass filter of second order; ``frequency`` in Hz."""
     w = 2 * np.pi * frequency
     continuous = control.tf([w**2], [1, np.sqrt(2) * w, w**2])
     return control.ss(
@@ -145,18 +146,18 @@ def slosh_damping(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> 
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of a loop: how far its loop gain stays away from -1."""
+    """Stability margins of a loop: distances of its loop gain to -1."""
 
     gain: float
-    """Largest factor of the gains that leaves the loop stable, dB; negative: it is unstable."""
+    """Largest factor of the gains with which the loop is stable, dB; below 0 it is unstable."""
     modulus: float
-    """Least distance of the loop gain to -1; a loop that is unstable has none (0)."""
+    """Smallest distance of the loop gain to -1; 0 if the loop is unstable."""
     slosh_gain: float
     """Largest loop gain between 1.8 and 3 Hz, dB; below 0 the slosh mode is gain-stabilised."""
 
 
 def margins(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> Margins:
-    """Return a loop's margins."""
+    """Return the stability margins of a loop."""
     loop = bench.loop(cycle, bandwidth, filter)
 
     def excess(factor: float) -> float:
@@ -174,14 +175,14 @@ def margins(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> Margin
 
 
 def growth(run: pd.DataFrame) -> float:
-    """Return the rate at which a run's oscillation grows over its last two thirds, 1/s."""
+    """Return the growth rate of the oscillation over the last two thirds of a run, 1/s."""
     t, x = run["time"].to_numpy(), run["omega"].to_numpy()
     thirds = [x[(t >= k * t[-1] / 3) & (t < (k + 1) * t[-1] / 3)] for k in (1, 2)]
     return np.log(np.std(thirds[1]) / np.std(thirds[0])) / (t[-1] / 3)
 
 
 def simulated_first_unstable(bench: Bench, cycle: Cycle, near: float) -> float:
-    """Return the bandwidth at which a simulated oscillation neither grows nor decays, Hz."""
+    """Return the bandwidth at which the simulated oscillation neither grows nor decays, Hz."""
     stop = 1800 * cycle.period
     return brentq(
         lambda bandwidth: growth(bench.run(cycle, bandwidth, stop, outputs=["omega"])),
@@ -193,11 +194,11 @@ def simulated_first_unstable(bench: Bench, cycle: Cycle, near: float) -> float:
 
 
 def harmonic_balance(bench: Bench, cycle: Cycle, amplitudes: np.ndarray, pendulum: str, dry: bool):
-    """Return (bandwidth in Hz, rate amplitude in rad/s) of limit cycles with these slosh angles.
+    """Return the (bandwidth in Hz, rate amplitude in rad/s) of limit cycles by slosh angle.
 
     al = a cos(wt) and omega = Re(W exp(iwt)) are put into the equations of hub and pendulum (linear
     or planar; the documentation's page on the model has them); their first harmonics must vanish.
-    That is the describing function of all nonlinear terms together. The unknowns are w, W and the
+    This is the describing function of all nonlinear terms together. The unknowns are w, W and the
     bandwidth. What the steps of the held torque do above half the sampling rate comes back to the
     controller folded (aliased): the sampled model's response less that of hold and plant.
     """
@@ -244,16 +245,16 @@ def harmonic_balance(bench: Bench, cycle: Cycle, amplitudes: np.ndarray, pendulu
         return [part for x in first for part in (x.real, x.imag)]
 
     start, found = np.array([1.03, -0.3, 0.0, 0.17]), []
-    for a in amplitudes[::-1]:  # from the largest, where friction matters least
+    for a in amplitudes[::-1]:  # from the largest, which friction affects least
         start, _, success, message = fsolve(residual, start, (a,), full_output=True)
         if success != 1:
-            raise RuntimeError(f"no limit cycle of {a} rad: {message}")
+            raise RuntimeError(f"no limit cycle of {a} rad is found: {message}")
         found.append((start[3], a * np.hypot(start[1], start[2])))
     return np.array(found[::-1]).T
 
 
 def fundamental(time: np.ndarray, signal: np.ndarray) -> float:
-    """Return the amplitude of a record's strongest harmonic between 2 and 3 Hz."""
+    """Return the amplitude of the signal's strongest harmonic between 2 and 3 Hz."""
     window = np.hanning(len(time))
     frequency = np.linspace(2, 3, 1001)
     spectrum = np.exp(-2j * np.pi * frequency[:, None] * time) @ (signal * window)
@@ -261,23 +262,23 @@ def fundamental(time: np.ndarray, signal: np.ndarray) -> float:
 
 
 def predicted_rate(bench: Bench, bandwidth: float, pendulum: str, dry: bool) -> float:
-    """Return the rate amplitude that the harmonic balance gives to a bandwidth's limit cycle.
+    """Return the rate amplitude of the limit cycle at a bandwidth, by harmonic balance, rad/s.
 
-    For the cases with one limit cycle: linear with dry friction, planar without.
+    It serves the cases with one limit cycle: linear with dry friction, planar without.
     """
     amplitudes = np.geomspace(0.03, 1.0, 60)
     found, rate = harmonic_balance(bench, SLOW, amplitudes, pendulum, dry)
     order = np.argsort(found)
     if not found.min() <= bandwidth <= found.max():
-        raise ValueError(f"no limit cycle of 0.03 to 1 rad at {bandwidth} Hz")
+        raise ValueError(f"no limit cycle has 0.03 to 1 rad at {bandwidth} Hz")
     return float(np.interp(bandwidth, found[order], rate[order]))
 
 
 def threshold(bench: Bench, bandwidth: float) -> float:
     """Return the rate amplitude (rad/s) between decay and growth, with dry friction.
 
-    The push of the liquid that leads to neither in two minutes is searched for; the run from there
-    hovers at the limit cycle for a while.
+    A push is searched after which the motion neither decays nor grows for two minutes: this motion
+    stays near the unstable limit cycle.
     """
 
     def run(push: float, stop: float, **options) -> pd.DataFrame:
@@ -297,7 +298,7 @@ def threshold(bench: Bench, bandwidth: float) -> float:
 def settled(bench: Bench, bandwidth: float, stop: float) -> list[float]:
     """Return the amplitudes that a run with spherical pendulums approaches.
 
-    They are the slosh angles, tangential and radial, in rad, and the hub's rate, rad/s.
+    These are the tangential and the radial slosh angle (rad) and the hub's rate (rad/s).
     """
     columns = ["slosh_angle", "slosh_angle_radial", "omega"]
     parameters = {"slosh.model": "spherical", "init.slosh_angle": 0.3}
@@ -324,7 +325,7 @@ DESIGNS = {
 
 
 def table(full: Bench, drained: Bench) -> pd.DataFrame:
-    """Return margins and slosh damping of the designs, at two fills."""
+    """Return margins and slosh damping of the designs at two fills."""
     rows = {}
     for name, design in DESIGNS.items():
         found = margins(full, *design)
@@ -339,7 +340,7 @@ def table(full: Bench, drained: Bench) -> pd.DataFrame:
 
 
 def figure(full: Bench, drained: Bench, path: Path) -> None:
-    """Draw the figure that README explains."""
+    """Draw the figure of the README."""
     _, axes = plt.subplots(3, 2, figsize=(11, 12), layout="constrained")
     (damping, nyquist), (notch_slow, notch_fast), (decay, cycles) = axes
     blue, orange, green, pink = COLORS[:4]
@@ -457,13 +458,13 @@ def figure(full: Bench, drained: Bench, path: Path) -> None:
 
 
 def main() -> None:
-    """Print the table, draw the figure."""
+    """Print the table and draw the figure."""
     parser = argparse.ArgumentParser(description="Slosh and a sampled PD controller.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     full, drained, frozen = (Bench(args.fmu, more) for more in ({}, DRAINED, FROZEN))
-    drained.inertia = full.inertia  # the controller does not know that the tank is drained
+    drained.inertia = full.inertia  # the gains are still those for the full tank
     print("First unstable bandwidth, PD with zeta 0.7:")
     for cycle in (FAST, Cycle(0.02, 6, "50 Hz, 130 ms"), SLOW):
         sloshing, rigid = full.first_unstable(cycle), frozen.first_unstable(cycle)

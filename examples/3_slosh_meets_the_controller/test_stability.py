@@ -1,4 +1,4 @@
-"""The numbers of README, from the FMU's derivatives and from the closed loop."""
+"""The FMU's derivatives and simulations of the closed loop reproduce the README's numbers."""
 
 import pytest
 from stability import (
@@ -33,7 +33,7 @@ def full(fmu: str) -> Bench:
 def test_the_simulation_turns_unstable_where_the_sampled_linear_model_does(
     fmu: str, full: Bench, cycle: Cycle, sloshing: float, rigid: float
 ) -> None:
-    """The limits agree within 0.5 %; numbers with three digits are the README's."""
+    """The limits agree within 0.5 %, and with the three digits of the README."""
     predicted = full.first_unstable(cycle)
     assert round(predicted, 3) == sloshing
     assert round(Bench(fmu, FROZEN).first_unstable(cycle), 3) == rigid
@@ -41,10 +41,10 @@ def test_the_simulation_turns_unstable_where_the_sampled_linear_model_does(
 
 
 @pytest.mark.parametrize("name", DESIGNS)
-def test_a_design_simulated_grows_or_decays_as_its_margin_says(full: Bench, name: str) -> None:
-    """The designs include filters.
+def test_a_simulated_design_grows_or_decays_as_its_margin_predicts(full: Bench, name: str) -> None:
+    """Some designs have filters.
 
-    A motion counts as growing or decaying above 0.002/s, a tenth of the slowest design's rate.
+    A rate counts as growth or decay above 0.002/s, a tenth of the slowest design's rate.
     """
     cycle, bandwidth, filter = DESIGNS[name]
     stop = min(40.0, 1200 * cycle.period)
@@ -72,7 +72,7 @@ def test_a_short_delay_damps_slosh_and_a_notch_removes_this_damping(fmu: str, fu
 def test_a_notch_above_the_slosh_frequency_is_worse_than_none(fmu: str, full: Bench) -> None:
     """A notch at the slosh frequency turns a gain margin of -3.8 dB into 11.5 dB.
 
-    When the tank drains, the slosh frequency moves away and the notch no longer helps.
+    When the tank drains, the slosh frequency leaves the notch, which then no longer helps.
     """
     drained = Bench(fmu, DRAINED)
     drained.inertia = full.inertia
@@ -91,7 +91,7 @@ def test_a_notch_above_the_slosh_frequency_is_worse_than_none(fmu: str, full: Be
 def test_dry_friction_masks_the_instability_up_to_the_predicted_amplitude(
     full: Bench,
 ) -> None:
-    """The simulated amplitude is within 10 % of the describing function's."""
+    """The simulated amplitude agrees with the describing function to 10 %."""
     predicted = predicted_rate(full, 0.25, "linear", dry=True)
     assert threshold(full, 0.25) == pytest.approx(predicted, rel=0.02)
 
@@ -99,7 +99,7 @@ def test_dry_friction_masks_the_instability_up_to_the_predicted_amplitude(
 def test_spherical_pendulums_reach_the_predicted_amplitude_or_rotary_slosh(
     full: Bench,
 ) -> None:
-    """Motion in the plane has the predicted amplitude within 10 %.
+    """The amplitude of motion in the plane agrees with the prediction to 10 %.
 
     Above about 0.172 Hz the liquid leaves the plane. After 900 s 1 % of the transient is left (at
     0.17 Hz its time constant is 200 s).

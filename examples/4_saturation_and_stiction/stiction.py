@@ -1,4 +1,6 @@
-"""Effects of wheel limits and a sticking bearing on a PID, and how much a smoothed law hides.
+"""Effects of wheel limits and of a sticking bearing on a PID controller.
+
+Smoothed friction laws are compared with the set-valued law, under which the hub sticks.
 
 python examples/4_saturation_and_stiction/stiction.py
 """
@@ -18,17 +20,17 @@ PERIOD, LATENCY = 0.02, 1
 BANDWIDTH, ZETA = 0.3, 0.7
 """Bandwidth and damping ratio of the PD part for a rigid body of `INERTIA`: Hz, 1."""
 INERTIA = 0.428
-"""kg·m², hub and rigid liquid."""
+"""Inertia of hub and rigid liquid, kg·m²."""
 INTEGRAL = 0.4
-"""Integral gain over the proportional gain, 1/s."""
+"""Ratio of the integral to the proportional gain, 1/s."""
 WIDTHS = (1e-2, 1e-3, 1e-5)
-"""Width of the smoothed sign (``friction.eps``), rad/s."""
+"""Widths of the smoothed sign function (``friction.eps``), rad/s."""
 
 
 def run(
     fmu: str | Path, angle: float, stop: float, parameters: dict, integral: float = 0.0
 ) -> pd.DataFrame:
-    """Simulate a step of the commanded angle (rad) under a PID, with spherical pendulums."""
+    """Simulate a step of the commanded angle (rad) with a PID law and spherical pendulums."""
     w, area = 2 * np.pi * BANDWIDTH, 0.0
 
     def law(time: float, measured: np.ndarray) -> float:
@@ -45,7 +47,7 @@ def run(
 
 
 def saturation(fmu: str | Path) -> dict[str, pd.DataFrame]:
-    """Return steps of 90 degrees on a free bearing: with unlimited torque, and with the wheel's."""
+    """Return 90° steps on a free bearing, with unlimited torque and with the wheel's limits."""
     free = {"friction.model": "none"}
     return {
         "any torque": run(fmu, np.pi / 2, 20, free),
@@ -54,20 +56,20 @@ def saturation(fmu: str | Path) -> dict[str, pd.DataFrame]:
 
 
 def friction_laws() -> dict[str, dict]:
-    """Return the settings of the friction laws by name."""
+    """Return the parameters of each friction law by name."""
     smooth = {"friction.model": "stribeck_smooth"}
     laws = {f"smoothed, {width:g} rad/s": smooth | {"friction.eps": width} for width in WIDTHS}
     return {"set-valued": {"friction.model": "stribeck"}} | laws
 
 
 def stiction(fmu: str | Path, integral: float, stop: float) -> dict[str, pd.DataFrame]:
-    """Return for each friction law the motion after a step of 1 degree."""
+    """Return the motion after a step of 1 degree for each friction law."""
     angle = np.radians(1)
     return {name: run(fmu, angle, stop, law, integral) for name, law in friction_laws().items()}
 
 
 def summary(fmu: str | Path) -> pd.DataFrame:
-    """Return the pointing error (deg) at some times after the step, by controller and law."""
+    """Return the pointing error (deg) at four times after the step, by controller and law."""
     rows = {}
     for controller, integral in (("PD", 0.0), ("PID", INTEGRAL)):
         for name, table in stiction(fmu, integral, 60).items():
@@ -78,7 +80,7 @@ def summary(fmu: str | Path) -> pd.DataFrame:
 
 
 def figure(fmu: str | Path, path: Path) -> None:
-    """Draw the figure that README explains."""
+    """Draw the figure of the README."""
     whole, axes = plt.subplots(2, 2, figsize=(10, 7), layout="constrained")
     (angle, speed), (pd_error, pid_error) = axes
     for (name, table), color in zip(saturation(fmu).items(), COLORS, strict=False):
@@ -108,9 +110,9 @@ def figure(fmu: str | Path, path: Path) -> None:
 
 
 def main() -> None:
-    """Print the numbers, draw the figure."""
-    parser = argparse.ArgumentParser(description="A wheel's limits, a bearing's stiction.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    """Print the numbers and draw the figure."""
+    parser = argparse.ArgumentParser(description="Wheel limits and stiction of a bearing.")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     for name, table in saturation(args.fmu).items():

@@ -1,12 +1,12 @@
-"""The numbers of README."""
+"""The numbers of the README are reproduced."""
 
 import numpy as np
 import pytest
 from stiction import saturation, summary
 
 
-def test_the_wheel_gives_its_torque_until_it_has_no_more_speed(fmu: str) -> None:
-    """The wheel gives at most 0.26 N·m, and its speed limits the rate of the hub to 0.77 rad/s."""
+def test_the_wheel_supplies_torque_until_it_reaches_its_speed_limit(fmu: str) -> None:
+    """The wheel's torque is at most 0.26 N·m; its speed limit holds the hub below 0.77 rad/s."""
     runs = saturation(fmu)
     for name, torque, rate, late in (("any torque", 2.39, 1.44, 5.2), ("wheel", 0.26, 0.77, 6.4)):
         table = runs[name]
@@ -38,4 +38,4 @@ EXPECTED = [
     [0.0353, -0.0217, -0.0004],
     [0.1328, -0.0035, -0.0186],
 ]
-"""deg; rows: PD, then PID, each with the laws from set-valued to the narrowest smoothed one."""
+"""Errors in deg; rows: PD, then PID, each with the set-valued law and the smoothed laws."""

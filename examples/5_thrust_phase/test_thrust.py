@@ -1,4 +1,4 @@
-"""The numbers of README."""
+"""The numbers of the README are reproduced."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import hubslosh
 
 
 def test_mass_frequencies_damping_and_bond_number_equal_the_readme(fmu: str) -> None:
-    """Mass, frequencies, damping and Bond number are computed by the FMU."""
+    """The FMU computes mass, frequencies, damping and Bond number."""
     names = ["tank.m_liq", "slosh.frequency[1]", "slosh.damping[1]", "tank.bond"]
     with hubslosh.Plant(fmu, CRAFT | {"g_axial": THRUST}) as plant:
         mass, frequency, damping, bond = plant.get(names)
@@ -28,7 +28,7 @@ def test_the_linear_model_under_thrust_predicts_the_decay(
 ) -> None:
     """The decay of nonlinear pendulums that start at 5° agrees to 3 %.
 
-    It is measured in windows of six periods.
+    The decay is measured in windows of six periods.
     """
     predicted = -slosh_pole(fmu, BANDWIDTHS[name]).real
     assert predicted == pytest.approx(rate, rel=5e-3)

@@ -23,24 +23,24 @@ CRAFT = {
     "fluid.sigma": (13.2, "mN/m"),
     "friction.model": "none",
 }
-"""Dry craft with the tank half a metre off the axis, free; liquid oxygen at 90 K."""
+"""Free dry craft with the tank half a metre off the axis, and liquid oxygen at 90 K."""
 THRUST = 0.012
 """Specific force of the engine, m/s²."""
 COAST = THRUST / 4
-"""In coast (Bond number 259; below 100 surface tension counts, and is not in the model), m/s²."""
+"""Specific force in coast, m/s². The Bond number is 259; below 100 surface tension matters."""
 START, END, STOP = 100.0, 1200.0, 1600.0  # s
 RAMP = 5.0  # s
 PERIOD, LATENCY = 0.5, 1
 """Cycle time and delay of the controller: s, cycles."""
 ZETA = 0.7
 BANDWIDTHS = {"below": 0.009, "near": 0.026, "above": 0.066}
-"""Hz, by where they are seen from the slosh frequency."""
+"""Bandwidths in Hz, named by their place relative to the slosh frequency."""
 DISPLACED = np.radians(10)
-"""Slosh angle at the start, left by a manoeuvre before, rad."""
+"""Slosh angle at the start, left by an earlier manoeuvre, rad."""
 
 
 def specific_force() -> pd.DataFrame:
-    """Return ``g_axial`` over time: coast, thrust, coast, with ramps."""
+    """Return ``g_axial`` over time: coast, thrust and coast, joined by ramps."""
     time = [0.0, START, START + RAMP, END, END + RAMP, STOP]
     return pd.DataFrame({"time": time, "g_axial": [COAST, COAST, THRUST, THRUST, COAST, COAST]})
 
@@ -52,7 +52,7 @@ def linear(fmu: str | Path, model: str = "linear") -> hubslosh.LinearModel:
 
 
 def gains(fmu: str | Path, bandwidth: float) -> np.ndarray:
-    """Return [kp, kd] of a PD for hub and rigid liquid."""
+    """Return [kp, kd] of a PD controller for hub and rigid liquid."""
     w = 2 * np.pi * bandwidth
     return np.array([w**2, 2 * ZETA * w]) / linear(fmu, "frozen").B[1, 0]
 
@@ -67,7 +67,7 @@ def slosh_pole(fmu: str | Path, bandwidth: float) -> complex:
 
 
 def run(fmu: str | Path, bandwidth: float, model: str = "spherical") -> pd.DataFrame:
-    """Simulate coast, thrust, coast under the PD."""
+    """Simulate coast, thrust and coast with the PD controller."""
     k = gains(fmu, bandwidth)
     return hubslosh.closed_loop(
         lambda time, measured: -k @ measured, PERIOD, STOP, fmu,
@@ -78,7 +78,7 @@ def run(fmu: str | Path, bandwidth: float, model: str = "spherical") -> pd.DataF
 
 
 def decay(table: pd.DataFrame) -> float:
-    """Return the decay rate of the slosh under thrust, 1/s, from its times at 90 and 10 %."""
+    """Return the decay rate of slosh under thrust, 1/s, from the times of 90 and 10 % amplitude."""
     thrust = table.query("@START + 150 <= time < @END")
     n = len(thrust) // 4
     first, last = (np.std(thrust["slosh_angle"].iloc[s]) for s in (slice(0, n), slice(-n, None)))
@@ -86,7 +86,7 @@ def decay(table: pd.DataFrame) -> float:
 
 
 def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
-    """Draw the figure that README explains."""
+    """Draw the figure of the README."""
     whole, (error, slosh, damping) = plt.subplots(
         3, figsize=(8, 9), layout="constrained", height_ratios=(1, 1, 1)
     )
@@ -117,9 +117,9 @@ def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
 
 
 def main() -> None:
-    """Print the numbers, draw the figure."""
+    """Print the numbers and draw the figure."""
     parser = argparse.ArgumentParser(description="Slosh under thrust.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     runs = {name: run(args.fmu, bandwidth) for name, bandwidth in BANDWIDTHS.items()}

@@ -2,7 +2,8 @@
 
 python examples/6_monte_carlo/monte_carlo.py --runs 400
 
-On this machine's cores; with ``--scheduler`` on a dask cluster (pip install distributed).
+The runs use the cores of this machine, with ``--scheduler`` a dask cluster (pip install
+distributed).
 """
 
 import argparse
@@ -25,14 +26,14 @@ if TYPE_CHECKING:
 PERIOD, LATENCY = 0.1, 1
 """Cycle time and delay of the controller: s, cycles."""
 BANDWIDTH, ZETA = 0.15, 0.7
-"""Bandwidth and damping ratio of the PD, designed for the nominal bench: Hz, 1."""
+"""Bandwidth and damping ratio of the PD controller for the nominal bench: Hz, 1."""
 INERTIA = 0.428
-"""kg·m², hub and rigid liquid at 10 cm."""
+"""Inertia of hub and rigid liquid at 10 cm, kg·m²."""
 STOP = 90.0  # s
 PUSH = np.radians(4)
 """Slosh angle at the start, rad."""
 TOLERANCE = np.radians(0.01)
-"""Pointing error within which the hub is settled, rad."""
+"""Pointing error below which the hub counts as settled, rad."""
 
 
 def gains() -> np.ndarray:
@@ -42,10 +43,10 @@ def gains() -> np.ndarray:
 
 
 def draws(runs: int, seed: int) -> pd.DataFrame:
-    """Return parameters by FMU name, a row per run; the same seed gives the same rows.
+    """Return the FMU's parameters, a row per run; the same seed gives the same rows.
 
-    Fill 4 to 14 cm; damping ratio a factor of two about 0.3 % (log-normal, 30 %), as measured tanks
-    scatter; dry friction from none to the bench's.
+    The fill is 4 to 14 cm. The damping ratio is log-normal about 0.3 % with 30 %, the scatter of
+    measured tanks. Dry friction ranges from none to the bench's.
     """
     random = np.random.default_rng(seed)
     share = random.uniform(0, 1, runs)
@@ -60,7 +61,7 @@ def draws(runs: int, seed: int) -> pd.DataFrame:
 
 
 def one(row: dict[str, float], fmu: str) -> dict[str, float]:
-    """Return the results of one draw: largest pole (linear, viscous) and settling time."""
+    """Return the largest pole (linear, viscous) and the settling time of one draw."""
     k = gains()
     parameters = {"slosh.zeta_from_correlation": False} | row
     viscous = parameters | {"friction.model": "viscous"}
@@ -82,7 +83,7 @@ def one(row: dict[str, float], fmu: str) -> dict[str, float]:
 def study(client: "Client | None", runs: int, seed: int, fmu: str) -> pd.DataFrame:
     """Return the draws with their results.
 
-    They are computed by dask's workers, or by processes of this machine.
+    Dask's workers compute them, or, without a client, processes of this machine.
     """
     table = draws(runs, seed)
     rows = table.to_dict("records")
@@ -95,7 +96,7 @@ def study(client: "Client | None", runs: int, seed: int, fmu: str) -> pd.DataFra
 
 
 def figure(table: pd.DataFrame, path: Path) -> None:
-    """Draw the figure that README explains."""
+    """Draw the figure of the README."""
     whole, (poles, times, ranks) = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained")
     stable = table["largest_pole"] < 1
     fill = 100 * table["tank.h"]
@@ -130,10 +131,10 @@ def figure(table: pd.DataFrame, path: Path) -> None:
 def main() -> None:
     """Run the study on this machine's cores, or on a cluster."""
     parser = argparse.ArgumentParser(description="Settling time and robust stability.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--runs", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--scheduler", help="address of a dask scheduler; workers need the wheel")
+    parser.add_argument("--scheduler", help="address of a dask scheduler; workers need hubslosh")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     if args.scheduler:
@@ -147,7 +148,7 @@ def main() -> None:
         table = study(None, args.runs, args.seed, args.fmu)
     stable, settled = table["largest_pole"] < 1, table["settling_time"] < STOP - 6
     print(f"{args.runs} draws: linear model stable in {stable.sum()}, settled in {settled.sum()};")
-    print(f"settled though unstable in {(settled & ~stable).sum()}")
+    print(f"settled although unstable in {(settled & ~stable).sum()}")
     print(f"settling time, median: {table['settling_time'].median():.1f} s")
     print(table.corr(method="spearman")[["largest_pole", "settling_time"]].iloc[:3].round(2))
     figure(table, args.out)

@@ -1,4 +1,4 @@
-"""The study gives what the draws give one by one; README runs it with 400 of them."""
+"""The study gives the results of single runs; the README's study has 400 runs."""
 
 import pandas as pd
 from distributed import Client
@@ -8,7 +8,7 @@ from monte_carlo import STOP, draws, one, study
 def test_dask_and_processes_give_the_results_of_single_runs(fmu: str) -> None:
     """A study by Dask (16 runs) and one by processes (4 runs) give the results of single runs.
 
-    For each yes-or-no result both outcomes occur.
+    Stable and unstable draws occur, as do settled and unsettled ones.
     """
     with Client(
         processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None
@@ -26,7 +26,7 @@ def test_dask_and_processes_give_the_results_of_single_runs(fmu: str) -> None:
         found = one(table.iloc[k, :4].to_dict(), fmu)
         assert found == table.iloc[k, 4:].to_dict()
     assert 0 < (table["largest_pole"] < 1).sum() < 16
-    # damping decides stability, dry friction the settling time
+    # Damping decides stability; dry friction decides the settling time.
     correlation = table.corr(method="spearman")
     assert correlation.loc["slosh.zeta", "largest_pole"] < -0.8
     assert correlation.loc["friction.c", "settling_time"] < -0.6

@@ -1,9 +1,9 @@
-"""One loop of two FMUs in three hosts, and a master that chooses its step by going back.
+"""One loop of two FMUs in three hosts, and a master that repeats steps to choose their length.
 
     cargo run --release -p one-loop -- dist/HubSlosh.fmu dist
-    python examples/7_one_loop/one_loop.py --folder dist        # and pip install libcosimpy
+    python examples/7_one_loop/one_loop.py --folder dist        # libcosim needs libcosimpy
 
-The first command packs Controller.fmu and closes the loop in the harness.
+The first command packs Controller.fmu and simulates the closed loop with the harness.
 """
 
 import argparse
@@ -22,20 +22,20 @@ import hubslosh
 STEP, STEPS = 0.02, 3000
 """Communication step, s, and number of steps."""
 PLANT = {"init.slosh_angle": 0.1, "tank.h": (50, "mm"), "friction.model": "viscous"}
-"""The same stand in src/main.rs and ssp/."""
+"""Parameters of the plant; they equal those in src/main.rs and ssp/."""
 RECORDED = ["theta", "omega", "slosh_angle"]
 TOLERANCE = 1e-9
-"""Largest difference between hosts, relative to each column's largest value."""
+"""Largest allowed difference between hosts, relative to each column's largest value."""
 
 
 @dataclass
 class Loop:
-    """Plant and controller, connected, as a Jacobi master sees them."""
+    """Plant and controller, connected by a Jacobi master."""
 
     plant: hubslosh.Plant
     controller: hubslosh.Plant
     slopes: bool
-    """Inputs run along the slopes that the other FMU tells; otherwise they are held."""
+    """True if each input follows the derivative that the other FMU gives; otherwise it is held."""
     time: float = 0.0
     steps: int = field(default=0, init=False)
 
@@ -45,7 +45,7 @@ class Loop:
         row = self.plant.get(RECORDED)
         self.controller.set("theta", theta)
         self.controller.set("omega", omega)
-        # der(tau) is that of the inputs: they have to be set before it is read
+        # der(tau) depends on the inputs, which are therefore set before it is read
         tau, tau_dot = self.controller.get(["tau", "der(tau)"])
         self.plant.set("tau_cmd", tau)
         if self.slopes:
@@ -55,7 +55,7 @@ class Loop:
         return [tau, *row]
 
     def step(self, end: float) -> None:
-        """Step both FMUs to the time ``end``, s."""
+        """Step both FMUs to the time ``end`` (s)."""
         self.plant.step(end)
         self.controller.step(end)
         self.time = end
@@ -66,14 +66,14 @@ class Loop:
         return self.plant.save(), self.controller.save()
 
     def restore(self, saved: tuple) -> None:
-        """Return to the states that `save` returned."""
+        """Restore the states that `save` returned."""
         self.plant.restore(saved[0])
         self.controller.restore(saved[1])
         self.time = saved[0][0]
 
 
 def in_fmpy(folder: Path, fmu: str | Path, slopes: bool) -> pd.DataFrame:
-    """Close the loop with fmpy."""
+    """Simulate the closed loop with fmpy."""
     with hubslosh.Plant(fmu, PLANT) as plant, hubslosh.Plant(folder / "Controller.fmu") as pd_fmu:
         loop, rows = Loop(plant, pd_fmu, slopes), []
         for k in range(STEPS + 1):
@@ -84,7 +84,7 @@ def in_fmpy(folder: Path, fmu: str | Path, slopes: bool) -> pd.DataFrame:
 
 
 def in_libcosim(folder: Path, fmu: str | Path) -> pd.DataFrame:
-    """Pack both FMUs as SSP into ``folder``, and have libcosim close the loop; inputs are held."""
+    """Pack both FMUs as SSP into ``folder`` and simulate it with libcosim, which holds inputs."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
     from libcosimpy.CosimObserver import CosimObserver
@@ -105,10 +105,10 @@ def in_libcosim(folder: Path, fmu: str | Path) -> pd.DataFrame:
             return lambda: list(observer.last_real_values(index, wanted))
 
         tau, recorded = reader("controller", ["tau"]), reader("plant", RECORDED)
-        rows = []  # the observer sees the ends of steps
+        rows = []  # the observer reads values at the ends of steps
         for k in range(STEPS):
             if not run.step():
-                raise hubslosh.FmuError("libcosim could not go on")
+                raise hubslosh.FmuError("libcosim cannot step the FMUs")
             rows.append([(k + 1) * STEP, *tau(), *recorded()])
     return pd.DataFrame(rows, columns=["time", "tau", *RECORDED])
 
@@ -125,36 +125,36 @@ def pack_system(folder: Path, fmu: str | Path) -> Path:
 
 
 def difference(one: pd.DataFrame, other: pd.DataFrame) -> float:
-    """Return the largest difference, relative to each column's largest value."""
+    """Return the largest difference relative to each column's largest value."""
     one, other = one.set_index("time"), other.set_index("time")
     common = one.index.intersection(other.index)
     assert len(common) >= STEPS
     return ((one.loc[common] - other.loc[common]).abs().max() / other.abs().max()).max()
 
 
-# A master that goes back -------------------------------------------------------------------------
+# A master that repeats steps ---------------------------------------------------------------------
 
 PULSES = ((0.0, 0.0), (2.0, 0.05), (3.0, 0.0), (40.0, -0.1), (40.5, 0.0))
-"""Torque from outside (``tau_ext``) from these times on: s, N·m."""
+"""External torque (``tau_ext``) from each of these times on: s, N·m."""
 STOP = 80.0  # s
 LONGEST = 0.5
-"""Step of the master that chooses, s."""
+"""Longest step of the adaptive master, s."""
 WATCHED = ["theta", "omega", "slosh_angle"]
 
 
 def exactly(fmu: str | Path) -> hubslosh.Plant:
-    """Return the plant with a solver so accurate that only errors of the coupling matter."""
+    """Return the plant with a solver so accurate that the errors of the coupling dominate."""
     return hubslosh.Plant(fmu, PLANT, tolerance=1e-11)
 
 
 def jump(loop: Loop) -> float:
-    """Set the external torque of the present time; return when it changes next, s."""
+    """Set the external torque at the present time; return the time of its next change, s."""
     loop.plant.set("tau_ext", [torque for start, torque in PULSES if start <= loop.time][-1])
     return min((start for start, _ in PULSES if start > loop.time), default=STOP)
 
 
 def fixed(fmu: str | Path, folder: Path, step: float) -> tuple[np.ndarray, int]:
-    """Return (time, watched outputs) per row, and the number of steps, with a fixed step."""
+    """Return rows of time and watched outputs, and the number of steps, with a fixed step."""
     with exactly(fmu) as plant, hubslosh.Plant(folder / "Controller.fmu") as pd_fmu:
         loop, rows = Loop(plant, pd_fmu, slopes=True), []
         while loop.time < STOP - 1e-9:
@@ -166,10 +166,11 @@ def fixed(fmu: str | Path, folder: Path, step: float) -> tuple[np.ndarray, int]:
 
 
 def adaptive(fmu: str | Path, folder: Path, tolerance: float) -> tuple[np.ndarray, int]:
-    """Return the same with steps that are chosen: each is made whole, rolled back, made in halves.
+    """Return the rows and the number of steps of a master that chooses its steps.
 
-    The difference of the two, in units of ``tolerance``, is the error of the whole step. It goes
-    with the third power of the step, since inputs along slopes are wrong by its square.
+    It makes each step whole, rolls back, and makes it in two halves. The difference of the results,
+    in units of ``tolerance``, is the error of the whole step. This error grows as the third power
+    of the step, since linearly extrapolated inputs have errors of second order.
     """
     with exactly(fmu) as plant, hubslosh.Plant(folder / "Controller.fmu") as pd_fmu:
         loop, rows, step = Loop(plant, pd_fmu, slopes=True), [], 1e-3
@@ -182,7 +183,7 @@ def adaptive(fmu: str | Path, folder: Path, tolerance: float) -> tuple[np.ndarra
         while loop.time < STOP - 1e-9:
             until = jump(loop)
             saved, start = loop.save(), loop.time
-            # not past a jump, nor to just before it
+            # a step ends neither after a jump nor just before it
             left = np.ceil((until - start) / step)
             end = until if left == 1 else start + (until - start) / left
             whole = go(end)
@@ -200,11 +201,11 @@ def adaptive(fmu: str | Path, folder: Path, tolerance: float) -> tuple[np.ndarra
 
 
 def exact(fmu: str | Path, times: np.ndarray) -> np.ndarray:
-    """Return the watched outputs of the linear loop at times, by its eigenvalues."""
+    """Return the watched outputs of the linear loop at the times, from its eigenvalues."""
     plant = hubslosh.linearize(fmu, PLANT, ["tau_cmd", "tau_ext"], WATCHED)
     k_p, k_d, t_f = 4.22, 1.88, 0.02  # as in controller.rs
     n = len(plant.A)
-    # states of the plant, tau, and the torque from outside
+    # states of the plant, tau and the external torque
     A = np.zeros((n + 2, n + 2))
     A[:n, :n], A[:n, n:] = plant.A, plant.B
     A[n, :n] = -(np.array([k_p, k_d]) @ plant.C[:2]) / t_f
@@ -221,29 +222,29 @@ def exact(fmu: str | Path, times: np.ndarray) -> np.ndarray:
     for k, (start, torque) in enumerate(PULSES):
         x = after(np.array(start - now), x)
         x[-1], now = torque, start
-        # a jump belongs to the end of the step before it
+        # at a jump the values are those before it
         these = (times > start + 1e-9) & (times <= starts[k + 1] + 1e-9)
         found[these] = after(times[these] - start, x)[:, :n] @ plant.C.T
     return found
 
 
 def hosts(folder: Path, fmu: str | Path) -> dict[str, float]:
-    """Return the differences between each host and the harness, by host; libcosim if installed."""
+    """Return the difference of each host from the harness; libcosim is included if installed."""
     held, slopes = (pd.read_csv(folder / f"loop_{name}.csv") for name in ("held", "slopes"))
     found = {
         "fmpy, inputs held": difference(in_fmpy(folder, fmu, False), held),
-        "fmpy, inputs along slopes": difference(in_fmpy(folder, fmu, True), slopes),
+        "fmpy, inputs with derivatives": difference(in_fmpy(folder, fmu, True), slopes),
         "held against slopes": difference(held, slopes),
     }
     try:
         found["libcosim (SSP), inputs held"] = difference(in_libcosim(folder, fmu), held)
     except ModuleNotFoundError:
-        print("libcosim is not here: pip install libcosimpy")
+        print("libcosim is not compared: it needs pip install libcosimpy")
     return found
 
 
 def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> None:
-    """Draw the figure that README explains."""
+    """Draw the figure of the README."""
     import matplotlib.pyplot as plt
 
     from hubslosh.plot import COLORS, save
@@ -274,16 +275,16 @@ def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> 
 
 
 def main() -> None:
-    """Compare hosts, then masters."""
+    """Compare the hosts, then the masters."""
     parser = argparse.ArgumentParser(description="One loop in several hosts.")
-    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
-    parser.add_argument("--folder", type=Path, default=Path("dist"), help="what one-loop wrote")
+    parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
+    parser.add_argument("--folder", type=Path, default=Path("dist"), help="folder with Controller.fmu")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
-    parser.add_argument("--hosts-only", action="store_true", help="compare hosts, draw nothing")
+    parser.add_argument("--hosts-only", action="store_true", help="compare the hosts only")
     args = parser.parse_args()
     if not (args.folder / "Controller.fmu").exists():
         command = f"cargo run --release -p one-loop -- dist/HubSlosh.fmu {args.folder}"
-        sys.exit(f"error: {args.folder} has no Controller.fmu; this makes it: {command}")
+        sys.exit(f"error: {args.folder} has no Controller.fmu; create it with: {command}")
     differences = hosts(args.folder, args.fmu)
     for name, value in differences.items():
         print(f"{name}: {value:.1e}")

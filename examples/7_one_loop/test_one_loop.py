@@ -1,6 +1,6 @@
-"""Hosts agree, and the master that goes back keeps its tolerance.
+"""Hosts agree, and the master that repeats steps keeps its tolerance.
 
-libcosim, which needs a package of its own, is compared by .ci/importers.
+`.ci/importers` compares libcosim, which needs a further package.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ from one_loop import RECORDED, STEPS, TOLERANCE, adaptive, difference, exact, fi
 
 @pytest.fixture(scope="module")
 def folder(request: pytest.FixtureRequest) -> Path:
-    """Return where `cargo run -p one-loop` wrote."""
+    """Return the output folder of `cargo run -p one-loop`."""
     path: Path = request.config.getoption("--folder")
     assert (path / "Controller.fmu").is_file(), "cargo run --release -p one-loop -- FMU dist"
     return path
@@ -23,7 +23,7 @@ def folder(request: pytest.FixtureRequest) -> Path:
 def test_fmpy_and_the_harness_give_equal_results(
     fmu: str, folder: Path, name: str, slopes: bool
 ) -> None:
-    """The promised accuracy is 1e-9; with the same calls results are bit-identical."""
+    """The guaranteed accuracy is 1e-9; with the same calls the results are bit-identical."""
     theirs = pd.read_csv(folder / f"loop_{name}.csv")
     assert len(theirs) == STEPS + 1 and list(theirs) == ["time", "tau", *RECORDED]
     assert theirs["omega"].abs().max() > 0.02
@@ -39,8 +39,8 @@ def test_input_slopes_change_the_loop(folder: Path) -> None:
     assert difference(held, slopes) > 0.1
 
 
-def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) -> None:
-    """Halving a step of 10 ms divides the error by 3.5, halving 5 ms divides it by 3.8."""
+def test_the_error_of_fixed_steps_grows_as_their_square(fmu: str, folder: Path) -> None:
+    """Half of 10 ms divides the error by 3.5, half of 5 ms by 3.8."""
     errors = []
     for step in (0.02, 0.01):
         rows, steps = fixed(fmu, folder, step)
@@ -52,7 +52,7 @@ def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) 
 def test_a_master_that_repeats_steps_makes_half_the_steps(fmu: str, folder: Path) -> None:
     """The master makes 4,416 steps with the error of 8,000 fixed steps.
 
-    Two thirds of its steps are rolled back or are halves.
+    Two thirds of its steps are rolled back or are half steps.
     """
     rows, steps = adaptive(fmu, folder, 1e-5)
     error = np.abs(rows[:, 1:] - exact(fmu, rows[:, 0])).max()

@@ -1,4 +1,6 @@
-"""Thrust-vector control of a craft with one tank on its axis: where the tank destabilises the loop.
+"""Heights of a tank at which its liquid destabilises the thrust-vector control of a craft.
+
+The craft has one tank on its axis.
 
 python examples/8_danger_zone/danger_zone.py
 """
@@ -16,26 +18,26 @@ import hubslosh
 from hubslosh.plot import COLORS, save
 
 THRUST = 2400.0  # N
-GIMBAL = -1.3  # m: height of the engine's gimbal; O of the FMU is there
+GIMBAL = -1.3  # m, height of the engine's gimbal, where the FMU's origin O lies
 FREQUENCY, RATIO = 0.2, 0.7
 """Bandwidth and damping ratio of the attitude loop: rad/s, 1."""
 DRY = (1180.0, 0.21, 860.0)
-"""The dry craft: kg, height of its centre of mass (m), kg·m² about it across the axis."""
+"""Dry craft: mass (kg), height of its centre of mass (m), transverse inertia about it (kg·m²)."""
 LIQUID = (253.493, 0.0563967, 3.67522)
-"""The rigid liquid: kg, height of its centre of mass above the tank's origin (m), kg·m²."""
+"""Rigid liquid: mass (kg), height of its centre of mass above the tank's origin (m), kg·m²."""
 BOB = (128.211, 0.248039, 0.136534)
-"""The slosh mode: kg, pendulum (m), height of its hinge above the tank's origin (m)."""
+"""Slosh mode: mass (kg), pendulum length (m), height of its hinge above the tank's origin (m)."""
 
 
 @dataclass(frozen=True)
 class Craft:
-    """The craft with the origin of its tank at the height ``z``, m."""
+    """The craft with the origin of its tank at the height ``z`` (m)."""
 
     z: float
     zeta: float = 0.0
 
     def __post_init__(self) -> None:
-        """Compute mass, centre of mass and inertia of rigid liquid and dry craft together."""
+        """Compute mass, centre of mass and inertia of dry craft and rigid liquid together."""
         (m_b, z_b, I_b), (m_0, H_0, I_0) = DRY, LIQUID
         M = m_b + m_0
         z_R = (m_b * z_b + m_0 * (self.z + H_0)) / M
@@ -65,14 +67,14 @@ class Craft:
 
     @property
     def gains(self) -> tuple[float, float]:
-        """K_p (N·m/rad) and K_d (N·m·s/rad) of the attitude loop."""
+        """Gains K_p (N·m/rad) and K_d (N·m·s/rad) of the attitude loop."""
         return self.I * FREQUENCY**2, self.I * 2 * RATIO * FREQUENCY
 
     @property
     def predicted_growth(self) -> float:
-        """Return what the loop adds to the slosh pole's real part, first order in the gains, 1/s.
+        """Return the shift of the undamped slosh pole's real part by the loop, 1/s.
 
-        K_d (w_z² - w_p²)/(2 I w_p²), undamped.
+        To first order in the gains it is K_d (w_z² - w_p²)/(2 I w_p²).
         """
         m, l, _ = BOB
         g = THRUST / (self.M + m)
@@ -83,7 +85,7 @@ class Craft:
 
     @property
     def damping_needed(self) -> float:
-        """The damping ratio of the liquid that just holds the loop stable; 0 if none is needed."""
+        """Smallest damping ratio of the liquid that keeps the loop stable; 0 if any does."""
         m, l, _ = BOB
         sigma = 1 + m / self.M + m * self.bob**2 / self.I
         # 2 zeta_p w_p = (c/m) sigma, c = 2 zeta m sqrt(g/l)
@@ -102,7 +104,7 @@ class Craft:
 
 
 def closed_loop_poles(fmu: str, craft: Craft) -> np.ndarray:
-    """Return the poles of FMU and attitude loop, from the FMU's directional derivatives."""
+    """Return the poles of FMU and attitude loop, computed by the FMU's directional derivatives."""
     model = hubslosh.linearize(
         fmu, craft.parameters(), ["force[1]"], ["q[3]", "omega[2]"], all_states=True
     )
@@ -117,7 +119,7 @@ def closed_loop_poles(fmu: str, craft: Craft) -> np.ndarray:
 def growth(fmu: str, craft: Craft) -> float:
     """Return the real part of the slosh pole in the loop, 1/s.
 
-    It is the one in pitch: with an imaginary part above 1 rad/s, moved by the loop.
+    The pole in pitch is the one above 1 rad/s that the loop shifts.
     """
     poles = closed_loop_poles(fmu, craft)
     m, l, _ = BOB
@@ -131,7 +133,7 @@ def growth(fmu: str, craft: Craft) -> float:
 
 
 def simulate(fmu: str, craft: Craft, stop: float, period: float = 0.01) -> pd.DataFrame:
-    """Simulate the sampled loop after the liquid is released 1 degree from its rest."""
+    """Simulate the sampled loop; the liquid is released at 1 degree from rest."""
     k_p, k_d = craft.gains
 
     def law(_: float, seen: np.ndarray) -> float:
@@ -148,7 +150,7 @@ def simulate(fmu: str, craft: Craft, stop: float, period: float = 0.01) -> pd.Da
 
 
 def simulated_growth(fmu: str, craft: Craft, stop: float = 120.0) -> float:
-    """Return the slosh amplitude's rate of growth in the simulated loop, 1/s."""
+    """Return the growth rate of the slosh amplitude in the simulated loop, 1/s."""
     run = simulate(fmu, craft, stop)
     time, angle = run["time"].to_numpy(), run["tank[1].angle_x[1]"].to_numpy()
     top = (np.abs(angle[1:-1]) >= np.abs(angle[:-2])) & (np.abs(angle[1:-1]) > np.abs(angle[2:]))
@@ -158,7 +160,7 @@ def simulated_growth(fmu: str, craft: Craft, stop: float = 120.0) -> float:
 
 
 def zone(fmu: str) -> tuple[float, float]:
-    """Return the heights of the tank between which the FMU's loop is unstable, m."""
+    """Return the lower and upper end of the heights at which the FMU's loop is unstable, m."""
     return tuple(
         brentq(lambda z: growth(fmu, Craft(z)), low, high, xtol=1e-4)
         for low, high in ((0.0, 0.2), (0.7, 1.1))
@@ -166,14 +168,14 @@ def zone(fmu: str) -> tuple[float, float]:
 
 
 def predicted_zone() -> tuple[float, float]:
-    """Return where the hinge is at the centre of mass, and the bob at the one of percussion, m."""
+    """Return the heights (m) with the hinge at the centre of mass and the bob at percussion."""
     hinge = brentq(lambda z: Craft(z).hinge, -1, 1)
     bob = brentq(lambda z: Craft(z).bob - Craft(z).percussion, 0, 2)
     return hinge, bob
 
 
 def figure(fmu: str) -> plt.Figure:
-    """Draw growth over the tank's height, and two histories."""
+    """Draw the growth rate over the tank's height, and two time histories."""
     drawing, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
     heights = np.linspace(-1.2, 1.2, 61)
     low, high = predicted_zone()
@@ -203,9 +205,9 @@ def figure(fmu: str) -> plt.Figure:
 
 
 def main() -> None:
-    """Print the numbers of README and draw its figure."""
+    """Print the numbers of the README and draw its figure."""
     parser = argparse.ArgumentParser(description="Where a tank destabilises an attitude loop.")
-    parser.add_argument("--fmu", default="Spacecraft", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="Spacecraft", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     print("zone, m: predicted {:.3f} to {:.3f}".format(*predicted_zone()), end="; ")

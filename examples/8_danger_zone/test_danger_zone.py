@@ -1,9 +1,9 @@
-"""The numbers of README: the zone, growth inside and outside, the damping that closes it."""
+"""The README's numbers: the danger zone, growth rates, and the damping that removes the zone."""
 
 import pytest
 from danger_zone import Craft, growth, predicted_zone, simulated_growth, zone
 
-# From an independent formulation of the craft in six axes, to all digits.
+# Growth rates of an independent formulation of the craft in six axes; all digits agree.
 GROWTH = {
     -1.60: -3.1726e-2, -0.45: -7.9994e-3, 0.14: 7.6250e-4, 0.20: 1.1911e-3, 0.50: 1.8675e-3,
     0.80: 4.5618e-4, 1.20: -3.2389e-3,
@@ -14,20 +14,20 @@ GROWTH = {
 def test_poles_from_the_fmus_derivatives_equal_those_of_the_closed_form(
     spacecraft: str, z: float, expected: float
 ) -> None:
-    """The closed form is first order in the gains, which leaves 0.2 %; five digits are known."""
+    """The closed form is of first order in the gains, and its error is 0.2 %."""
     craft = Craft(z)
     assert growth(spacecraft, craft) == pytest.approx(expected, rel=2e-5, abs=5e-8)
     assert craft.predicted_growth == pytest.approx(expected, rel=2.5e-3)
 
 
 def test_the_danger_zone_ends_at_the_closed_form(spacecraft: str) -> None:
-    """Both ends of the danger zone agree to 1 mm; the ends move with the square of the gains."""
+    """Both ends agree to 1 mm; they move by terms of second order in the gains."""
     assert zone(spacecraft) == pytest.approx(predicted_zone(), abs=1e-3)
 
 
 @pytest.mark.parametrize("z", [-0.45, 0.5])
-def test_the_simulated_loop_grows_as_its_poles_say(spacecraft: str, z: float) -> None:
-    """A cycle of 10 ms delays the torque by 5 ms, which changes the growth by 0.3 %."""
+def test_the_simulated_growth_equals_that_of_the_poles(spacecraft: str, z: float) -> None:
+    """The 10 ms cycle delays the torque by 5 ms, which changes the growth by 0.3 %."""
     found = simulated_growth(spacecraft, Craft(z))
     assert found == pytest.approx(growth(spacecraft, Craft(z)), rel=0.01)
 

@@ -1,4 +1,6 @@
-"""Agile slew of an Earth observer with two tanks: rigid, sloshing, with a slosh-torque observer.
+"""Agile slew of an Earth observer with two tanks and an observer of the slosh torque.
+
+Three runs are compared: rigid liquid, sloshing liquid, and sloshing liquid with the observer.
 
 python examples/9_agile_slew/agile_slew.py
 """
@@ -14,28 +16,28 @@ from scipy.linalg import solve_discrete_are
 import hubslosh
 from hubslosh.plot import COLORS, save
 
-PERIOD = 0.1  # s, cycle of the controller; the torque comes one cycle later
+PERIOD = 0.1  # s, cycle of the controller; its torque acts one cycle later
 SLEW, DURATION = np.radians(30), 20.0
-"""About the roll axis: rad, s."""
+"""Slew about the roll axis: angle (rad), duration (s)."""
 STOP, SHOWN = 500.0, 120.0  # s, of the simulation and of the figure
 BANDWIDTH, DAMPING = 0.25, 0.9
 """Bandwidth and damping ratio of attitude control for a rigid craft: rad/s, 1."""
 NOISE = 2e-6  # rad/s, standard deviation of a gyro sample
 UNKNOWN = 1e-3
-"""1/s per cycle, what the filter takes for unknown in the liquid's rate."""
+"""Process noise of the filter in the liquid's rate, 1/s per cycle."""
 POINTING, RATE = np.radians(2e-3), np.radians(1e-3)
-"""Imaging begins when the error stays below: rad, rad/s."""
+"""Imaging begins when the errors stay below these limits: rad, rad/s."""
 
-J_XX = 450.0  # kg·m², of the dry craft about roll
+J_XX = 450.0  # kg·m², inertia of the dry craft about roll
 MASS, LENGTH, FIXED, ARM = 35.0, 0.15, 45.0, 0.5
-"""Each tank: sloshing mass, kg, pendulum length, m, rigid liquid, kg, distance from roll, m."""
+"""Of each tank: sloshing mass (kg), pendulum (m), rigid liquid (kg), distance from roll (m)."""
 OWN = 0.5  # kg·m², inertia of a tank's rigid liquid about its own axis
 FREQUENCY, ZETA = 0.08, 0.01
-"""Frequency and damping ratio of the liquid on its diaphragm, weightless, craft held: Hz, 1."""
+"""Frequency (Hz) and damping ratio of the weightless liquid on its diaphragm, craft held."""
 
 
 def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, float | int]:
-    """Return parameters of the FMU: tanks at ±ARM, their axes along the thrust axis x."""
+    """Return parameters of the FMU: tanks at ±ARM with their axes along the thrust axis x."""
     values: dict[str, float | int] = {
         "craft.mass": 900.0, "craft.Jxx": J_XX, "craft.Jyy": 380.0, "craft.Jzz": 400.0, "tanks": 2,
         "craft.r[1]": 0.0, "craft.r[2]": 0.0, "craft.r[3]": 0.0,
@@ -56,11 +58,11 @@ def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, fl
 
 
 RIGID = J_XX + 2 * (OWN + (FIXED + MASS) * ARM**2)
-"""kg·m², roll inertia with all liquid rigid."""
+"""Roll inertia with rigid liquid, kg·m²."""
 
 
 def reference(time: float) -> tuple[float, float, float]:
-    """Return roll angle (rad), rate and acceleration: one period of a sine of acceleration."""
+    """Return roll angle (rad), rate and acceleration, which is one period of a sine."""
     t = np.clip(time, 0.0, DURATION)
     w = 2 * np.pi / DURATION
     angle = SLEW * (t - np.sin(w * t) / w) / DURATION
@@ -69,15 +71,15 @@ def reference(time: float) -> tuple[float, float, float]:
 
 
 class Observer:
-    """Kalman filter of the roll rate and the slosh, from the gyro and the commanded torques."""
+    """Kalman filter that estimates roll rate and slosh from the gyro and the commanded torques."""
 
     def __init__(self, fmu: str, frequency: float) -> None:
-        """Use the FMU's own linear model; ``frequency`` is the assumed slosh frequency, Hz."""
+        """Linearize the FMU with the assumed slosh frequency ``frequency`` (Hz)."""
         believed = parameters(frequency=frequency)
         model = hubslosh.linearize(fmu, believed, ["torque[1]"], ["omega[1]"])
         self.rate = model.states.index("omega[1]")
         self.A, self.B = model.A[self.rate], model.B[self.rate, 0]
-        self.inertia = 1 / self.B  # kg·m², what a sudden torque meets
+        self.inertia = 1 / self.B  # kg·m², inertia against a sudden torque
         sampled = model.sampled(PERIOD)
         self.transition, self.input = sampled.A, sampled.B[:, 0]
         C = np.zeros((1, len(self.transition)))
@@ -89,13 +91,13 @@ class Observer:
         self.x = np.zeros(len(self.transition))
 
     def slosh_torque(self, x: np.ndarray) -> float:
-        """Return the torque of the slosh motion on the craft that a sudden torque meets, N·m."""
+        """Return the slosh torque on the body with this inertia, N·m."""
         return float(self.inertia * (self.A @ x))
 
     def update(self, measured: float, torque: float) -> tuple[float, float]:
-        """Return the slosh torque a cycle from now, and its mean over the cycle that begins then.
+        """Return the slosh torque one cycle ahead, and its mean over the cycle that begins then.
 
-        measured: rad/s; torque: what was commanded last, to act in the present cycle, N·m.
+        measured: rad/s; torque: the last command, which acts in the present cycle, N·m.
         """
         self.x += self.gain * (measured - self.x[self.rate])
         self.x = self.transition @ self.x + self.input * torque
@@ -110,7 +112,7 @@ def slew(
     frequency: float = FREQUENCY,
     stop: float = STOP,
 ) -> pd.DataFrame:
-    """Simulate one slew; ``estimate`` is the observer's slosh torque in each row, N·m.
+    """Simulate one slew; the column ``estimate`` is the observer's slosh torque, N·m.
 
     ``frequency`` is the slosh frequency that the observer assumes, Hz.
     """
@@ -125,7 +127,7 @@ def slew(
         q1, q2, omega = measured
         omega += random.normal(0.0, NOISE)
         angle = 2 * np.arctan2(q2, q1)
-        # The command acts one cycle from now, for one cycle: half a cycle more in the mean.
+        # The command acts during the next cycle, on average 1.5 cycles from now.
         _, _, ahead = reference(time + 1.5 * PERIOD)
         wanted, rate, _ = reference(time)
         acceleration = ahead + kp * (wanted - angle) + kd * (rate - omega)
@@ -147,8 +149,8 @@ def slew(
     run["error"] = 2 * np.arctan2(run["q[2]"], run["q[1]"]) - angle
     run["rate_error"] = run["omega[1]"] - rate
     if observer:
-        # Newton and Euler: what is left of J omega' once the torque is taken off.
-        # At a communication point omega_dot is still that of the torque that ends there.
+        # By Newton and Euler the slosh torque is J omega' less the torque that acts. At a
+        # communication point omega_dot still belongs to the torque of the step that ends there.
         acted = run["torque[1]"].shift(1, fill_value=0.0)
         run["slosh"] = observer.inertia * run["omega_dot[1]"] - acted
         run["estimate"] = [np.nan, *estimates]
@@ -156,20 +158,20 @@ def slew(
 
 
 def tranquillisation(run: pd.DataFrame) -> float:
-    """Return the time from the end of the slew until the errors stay small enough, s."""
+    """Return the time from the end of the slew until imaging can begin, s."""
     late = run[run["time"] >= DURATION]
     out = late[(late["error"].abs() > POINTING) | (late["rate_error"].abs() > RATE)]
     return float(out["time"].iloc[-1] - DURATION) if len(out) else 0.0
 
 
 def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
-    """Draw pointing error and slosh torque of the runs."""
+    """Draw the pointing errors and slosh torques of the runs."""
     drawing, axes = plt.subplots(
         2, 1, figsize=(9, 5.6), sharex=True, layout="constrained", height_ratios=(2, 1)
     )
     for (name, run), color in zip(runs.items(), ("0.5", COLORS[1], COLORS[0]), strict=True):
         run = run[run["time"] <= SHOWN]
-        # what a rigid craft does lies under the observer's line: dashed, on top of it
+        # the rigid run's line is dashed and drawn over the observer's, which it nearly equals
         line = {"linestyle": ":", "zorder": 3} if name == "liquid rigid" else {}
         axes[0].plot(run["time"], 1e3 * np.degrees(run["error"]), color=color, label=name, **line)
     axes[0].axhspan(-1e3 * np.degrees(POINTING), 1e3 * np.degrees(POINTING), color="0.9")
@@ -206,9 +208,9 @@ def all_runs(fmu: str) -> dict[str, pd.DataFrame]:
 
 
 def main() -> None:
-    """Print the numbers of README and draw its figure."""
+    """Print the numbers of the README and draw its figure."""
     parser = argparse.ArgumentParser(description="Agile slew of an Earth observer.")
-    parser.add_argument("--fmu", default="Spacecraft", help="file, or the name of a packed one")
+    parser.add_argument("--fmu", default="Spacecraft", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     runs = all_runs(args.fmu)

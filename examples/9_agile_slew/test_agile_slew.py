@@ -1,4 +1,4 @@
-"""The numbers of README: pointing with rigid liquid, with sloshing, with the observer."""
+"""The README's pointing errors with rigid liquid, with slosh and with the observer."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import hubslosh
 
 
 def after(run) -> float:
-    """Return the largest pointing error after the slew, degrees."""
+    """Return the largest pointing error after the slew, deg."""
     return float(np.degrees(run.loc[run["time"] >= DURATION, "error"].abs().max()))
 
 
@@ -17,8 +17,8 @@ def test_the_inertia_with_rigid_liquid_is_the_inertia_of_craft_and_liquid_togeth
 ) -> None:
     """With rigid liquid the FMU has the inertia of craft and liquid together.
 
-    The observer's inertia is 17.5 kg·m² less, because the sloshing part does not follow a fast
-    turn.
+    The observer's inertia is 17.5 kg·m² smaller, because the sloshing part does not follow a fast
+    rotation.
     """
     rigid = hubslosh.linearize(spacecraft, parameters(False), ["torque[1]"], ["omega[1]"])
     assert 1 / rigid.B[0, 0] == pytest.approx(RIGID, rel=1e-12)
@@ -26,7 +26,7 @@ def test_the_inertia_with_rigid_liquid_is_the_inertia_of_craft_and_liquid_togeth
 
 
 def test_the_observer_compensates_the_slosh_torque(spacecraft: str) -> None:
-    """A tenth of the remaining error is the gyro's noise, which is the same in each run."""
+    """A tenth of the remaining error is gyro noise, which is the same in each run."""
     rigid, sloshing = slew(spacecraft, slosh=False, stop=100), slew(spacecraft)
     observed = slew(spacecraft, observe=True, stop=100)
     assert after(rigid) < 3e-4
@@ -39,10 +39,10 @@ def test_the_observer_compensates_the_slosh_torque(spacecraft: str) -> None:
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
-def test_a_mistuned_observer_still_helps(spacecraft: str, share: float) -> None:
-    """The error is thirty times smaller than without observer.
+def test_a_mistuned_observer_still_reduces_the_error(spacecraft: str, share: float) -> None:
+    """The error is thirty times smaller than without an observer.
 
-    Without it, a picture could be taken only six minutes later.
+    Without one, imaging could begin only six minutes later.
     """
     run = slew(spacecraft, observe=True, frequency=share * FREQUENCY, stop=200)
     assert after(run) < 0.1315 / 30

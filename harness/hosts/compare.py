@@ -54,7 +54,7 @@ def drive(
 
 
 def compare(here: Signals, there: Signals, allowed: float | None = None) -> None:
-    """Print the largest difference between the signals of a host (``there``) and of fmpy (``here``).
+    """Print the largest difference between signals of a host (``there``) and fmpy (``here``).
 
     If a difference exceeds ``allowed`` times the largest value of its signal, exit with an error.
     """

@@ -583,7 +583,7 @@ SEEDS = range(1, 11)  # seeds of the gyro's noise
 
 
 def built_sweep(fill: dict, amplitude: float, gyro: str = "omega") -> tuple[float, bool]:
-    """Return the peak acceleration (rad/s²) in a sweep of the bench as built, and True if rotary."""
+    """Return the peak acceleration (rad/s²) in a sweep of the bench, and True if rotary."""
     plan = tomllib.loads(PLAN.read_text(encoding="utf-8"))
     run = hubslosh.simulate(
         FMUS["HubSlosh"],

@@ -1,5 +1,6 @@
-//! Packs the controller's FMU, then closes the loop of controller and plant with the harness's own
-//! host, twice: inputs held from step to step, and along the slopes that the other FMU tells.
+//! Packs the controller's FMU, then simulates the closed loop of controller and plant with the
+//! harness's host. It does so twice: with inputs held during each step, and with inputs that follow
+//! the derivatives given by the other FMU.
 //!
 //!     cargo run --release -p one-loop -- dist/HubSlosh.fmu dist
 //!
@@ -42,8 +43,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Steps both FMUs together. At each communication point all outputs are read before any input is set (a Jacobi master). Returns the rows
-/// of time, tau and the recorded variables.
+/// Steps both FMUs together. At each communication point all outputs are read before any input is
+/// set (a Jacobi master). Returns the rows of time, tau and the recorded variables.
 fn closed_loop(plant: &Fmu, controller: &Fmu, slopes: bool) -> Result<Vec<Vec<f64>>> {
     let mut plant = started(plant, &PLANT)?;
     let mut controller = started(controller, &[])?;
@@ -64,7 +65,7 @@ fn closed_loop(plant: &Fmu, controller: &Fmu, slopes: bool) -> Result<Vec<Vec<f6
         let (mut measured, mut tau, mut row) = ([0.0; 3], [0.0; 2], [0.0; RECORDED.len()]);
         plant.get_real(&angles, &mut measured)?;
         plant.get_real(&recorded, &mut row)?;
-        // der(tau) is that of the inputs: they have to be set before it is read
+        // der(tau) depends on the inputs, which are therefore set before it is read
         controller.set_real(&inputs, &measured[..2])?;
         controller.get_real(&torque, &mut tau)?;
         plant.set_real(&tau_cmd, &tau[..1])?;
@@ -98,7 +99,7 @@ fn write(path: &Path, rows: &[Vec<f64>]) -> Result<()> {
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record([&["time", "tau"], &RECORDED[..]].concat())?;
         for row in rows {
-            // the shortest text that is read back as the same number
+            // the shortest text that is parsed to the same number
             csv.write_record(row.iter().map(f64::to_string))?;
         }
         Ok(csv.flush()?)

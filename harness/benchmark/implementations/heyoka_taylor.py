@@ -83,7 +83,7 @@ def attitude(q, w, a):
 
 
 def lagrange(lagrangian, force, coordinates, rates):
-    """Return matrix and right-hand side of the linear equations for the accelerations (Lagrange)."""
+    """Return matrix and right-hand side of the linear equations for accelerations (Lagrange)."""
     matrix, right = [], []
     for q, v, f in zip(coordinates, rates, force, strict=True):
         momentum = hy.diff(lagrangian, v)

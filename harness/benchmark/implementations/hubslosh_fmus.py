@@ -355,7 +355,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Runs the slosh benchmark with HubSlosh's FMUs.")
     parser.add_argument("folder", type=Path, help="where to write CASE/results.csv")
     parser.add_argument("case", nargs="*", help="cases to run (all)")
-    parser.add_argument("--fmus", type=Path, help="folder with FMUs to use instead of the package's")
+    parser.add_argument("--fmus", type=Path, help="folder with FMUs to use instead")
     args = parser.parse_args()
     FOLDER = args.fmus
     for name in args.case or CASES:

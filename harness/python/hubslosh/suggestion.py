@@ -15,7 +15,7 @@ from .stability import _compiled, _largest, _moved, frequencies
 if TYPE_CHECKING:
     from .review_point import Point
 
-DEAREST = 15.0  # Largest loss of phase at the rigid-body crossover that is accepted, deg
+LARGEST_PHASE_LOSS = 15.0  # Largest loss of phase at the rigid-body crossover that is accepted, deg
 
 WORTH = 0.02  # Smallest increase of the modulus margin for which a filter is suggested
 
@@ -55,7 +55,7 @@ def suggest(
     for words, law in _candidates(slosh, rigid["frequency"], loop.period):
         at = np.exp(2j * np.pi * rigid["frequency"].to_numpy() * loop.period)
         cost = float(-np.degrees(np.angle(law._at(at)[:, 0, 0])).min(initial=0.0))
-        if cost > DEAREST:
+        if cost > LARGEST_PHASE_LOSS:
             continue
         after = min(_distance(p, w, L, law) for p, (w, L) in zip(points, grids, strict=True))
         if best is None or after > best[0] + 1e-3 or (after > best[0] - 1e-3 and cost < best[1]):
@@ -64,7 +64,7 @@ def suggest(
     if best is None or best[0] < before + WORTH or controller is None:
         text = (
             f"No notch or roll-off that was tried raises the smallest modulus margin by {WORTH:g} "
-            f"and costs at most {DEAREST:.0f}° of phase at the rigid crossover."
+            f"and costs at most {LARGEST_PHASE_LOSS:.0f}° of phase at the rigid crossover."
         )
         return Suggestion(text, None, None, before, before, 0.0)
     after, cost, words, law = best

@@ -1,13 +1,13 @@
-//! A PD controller that rolls off, t_f tau' = -k_p theta - k_d omega - tau.
+//! A PD controller with a low-pass filter: t_f tau' = -k_p theta - k_d omega - tau.
 //!
-//! Its output is a state: nothing passes through it at once, so that a loop with it has the same
-//! answer in whatever order a master reads and sets.
+//! Its output is a state, so no input acts on it at once. A loop with this controller therefore has
+//! one result, independent of the order in which a master reads outputs and sets inputs.
 
 use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
-/// Parameters: gains (N m/rad, N m s/rad) and time constant of the roll-off (s).
+/// Parameters: gains (N m/rad, N m s/rad) and time constant of the filter (s).
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
     k_p: f64,
@@ -22,7 +22,7 @@ impl Default for Parameters {
     }
 }
 
-/// The error's angle (rad) and rate (rad/s), each with its slope.
+/// Errors of angle (rad) and rate (rad/s), each with its time derivative.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     theta: [f64; 2],
@@ -41,13 +41,13 @@ type V = Variable<Controller>;
 static VARIABLES: &[Variable<Controller>] = &[
     V::output("tau", |_, _| 0.0, "N.m", "Torque command").is_state(|_| 0)
         .depends_on(&["tau"]),
-    V::input("theta", |i, _| i.theta.each_mut(), "rad", "Angle less the wanted one"),
-    V::input("omega", |i, _| i.omega.each_mut(), "rad/s", "Rate less the wanted one"),
+    V::input("theta", |i, _| i.theta.each_mut(), "rad", "Angle minus its reference"),
+    V::input("omega", |i, _| i.omega.each_mut(), "rad/s", "Rate minus its reference"),
     V::derivative("der(tau)", |_| 0, "N.m/s", "Derivative of tau")
         .depends_on(&["tau", "theta", "omega"]).initial_depends_on(&["k_p", "k_d", "t_f"]),
     V::parameter("k_p", |p, _| &mut p.k_p, "N.m/rad", "Gain of the angle").at_least(0.0),
     V::parameter("k_d", |p, _| &mut p.k_d, "N.m.s/rad", "Gain of the rate").at_least(0.0),
-    V::parameter("t_f", |p, _| &mut p.t_f, "s", "Time constant of the roll-off").range(1e-6, 1e3),
+    V::parameter("t_f", |p, _| &mut p.t_f, "s", "Time constant of the filter").range(1e-6, 1e3),
 ];
 
 static SCALARS: [Scalar<Controller>; scalar_count(VARIABLES)] = scalars(VARIABLES);
@@ -56,7 +56,7 @@ static TABLE: Table<Controller> = Table::new(
     About {
         model: "Controller",
         version: env!("CARGO_PKG_VERSION"),
-        description: "A PD controller that rolls off",
+        description: "PD controller with a low-pass filter",
         events: "",
         event_indicators: 0,
         saved_words: 1,
@@ -66,8 +66,8 @@ static TABLE: Table<Controller> = Table::new(
 );
 
 impl Controller {
-    /// Returns the torque, N m, to which the filtered torque tau tends.
-    fn wanted(&self, theta: f64, omega: f64) -> f64 {
+    /// Returns the unfiltered torque, N m, which tau approaches.
+    fn unfiltered(&self, theta: f64, omega: f64) -> f64 {
         -self.p.k_p * theta - self.p.k_d * omega
     }
 }
@@ -97,10 +97,10 @@ impl Dynamics for Controller {
         tau[0].is_finite().then_some(Controller { p: *p, tau })
     }
 
-    /// With inputs along straight lines, v = v0 + v1 t, the exact solution is
+    /// Steps exactly: for inputs that change linearly, v = v0 + v1 t, the solution is
     /// tau(h) = v(h) - t_f v1 + (tau(0) - v0 + t_f v1) exp(-h/t_f).
     fn step(&mut self, Inputs { theta, omega }: &Inputs, h: f64) -> Result<(), StepFailure> {
-        let [v0, v1] = [0, 1].map(|k| self.wanted(theta[k], omega[k]));
+        let [v0, v1] = [0, 1].map(|k| self.unfiltered(theta[k], omega[k]));
         let lag = self.p.t_f * v1;
         self.tau[0] = v0 + v1 * h - lag + (self.tau[0] - v0 + lag) * (-h / self.p.t_f).exp();
         Ok(())
@@ -119,7 +119,7 @@ impl Dynamics for Controller {
     fn set_time(&mut self, _: Instant) {}
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
-        x_dot[0] = (self.wanted(inputs.theta[0], inputs.omega[0]) - self.tau[0]) / self.p.t_f;
+        x_dot[0] = (self.unfiltered(inputs.theta[0], inputs.omega[0]) - self.tau[0]) / self.p.t_f;
     }
 
     fn directional_derivative(
@@ -129,6 +129,6 @@ impl Dynamics for Controller {
         dx: &[f64],
         dx_dot: &mut [f64],
     ) {
-        dx_dot[0] = (self.wanted(theta[1], omega[1]) - dx[0]) / self.p.t_f;
+        dx_dot[0] = (self.unfiltered(theta[1], omega[1]) - dx[0]) / self.p.t_f;
     }
 }

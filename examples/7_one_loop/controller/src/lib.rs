@@ -1,4 +1,4 @@
-//! A PD controller as an FMU.
+//! FMU of a PD controller.
 #![allow(non_snake_case)]
 
 pub mod controller;
