@@ -1,6 +1,7 @@
-"""Open the book in a browser: search it, and look at its pages on wide and narrow screens.
+"""Check the book in a browser: its search, and its pages on wide and narrow screens.
 
-Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both.
+This needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` installs
+both.
 """
 
 import argparse
@@ -56,7 +57,7 @@ ANSWERS = {
     "phase margin": "spacecraft.html",
     "licence": "documentation/index.html#licence",
 }
-"""Words that readers search for, and the end of an address among the first three hits."""
+"""Words that readers search for, and the end of an address that the first hits must contain."""
 HITS = 3
 
 LOOKED_AT = (
@@ -68,52 +69,52 @@ LOOKED_AT = (
 
 
 def open_page(browser: Browser, file: Path, width: int, scheme: str) -> Page:
-    """Open a page; whatever comes from elsewhere than the book's folder is an error."""
+    """Open a page; a request for anything outside the book's folder is an error."""
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     fetched: list[str] = []
     page.on("request", lambda request: fetched.append(request.url))
     page.goto(file.absolute().as_uri())
     outside = [url for url in fetched if not url.startswith(("file:", "data:"))]
-    assert not outside, f"{file}: fetched from elsewhere: {outside}"
+    assert not outside, f"{file}: the page fetches from outside the book: {outside}"
     return page
 
 
 def search(page: Page, book: Path, words: str) -> list[str]:
-    """Return the addresses of the first hits."""
+    """Return the addresses of the first hits of a search."""
     page.goto(f"{(book / 'search.html').absolute().as_uri()}?q={quote(words)}")
     page.wait_for_function("/finished|did not match/.test(document.body.innerText)")
     links = page.locator("ul.search > li > a").evaluate_all("all => all.map(a => a.href)")
-    # file?highlight=words#place, or file#place?highlight=words#place
+    # An address is file?highlight=words#place or file#place?highlight=words#place.
     files = [re.split("[?#]", link)[0] for link in links[:HITS]]
     places = [link.partition("#")[1] + link.rpartition("#")[2] for link in links[:HITS]]
     return [file + place * ("#" in place) for file, place in zip(files, places, strict=True)]
 
 
 def main() -> None:
-    """Check one book; exit with 1 and a sentence if something is not found or does not fit."""
+    """Check one book; exit with a message if a search fails or a page is too wide."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("book", type=Path, help="the folder that `hubslosh book --out` wrote")
+    parser.add_argument("book", type=Path, help="output folder of `hubslosh book --out`")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of the pages")
     arguments = parser.parse_args()
     with chromium() as browser:
         page = browser.new_page()
         for words, answer in ANSWERS.items():
             found = search(page, arguments.book, words)
-            assert any(hit.endswith(answer) for hit in found), f"{words}: {found}, not {answer}"
+            assert any(hit.endswith(answer) for hit in found), f"{words}: {found} lacks {answer}"
         for name in LOOKED_AT:
             for width in (1400, 500):
                 for scheme in ("light", "dark"):
                     page = open_page(browser, arguments.book / name, width, scheme)
                     place = f"{name}, {width} px, {scheme}"
                     wide = page.evaluate("document.documentElement.scrollWidth")
-                    assert wide <= width, f"{place}: {wide} px wide"
+                    assert wide <= width, f"{place}: the page is {wide} px wide"
                     if arguments.pictures:
                         arguments.pictures.mkdir(parents=True, exist_ok=True)
                         stem = f"{Path(name).stem}-{width}-{scheme}.png"
                         page.screenshot(path=arguments.pictures / stem)
         equations = page.locator("math").evaluate_all("all => all.map(m => m.clientHeight)")
         assert len(equations) > 50 and min(equations) > 0, "equations are not drawn"
-    print(f"{arguments.book}: {len(ANSWERS)} words found, {len(LOOKED_AT)} pages looked at")
+    print(f"{arguments.book}: {len(ANSWERS)} words found, {len(LOOKED_AT)} pages fit the screen")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,15 @@
-"""Runs every `sh` and `python` block of the pages with the installed wheel, as a reader does.
+"""Runs every `sh` and `python` block of the pages with the installed wheel, like a reader.
 
-    python3 .ci/check_pages.py dist/hubslosh-….whl [PAGE …] [--find-links FOLDER] [--dear] [--keep]
+    python3 .ci/check_pages.py WHEEL [PAGE …] [--find-links FOLDER] [--slow] [--keep FOLDER]
 
 Pages are README, the book, the READMEs of the examples and of the package, and the documentation
-of the FMUs. Each runs in a folder of its own, without the project's source: its commands one by
-one, its Python as one program. What a page presumes, such as the reader's recording, is made by
-`GIVEN`. Commands that need the source or change the machine are in `LEFT_OUT`, with the reason.
-`DEAR` ones run only with --dear (`.ci/run --nightly`). An entry of these lists that fits no
-command is an error.
+of the FMUs. Each page runs in its own folder, without the project's source. Its commands run one by
+one, its Python runs as one program. `GIVEN` creates the files that a page expects, such as the
+reader's recording. `LEFT_OUT` lists commands that need the source or change the machine, with the
+reason. Commands in `SLOW` run only with --slow (`.ci/run --nightly`). An entry of these lists that
+matches no command is an error.
 
-Prints each failure as PAGE:LINE with what was run; exit code 1 if there is any.
+Each failure is printed as PAGE:LINE with the command or code; the exit code is then 1.
 """
 
 import argparse
@@ -31,47 +31,47 @@ PAGES = ("README.md", "book/**/*.md", "examples/**/README.md", "harness/python/R
          "modelDescription/*/documentation/*.md")  # fmt: skip
 
 INDENTED = r" {4}(hubslosh|python3?|pip|cargo) "
-"""Begin of a block of the shell that is indented instead of fenced."""
+"""Pattern of the first line of a shell block that is indented instead of fenced."""
 
 LEFT_OUT = {
     r"cargo (run|test|build|install)\b": "needs the source and Rust; .ci/run and CI's workflows",
     r"hubslosh pack\b": "needs the source and Rust; .ci/run packs",
     r"pip install\b": "this script and .ci/wheels install the wheel",
-    r"python3 -m venv\b": "makes the environment that this script makes",
+    r"python3 -m venv\b": "creates an environment, as this script does",
     r"\. \.venv/bin/activate": "as above",
     r"hubslosh analyse --bench-day (tuesday|target/day)": "a day's logs; tests of `bench_day`",
     r"(PYTHONPATH=harness/python )?python3? harness/studies/": "tests/python.rs",
     r"python examples/(6|7|11)_": "needs dask, libcosimpy or bsk; tests/python.rs",
-    r"hubslosh identify (shaken|friction ramp)\.csv": "others' recordings; their tests",
+    r"hubslosh identify (shaken|friction ramp)\.csv": "recordings of others, which have tests",
     r"hubslosh (identify (a|flight)|design slew)\.csv": "others' recordings; tests of `any_fmu`",
     r"hubslosh check my\.fmu --strict": "FMUs built here need a newer glibc, an error; .ci/run",
     r"python3 -m hubslosh\.recordings": "needs the extra recordings; test_recordings.py",
     r"pytest\b": "tests of the source; tests/python.rs",
 }
-"""Commands that do not run here, and why."""
+"""Commands that do not run here, with the reason, or with what runs them."""
 
 PYTHON_LEFT_OUT = {
     "book/liquid.md": "needs the extra fem (gmsh and libGLU); test_liquid.py",
 }
-"""Pages whose Python does not run here, and why."""
+"""Pages whose Python does not run here, with the reason."""
 
-DEAR = (
+SLOW = (
     r"hubslosh campaign( |$)",
     r"hubslosh identify .*--free",
     r"hubslosh design .*--optimal",
     r"python examples/(3|9|12|13|14)_",
 )
-"""Commands of more than ten seconds; they run with --dear."""
+"""Commands that take more than ten seconds; they run with --slow."""
 
 EXIT_CODES = {r"hubslosh check broken\.fmu": 1}
-"""Commands that are meant to fail."""
+"""Commands that must fail, with their exit codes."""
 
 FOLLOWS = {
     "book/which_damping.md": ("book/spacecraft.md",),
     "book/how_many_modes.md": ("book/spacecraft.md",),
     "book/is_it_slosh.md": ("book/spacecraft.md",),
 }
-"""Pages whose Python continues that of others."""
+"""Pages whose Python continues the Python of other pages."""
 
 RECORDING = """
 import numpy as np, pandas as pd, hubslosh
@@ -160,22 +160,22 @@ impulse, taken = np.arange(6.0), np.zeros(6)
 M_host, C, V, omega = np.eye(6), np.eye(3), np.zeros(3), np.zeros(3)
 """,
 }
-"""Python that makes what a page presumes; the page's own Python continues it."""
+"""Python that creates the files and names that a page expects; the page's Python continues it."""
 
 
 @dataclass
 class Block:
-    """A block of code of a page, with its language and its line."""
+    """A block of code of a page with its language and line."""
 
     page: str
     line: int
-    """Number of its first line of code."""
+    """Line number of its first line of code."""
     language: str
     code: str
 
 
 def blocks(page: str) -> list[Block]:
-    """Return the blocks of a page in which something runs."""
+    """Return the blocks of a page that contain commands or Python."""
     found, lines = [], (ROOT / page).read_text().splitlines()
     begin = None
     for n, line in enumerate(lines):
@@ -194,7 +194,7 @@ def blocks(page: str) -> list[Block]:
 
 
 def commands(block: Block) -> list[tuple[int, str]]:
-    """Return the commands of a block of sh, each with its line; a backslash continues a command."""
+    """Return the commands of a shell block with their lines; a backslash continues a command."""
     found: list[tuple[int, str]] = []
     whole, first = "", block.line
     for n, line in enumerate(block.code.splitlines(), block.line):
@@ -210,7 +210,7 @@ def commands(block: Block) -> list[tuple[int, str]]:
 
 
 class Reader:
-    """A machine on which a reader follows the pages: it has the wheel and the system's programs."""
+    """A reader's machine, with the wheel and the system's programs."""
 
     def __init__(self, folder: Path, wheel: Path, find_links: Path | None) -> None:
         """Install the wheel with the packages that the pages use."""
@@ -240,7 +240,7 @@ class Reader:
         self.fmus = [Path(line) for line in listed.split()]
 
     def prepare(self, page: str) -> Path:
-        """Return the folder of a page, with the files that the pages name."""
+        """Create a page's folder with the files that the pages name, and return it."""
         folder = self.folder / page.replace("/", "-").removesuffix(".md")
         (folder / "dist").mkdir(parents=True)
         for fmu in self.fmus:
@@ -277,21 +277,21 @@ for page, line, code in json.loads(Path(sys.argv[1]).read_text()):
         traceback.print_exc()
         sys.exit(f"AT {page}:{line}")
 """
-"""Runs blocks of Python as one program, with the pages' lines in its messages."""
+"""Program that runs blocks of Python as one, and reports errors at the lines of the pages."""
 
 
 class Check:
-    """The failures found in the pages, and the entries of the lists that fitted a command."""
+    """A check of pages: its failures, and the list entries that matched a command."""
 
-    def __init__(self, reader: Reader, dear: bool) -> None:
-        """Store the reader of the pages; ``dear``: also run commands of more than ten seconds."""
-        self.reader, self.dear = reader, dear
+    def __init__(self, reader: Reader, include_slow: bool) -> None:
+        """Store the reader; ``include_slow``: also run commands of more than ten seconds."""
+        self.reader, self.include_slow = reader, include_slow
         self.failures: list[str] = []
         self.used: set[str] = set()
-        self.slow: list[tuple[float, str]] = []
+        self.durations: list[tuple[float, str]] = []
 
     def matches(self, patterns: object, command: str) -> str | None:
-        """Return the entry of a list that a command fits, and note that it was used."""
+        """Return the list entry that a command matches, and record it as used."""
         found = next((p for p in patterns if re.match(p, command)), None)
         self.used |= {found} if found else set()
         return found
@@ -323,17 +323,17 @@ class Check:
             self._python(page, [*prelude, *before, *python], folder)
 
     def _before(self, block: Block) -> str:
-        """Return the paragraph of the page that precedes a block."""
+        """Return the paragraph before a block."""
         lines = (ROOT / block.page).read_text().splitlines()[: block.line - 2]
         return " ".join(lines[-4:])
 
     def _shell(self, block: Block, folder: Path) -> None:
-        """Run a block of shell commands in one shell, up to the first failure."""
+        """Run a block of shell commands in one shell until one fails."""
         script, lines = ["set -uo pipefail"], []
         for line, command in commands(block):
             if self.matches(LEFT_OUT, command):
                 continue
-            if self.matches(DEAR, command) and not self.dear:
+            if self.matches(SLOW, command) and not self.include_slow:
                 continue
             expected = EXIT_CODES.get(self.matches(EXIT_CODES, command) or "", 0)
             script += [
@@ -349,7 +349,7 @@ class Check:
         marks = list(re.finditer(r"^@@ (\w+) ([\d.]+)$", said, re.MULTILINE))
         for (line, command), begin, end in zip(lines, marks, marks[1:], strict=False):
             seconds = float(end[2]) - float(begin[2])
-            self.slow.append((seconds, f"{block.page}:{line}: {command}"))
+            self.durations.append((seconds, f"{block.page}:{line}: {command}"))
         if code:
             line, command = lines[int(marks[-1][1])]
             self._fail(f"{block.page}:{line}", command, said[marks[-1].end() :])
@@ -363,7 +363,7 @@ class Check:
         begin = time.monotonic()
         program = [self.reader.python, ".blocks.py", ".blocks.json", str(ROOT)]
         code, said = self.reader.run(program, folder)
-        self.slow.append((time.monotonic() - begin, f"{page}: Python"))
+        self.durations.append((time.monotonic() - begin, f"{page}: Python"))
         if code:
             place = re.search(r"^AT (.*)$", said, re.MULTILINE)
             self._fail(place[1] if place else page, "Python", said)
@@ -383,8 +383,8 @@ def main() -> None:
     parser.add_argument("wheel", type=Path)
     parser.add_argument("pages", nargs="*")
     parser.add_argument("--find-links", type=Path, metavar="FOLDER")
-    parser.add_argument("--dear", action="store_true", help="also what takes more than ten seconds")
-    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="run here and leave the files")
+    parser.add_argument("--slow", action="store_true", help="run SLOW commands too")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="run here and keep the files")
     args = parser.parse_args()
     every = [
         p.relative_to(ROOT).as_posix() for pattern in PAGES for p in sorted(ROOT.glob(pattern))
@@ -393,23 +393,23 @@ def main() -> None:
     folder = args.keep or Path(tempfile.mkdtemp(prefix="pages-"))
     folder.mkdir(exist_ok=True)
     try:
-        check = Check(Reader(folder.absolute(), args.wheel, args.find_links), args.dear)
+        check = Check(Reader(folder.absolute(), args.wheel, args.find_links), args.slow)
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(check.page, pages))
     finally:
         if not args.keep:
             shutil.rmtree(folder, ignore_errors=True)
-    lists = [*LEFT_OUT, *DEAR, *EXIT_CODES, *PYTHON_LEFT_OUT]
+    lists = [*LEFT_OUT, *SLOW, *EXIT_CODES, *PYTHON_LEFT_OUT]
     if not args.pages:
         unused = [entry for entry in lists if entry not in check.used]
         check.failures += [
-            f"no command is {entry}: remove it from .ci/check_pages.py" for entry in unused
+            f"no command matches {entry}: remove it from .ci/check_pages.py" for entry in unused
         ]
         unknown = [page for page in (*GIVEN, *FOLLOWS) if page not in pages]
         check.failures += [
             f"{page} has no code: remove it from .ci/check_pages.py" for page in unknown
         ]
-    for seconds, what in sorted(check.slow, reverse=True)[:12]:
+    for seconds, what in sorted(check.durations, reverse=True)[:12]:
         print(f"{seconds:6.1f} s  {what}")
     if check.failures:
         sys.exit("\n".join(["", *check.failures, f"{len(check.failures)} failures"]))

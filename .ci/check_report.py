@@ -1,6 +1,7 @@
-"""Click through a campaign's report in a browser and say what does not work.
+"""Check a campaign's report in a browser by using its figures and links.
 
-Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both.
+This needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` installs
+both.
 """
 
 import argparse
@@ -17,7 +18,7 @@ RANGE = "document.querySelector('.plot').layout.xaxis.range.map(Number)"
 
 
 def clicks(page: Page) -> None:
-    """Try out hovering, legend, zoom and reset in the first figure, and the list of contents."""
+    """Check hover, legend, zoom and reset of the first figure, and the table of contents."""
     plot = page.locator(".plot").first
     plot.scroll_into_view_if_needed()
     point = plot.locator(".points path, .point path")
@@ -25,7 +26,7 @@ def clicks(page: Page) -> None:
     box = target.bounding_box()
     assert box, "the first figure has neither points nor lines"
     label = plot.locator(".hoverlayer .hovertext")
-    # in a figure of lines alone up and down its middle, until one is near
+    # In a figure without points the pointer moves down its middle until a line is near.
     for part in (0.5,) if point.count() else (k / 20 for k in range(1, 20)):
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * part)
         page.wait_for_timeout(200)
@@ -33,16 +34,17 @@ def clicks(page: Page) -> None:
             break
     label.first.wait_for(timeout=10_000)
     text = label.first.text_content() or ""
-    assert re.search(r"\d", text), f"the pointer shows no value: {text!r}"
+    assert re.search(r"\d", text), f"the label at the pointer has no value: {text!r}"
 
-    # a figure whose lines have their names at their ends has no legend
+    # A figure with names at the ends of its lines has no legend.
     legend = page.locator(".plot:has(.legendtoggle)").first
     shown = "document.querySelector('.plot:has(.legendtoggle)').data[0].visible"
     assert page.evaluate(shown) in (None, True)
     legend.scroll_into_view_if_needed()
     legend.locator(".legendtoggle").first.click()
     page.wait_for_function(f"{shown} === 'legendonly'", timeout=10_000)
-    page.wait_for_timeout(600)  # two quick clicks would be a double click, which shows one alone
+    # Two quick clicks would be a double click, which hides all other lines.
+    page.wait_for_timeout(600)
     legend.locator(".legendtoggle").first.click()
     page.wait_for_function(f"{shown} === true", timeout=10_000)
     plot.scroll_into_view_if_needed()
@@ -57,7 +59,7 @@ def clicks(page: Page) -> None:
     page.mouse.up()
     page.wait_for_timeout(500)
     zoomed = page.evaluate(RANGE)
-    assert zoomed[1] - zoomed[0] < 0.5 * (before[1] - before[0]), f"no zoom: {before}, {zoomed}"
+    assert zoomed[1] - zoomed[0] < 0.5 * (before[1] - before[0]), f"no zoom of {before}: {zoomed}"
     page.mouse.dblclick(left, top)
     page.wait_for_timeout(700)
     reset = page.evaluate(RANGE)
@@ -68,7 +70,7 @@ def clicks(page: Page) -> None:
     target = link.get_attribute("href") or ""
     page.locator("nav summary").click()
     link.click()
-    # the page scrolls there, as fast as the machine draws it; a figure that never comes ends this
+    # The page scrolls as fast as the machine draws it; the timeout fails if it never arrives.
     top = f"document.querySelector('{target}').getBoundingClientRect().top"
     page.wait_for_function(f"{top} < 900", timeout=20_000)
     assert page.evaluate("location.hash") == target
@@ -91,11 +93,11 @@ FAULTS = """
   return faults.map((fault) => `figure ${i + 1}: ${fault}`);
 })
 """
-"""Faults of the figures as drawn."""
+"""Script that returns faults in the layout of the drawn figures."""
 
 
 def background(page: Page) -> int:
-    """Return how light the background of the page is, from 0 (black) to 765 (white)."""
+    """Return the lightness of the page's background, from 0 (black) to 765 (white)."""
     color = page.evaluate("getComputedStyle(document.body).backgroundColor")
     return sum(int(part) for part in re.findall(r"\d+", color)[:3])
 
@@ -111,16 +113,16 @@ def view(browser: Browser, report: Path) -> str:
     page.wait_for_url("**/view.html")
     page.wait_for_function("document.documentElement.dataset.drawn === 'yes'", timeout=180_000)
     assert page.inner_text("h1") == largest["name"], page.inner_text("h1")
-    assert page.evaluate("hubsloshView.read().length") == 1, "the tank is drawn"
+    assert page.evaluate("hubsloshView.read().length") == 1, "the view does not draw one tank"
     page.close()
     return largest["name"]
 
 
 def main() -> None:
-    """Check one report; exit with 1 and a sentence if something does not work."""
+    """Check one report; exit with a message at the first fault."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("report", type=Path)
-    parser.add_argument("--pages", type=int, help="most pages of paper")
+    parser.add_argument("--pages", type=int, help="largest number of printed pages")
     arguments = parser.parse_args()
     with chromium() as browser, tempfile.TemporaryDirectory() as directory:
         has_view = (arguments.report.parent / "view.html").exists()
@@ -128,8 +130,8 @@ def main() -> None:
         page = open_page(browser, arguments.report, 1400)
         clicks(page)
         assert background(page) > 700
-        assert not (faults := page.evaluate(FAULTS)), f"on a wide screen: {faults[:5]}"
-        # of the tool that is chosen, too
+        assert not (faults := page.evaluate(FAULTS)), f"faults on a wide screen: {faults[:5]}"
+        # The icon of the active tool is included.
         icons = "[...document.querySelectorAll('.modebar-btn path')].map(p => p.style.fill)"
         for fill in set(page.evaluate(icons)):
             assert sum(int(part) for part in re.findall(r"\d+", fill)[:3]) < 400, f"icons {fill}"
@@ -142,16 +144,16 @@ def main() -> None:
         page.pdf(path=pdf, prefer_css_page_size=True)
         pages = len(re.findall(rb"/Type\s*/Page[^s]", pdf.read_bytes()))
         if arguments.pages:
-            assert pages <= arguments.pages, f"{pages} pages of paper"
+            assert pages <= arguments.pages, f"the report prints on {pages} pages"
         page.close()
         dark = open_page(browser, arguments.report, 1400, "dark")
-        assert background(dark) < 150, "the page stays light in the dark"
+        assert background(dark) < 150, "the page is light in dark mode"
         ink = "document.querySelector('.plot').layout.font.color"
-        assert dark.evaluate(ink) == "#e6eaee", "the figures stay dark in the dark"
+        assert dark.evaluate(ink) == "#e6eaee", "the text of figures is dark in dark mode"
         dark.close()
         phone = open_page(browser, arguments.report, 400)
         width = phone.evaluate("document.documentElement.scrollWidth")
-        assert width <= 400, f"text {width} px wide on a phone of 400 px"
+        assert width <= 400, f"text is {width} px wide on a phone of 400 px"
         assert not (faults := phone.evaluate(FAULTS)), f"on a phone: {faults[:5]}"
     print(
         f"{arguments.report}: hover, legend, zoom, reset, contents, dark, phone; {pages} pages; "

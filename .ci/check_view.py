@@ -1,14 +1,14 @@
-"""Compare pages of ``hubslosh view`` with the tables that they show, in a browser.
+"""Compare pages of ``hubslosh view`` in a browser with the tables that they show.
 
-Makes five runs: a sweep with rotary slosh, four modes of the liquid, a slew in six axes with two
-tanks, a tank that drains, a sphere. At three instants of each page, the drawn bobs are read back
-and compared with the positions from the table. So is the wave at the wall, also with the FMU's
-wave_height. The surface has to move the liquid's centre of mass as far as the pendulums do.
-Contrast and the rest of WCAG 2 AA are axe-core's to judge. A unit of the FMU that looks like markup
-is shown as text. Leaves fifteen screenshots.
+Five runs are made: a sweep with rotary slosh, a run with four modes, a slew in six axes with two
+tanks, a tank that drains, and a sphere. At three instants of each page the positions of the drawn
+bobs and the waves at the wall are compared with the table, and the waves also with the FMU's
+wave_height. The drawn surface must move the liquid's centre of mass as far as the pendulums do.
+axe-core checks contrast and the other rules of WCAG 2 AA. A unit of the FMU that looks like markup
+must be shown as text. Fifteen screenshots are written.
 
-Needs Playwright (``requirements-browser.txt``), and Debian's Chromium; ``.ci/browser`` gets
-them.
+This needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` installs
+both.
 """
 
 import argparse
@@ -36,7 +36,7 @@ XI = (1.8411837813406593, 5.3314427735250325, 8.536316366346285, 11.706004902592
 """Zeros of J1'."""
 
 SINGLE = 1e-6
-"""m per m of reach: a page holds numbers of 32 bits."""
+"""Tolerance in m per m of the scene's size: a page stores 32-bit numbers."""
 
 HIDDEN = """() => {
   const legend = document.querySelector(".hs-legend").getBoundingClientRect();
@@ -46,38 +46,38 @@ HIDDEN = """() => {
     return !(beside || bottom < legend.top || top > legend.bottom);
   }).map((letter) => letter.textContent);
 }"""
-"""Axes whose letters lie under the legend."""
+"""Script that returns the axes whose letters lie under the legend."""
 
 VIEWS = ((1400, "light"), (400, "light"), (1400, "dark"))
-"""Width, px, and colours at the three instants."""
+"""Width (px) and colour scheme at each of the three instants."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """Expected position of one slosh mode's bob in the picture, body axes, m."""
+    """Expected position of one slosh mode's bob in body axes, m."""
 
     hinge: Vector
     bob: Vector
     level: float
     wall: tuple[float, float]
-    """Elevation at the wall along the tank's x and y, of all modes."""
+    """Elevation of the wave at the wall along the tank's x and y, all modes together, m."""
     moved: tuple[float, float]
-    """m l times the slosh angle along x and y over the density, m4, of this mode."""
+    """m l times this mode's slosh angle along x and y, over the density, m⁴."""
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode's data, m, m, m/rad, m4."""
+    """Data of one slosh mode: m, m, m/rad, m⁴."""
 
     hinge: float
     length: float
     wave: float
     moment: float
-    """m l over the density: of a tank filled anyhow the first moment of the surface per angle."""
+    """m l over the density, which is the first moment of the surface per slosh angle."""
 
 
 def cylinder(n: int, radius: float, depth: float) -> Mode:
-    """Return mode n, from 0, of an upright cylinder, heights from its bottom (NASA SP-106)."""
+    """Return mode n (from 0) of an upright cylinder, with heights from its bottom (NASA SP-106)."""
     xi = XI[n]
     u = xi * depth / radius
     length = radius / (xi * math.tanh(u))
@@ -88,24 +88,24 @@ def cylinder(n: int, radius: float, depth: float) -> Mode:
 
 @dataclass(frozen=True)
 class Case:
-    """A run, how its page is made, and a function that computes its bobs from the table."""
+    """A run, the options of its page, and a function that computes its bobs from the table."""
 
     name: str
     fmu: str
     run: list[str]
     columns: str
-    """What is recorded."""
+    """Recorded columns, separated by commas."""
     instants: tuple[float, float, float]
     expected: Callable[[Row], list[list[Drawn]]]
     radii: tuple[float, ...]
     """Radii of the free surfaces at rest, m."""
     inputs: Callable[[float], Row] | None = None
     tank: Path | None = None
-    """A file by which its tank is drawn."""
+    """File of the tank by which it is drawn."""
 
 
 def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
-    """Return the bob of the bench's tank; sines of slosh angles are displacements over l."""
+    """Return the bob of the bench's tank from the sines of slosh angles, displacements over l."""
     radius, depth, arm = 0.163 / 2, 0.1, 0.225
     data = [cylinder(n, radius, depth) for n in range(len(sines))]
     p = [(x, y, -math.sqrt(1 - x * x - y * y)) for x, y in sines]
@@ -113,12 +113,12 @@ def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
 
 
 def sweep(row: Row) -> list[list[Drawn]]:
-    """Return the bob of the sweep's only mode."""
+    """Return the bob of the sweep, which has one mode."""
     return bench(row, [(math.sin(row["slosh_angle_radial"]), math.sin(row["slosh_angle"]))])
 
 
 def four(row: Row) -> list[list[Drawn]]:
-    """Four modes of the spherical pendulum: its coordinates are stereographic, also of mode 1."""
+    """Return the bobs of four spherical pendulums, whose coordinates are stereographic."""
     sines = []
     for n in range(1, 5):
         x, y = row[f"slosh.q_radial[{n}]"], row[f"slosh.q_tangential[{n}]"]
@@ -128,15 +128,18 @@ def four(row: Row) -> list[list[Drawn]]:
 
 
 def slew(row: Row) -> list[list[Drawn]]:
-    """Two tanks: one of known modes, one by diameter and depth, above it and turned by 90°."""
-    # m l of the first by the formula of the cylinder that its wave and length are of
+    """Return the bobs of two tanks.
+
+    The lower is given by its modes, the upper by diameter and depth, and turned by 90°.
+    """
+    # m l of the first tank follows from the cylinder to which its wave and length belong.
     given = Mode(0.136534, 0.248039, 0.376618, cylinder(0, 0.45, 0.6).moment)
     lower = modes(row, "tank[1]", [given], (0, 0, -0.55), 0.3)
     upper = [cylinder(n, 0.4, 0.35) for n in (0, 1)]
     turned = modes(row, "tank[2]", upper, (0, 0, 0), 0.35)
 
     def place(r: Vector) -> Vector:
-        # q = (1, 0, 0, 1), normalised, turns x to y
+        # q = (1, 0, 0, 1), normalised, turns x into y.
         return (-r[1], r[0], r[2] + 0.45)
 
     upper_drawn = [Drawn(place(d.hinge), place(d.bob), d.level, d.wall, d.moved) for d in turned]
@@ -166,7 +169,7 @@ def draw_modes(data: list[Mode], p: Sequence[Vector], at: Vector, level: float) 
 
 
 def drain(row: Row) -> list[list[Drawn]]:
-    """Take the table with which the FMU starts: a cylinder of 0.9 m, its bottom at -0.3 m."""
+    """Return the bobs of the FMU's default tank, a cylinder of 0.9 m with its bottom at -0.3 m."""
     depth = row["tank.liquid"] / (1000 * math.pi * 0.45**2)
     mode = cylinder(0, 0.45, depth)
     mode = Mode(mode.hinge - 0.3, mode.length, mode.wave, mode.moment)
@@ -174,12 +177,12 @@ def drain(row: Row) -> list[list[Drawn]]:
 
 
 def pulse(t: float, begin: float, end: float) -> float:
-    """Return a smooth pulse, 0 to 1."""
+    """Return a smooth pulse with values from 0 to 1."""
     return math.sin(math.pi * (t - begin) / (end - begin)) ** 2 if begin < t < end else 0.0
 
 
 def torques(t: float) -> Row:
-    """Return the torques of a slew about three axes, under thrust."""
+    """Return the torques of a slew about three axes under thrust."""
     return {
         "torque[1]": 24 * (pulse(t, 2, 14) - pulse(t, 14, 26)),
         "torque[2]": 16 * (pulse(t, 5, 17) - pulse(t, 17, 29)),
@@ -195,7 +198,7 @@ def shaken(t: float) -> Row:
 
 
 def pushed(t: float) -> Row:
-    """Return the force that shakes a tank in two directions, each for a while."""
+    """Return the force that shakes a tank in two directions one after the other."""
     return {
         "a[1]": 0.06 * math.sin(3.9 * t) * pulse(t, 0, 8),
         "a[2]": 0.2 * pulse(t, 5, 6) - 0.2 * pulse(t, 6, 7),
@@ -215,7 +218,7 @@ COLUMNS = {
     "drain": "force[1],force[2],force[3],torque[1],torque[2],torque[3],tank.p[1,1],tank.p[1,2],"
     "tank.p[1,3],tank.wave_height,tank.liquid",
 }
-"""What is recorded."""
+"""Recorded columns of each case."""
 
 TWO_TANKS = (
     "tanks=2 tank[1].position[3]=-0.55 tank[2].position[3]=0.45 tank[2].q[1]=1 tank[2].q[4]=1 "
@@ -224,7 +227,7 @@ TWO_TANKS = (
 
 
 def settings(text: str) -> list[str]:
-    """Return the command's flags for the settings in a text, which spaces separate."""
+    """Return the command's flags for settings that spaces separate."""
     return [part for name in text.split() for part in ("--set", name)]
 
 
@@ -277,7 +280,7 @@ CASES = (
 
 
 def in_sphere(binary: Path, folder: Path) -> Case:
-    """Return a run of a sphere filled to 0.14 m, by the modes that the tank solver finds."""
+    """Return a run of a sphere filled to 0.14 m with the modes from the tank solver."""
     tank = Path(__file__).parents[1] / "harness/tank/examples/sphere.toml"
     file, fill, radius, density = folder / "sphere.toml", 0.14, 0.3, 1004.0
     command = [binary, "tank", tank, "--fill", str(fill), "--modes", "2", "--parameters", file]
@@ -310,13 +313,13 @@ def in_sphere(binary: Path, folder: Path) -> Case:
 
 
 def rows(file: Path) -> list[Row]:
-    """Return a table's rows."""
+    """Return the rows of a table."""
     with file.open(newline="") as text:
         return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(text)]
 
 
 def record(case: Case, binary: Path, fmus: Path, folder: Path) -> tuple[Path, Path]:
-    """Simulate the case and write its page; return the run's table as CSV, and the page."""
+    """Simulate the case and write its page; return the paths of the CSV table and the page."""
     run, page = folder / f"{case.name}.parquet", folder / f"{case.name}.html"
     drive = []
     if case.inputs:
@@ -350,9 +353,9 @@ def record(case: Case, binary: Path, fmus: Path, folder: Path) -> tuple[Path, Pa
 def first_moment(section: list[list[float]], radius: float) -> float:
     """Return the integral of elevation times x over the surface at rest, m4, by Simpson's rule.
 
-    ``section`` is the surface above the x axis, (r, elevation) at equal steps from the axis, and
-    goes around as a cosine. A sloping wall ends it higher or lower; in linear theory it ends at
-    ``radius``.
+    ``section`` is the surface above the x axis, (r, elevation) at equal steps from the axis; around
+    the axis it varies as a cosine. At a sloping wall it ends at another radius than ``radius``,
+    where linear theory ends it.
     """
     last = len(section) - 1
     weights = [1 if k in (0, last) else 2 + 2 * (k % 2) for k in range(last + 1)]
@@ -361,17 +364,17 @@ def first_moment(section: list[list[float]], radius: float) -> float:
 
 
 def compare(page: Page, case: Case, row: Row, reach: float) -> tuple[float, float]:
-    """Return how far what is drawn is off.
+    """Return two errors of the drawn scene.
 
-    The largest distance from the table's numbers, m; of the liquid's centre of mass by the surface
-    from that by the pendulums, over the latter.
+    The first is the largest distance from the table's positions, m. The second is the relative
+    difference between the liquid's shift by the surface and its shift by the pendulums.
     """
     page.evaluate(f"hubsloshView.seek({row['time']!r})")
     tanks = page.evaluate("hubsloshView.read()")
     wanted = case.expected(row)
     assert len(tanks) == len(wanted), f"{case.name}: {len(tanks)} tanks"
-    # the numbers of the table over the fill have six digits and are interpolated; from six digits
-    # of masses follows the level of a tank whose outline nobody knows
+    # The table over the fill has six digits and is interpolated. The level of a tank without
+    # a known outline follows from masses with six digits.
     allowed = reach * (2e-3 if case.name == "drain" else SINGLE)
     of_level = reach * (2e-3 if case.name == "drain" else 1e-4)
     worst = carried = 0.0
@@ -381,23 +384,23 @@ def compare(page: Page, case: Case, row: Row, reach: float) -> tuple[float, floa
             worst = max(worst, math.dist(found["hinge"], mode.hinge))
             worst = max(worst, math.dist(found["bob"], mode.bob))
         off = abs(tank["level"] - modes_[0].level)
-        assert off < of_level, f"{case.name} at {row['time']} s: the level is {off} m off"
+        assert off < of_level, f"{case.name} at {row['time']} s: error of the level {off} m"
         worst = max(worst, math.dist(tank["wall"], modes_[0].wall))
         moved = [sum(mode.moved[i] for mode in modes_) for i in (0, 1)]
         shown = [first_moment(section, radius) for section in tank["sections"]]
         carried = max(carried, math.dist(moved, shown) / math.hypot(*moved))
-    assert worst < allowed, f"{case.name} at {row['time']} s: {worst} m off (allowed: {allowed})"
-    # Simpson's rule over 16 rings, or 8 for every mode
-    assert carried < 1e-3, f"{case.name} at {row['time']} s: the surface moves {carried} too far"
+    assert worst < allowed, f"{case.name} at {row['time']} s: error {worst} m (allowed: {allowed})"
+    # Simpson's rule has 16 rings, or 8 for each mode.
+    assert carried < 1e-3, f"{case.name} at {row['time']} s: error of the surface {carried}"
     names = [name for name in row if name.split(".")[-1] == "wave_height"]
     for tank, name in zip(tanks, sorted(names), strict=True):
         off = abs(math.hypot(*tank["wall"]) - row[name])
-        assert off < allowed, f"{case.name} at {row['time']} s: {name} is {off} m off"
+        assert off < allowed, f"{case.name} at {row['time']} s: error of {name} {off} m"
     return worst, carried
 
 
 def keys(page: Page) -> None:
-    """Play, pause, step, jump, turn the view, all by keyboard."""
+    """Check by keyboard that the page plays, pauses, steps, jumps and turns the view."""
     now = "hubsloshView.now"
     page.keyboard.press("Home")
     assert page.evaluate(f"{now} === hubsloshView.first")
@@ -422,14 +425,14 @@ def keys(page: Page) -> None:
     assert {"CANVAS", "play", "time", "speed", "wave", "window"} <= set(reached), reached
     page.click(".plot >> nth=0", position={"x": 150, "y": 50})
     span = page.evaluate("[hubsloshView.now, hubsloshView.first, hubsloshView.last]")
-    assert span[1] < span[0] < span[2], "a click on a plot goes nowhere"
+    assert span[1] < span[0] < span[2], "a click on a plot does not move the time"
 
 
 def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str:
-    """Show a run whose FMU has a unit with the text "<!--" and "<script>".
+    """Check the page of an FMU with a unit that contains "<!--" and "<script>".
 
-    The page must show both as text. A browser that read them as markup would not find the end of
-    the page's data, and nothing would be drawn.
+    The page must show both as text. If a browser read them as markup, it would not find the end of
+    the page's data and would draw nothing.
     """
     unit, hostile = "<!--<script>rad/s", folder / "hostile_unit.fmu"
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(hostile, "w") as out:
@@ -452,12 +455,12 @@ def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str
 
 
 def main() -> None:
-    """Check all cases; exit with 1 and a sentence if one is not drawn as its table says."""
+    """Check all cases; exit with a message if a drawing differs from its table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("binary", type=Path, help="the program hubslosh")
-    parser.add_argument("fmus", type=Path, help="the folder with the packed FMUs")
+    parser.add_argument("fmus", type=Path, help="folder of the packed FMUs")
     parser.add_argument("axe", type=Path, help="axe.min.js of npm's axe-core")
-    parser.add_argument("out", type=Path, help="a folder for runs, pages and screenshots")
+    parser.add_argument("out", type=Path, help="folder for runs, pages and screenshots")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     with chromium() as browser:
@@ -465,20 +468,20 @@ def main() -> None:
             table, file = record(case, arguments.binary, arguments.fmus, arguments.out)
             data = rows(table)
             text = file.read_text(encoding="utf-8")
-            assert len(text) < 9e6, f"{case.name}: {len(text)} bytes"
+            assert len(text) < 9e6, f"{case.name}: the page has {len(text)} bytes"
             found = re.search(r'id="run">(.*?)</script>', text, re.DOTALL)
             assert found
             reach = json.loads(found[1])["scene"]["geometry"]["reach"]
             worst = (0.0, 0.0)
             for instant, (width, scheme) in zip(case.instants, VIEWS, strict=True):
                 page = open_page(browser, file, width, scheme, reduced_motion="reduce")
-                assert not page.evaluate("hubsloshView.playing"), "it plays by itself"
+                assert not page.evaluate("hubsloshView.playing"), "the page plays without a click"
                 row = min(data, key=lambda row: abs(row["time"] - instant))
                 worst = tuple(map(max, worst, compare(page, case, row, reach)))
                 assert page.evaluate("document.documentElement.scrollWidth") <= width
                 contrast.demand(page, arguments.axe, f"{case.name}, {scheme}, {width} px")
                 if width == 400:
-                    # a wide picture has its legend at the side
+                    # On a wide screen the legend is beside the picture.
                     hidden = page.evaluate(HIDDEN)
                     assert not hidden, f"{case.name}: the legend lies over {hidden}"
                 page.wait_for_timeout(300)
@@ -489,8 +492,8 @@ def main() -> None:
                 page.close()
             times = ", ".join(f"{t:g}" for t in case.instants)
             print(
-                f"{case.name}: at {times} s bobs and waves are within {worst[0]:.1e} m of the "
-                f"table, liquid moved by the surface within {worst[1]:.1e} of that by the pendulums"
+                f"{case.name}: at {times} s bobs and waves agree within {worst[0]:.1e} m with the "
+                f"table, shifts of the liquid by surface and pendulums to {worst[1]:.1e}"
             )
         hub = arguments.fmus / "HubSlosh.fmu"
         print(hostile_unit(browser, arguments.binary, hub, arguments.out))

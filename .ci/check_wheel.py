@@ -1,15 +1,14 @@
-"""Installs a wheel of this package as a user does, where no Rust is, and uses all of it.
+"""Installs a wheel of this package without Rust, as a user does, and uses all its parts.
 
     python3 .ci/check_wheel.py dist/hubslosh-….whl [--find-links FOLDER]
 
-Creates a virtual environment; PATH has only it and the system's own programs. Measures the time to
-the first plot. Runs ``import hubslosh``, the command ``hubslosh`` with the FMUs that the wheel
-brings (run, check, tank, identify, the campaign and its report), the package's ``campaign``, and
-every example that needs no further package. With --find-links pip takes packages from that folder
-alone, so that a machine without a network will do. Python 3.11 or newer and its standard library
-are enough.
+It creates a virtual environment; PATH has only this environment and the system's programs. It
+measures the time to the first plot. It runs ``import hubslosh``, the command ``hubslosh`` with the
+wheel's FMUs (run, check, tank, identify, the campaign and its report), the package's ``campaign``,
+and every example that needs no further package. With --find-links pip installs packages from that
+folder, without a network. The script needs Python 3.11 or newer and its standard library.
 
-Exit code 0 if everything runs, within the times that are printed.
+The exit code is 0 if everything runs within the printed times.
 """
 
 import argparse
@@ -24,16 +23,16 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 IMPORT = 0.2
-"""s of CPU time for ``import hubslosh``."""
+"""Allowed CPU time of ``import hubslosh``, s."""
 
 FIRST_PLOT = 60.0
-"""s elapsed from the downloaded wheels to the first plot."""
+"""Allowed time from the downloaded wheels to the first plot, s."""
 
 REPORT = 180.0
-"""s elapsed for the campaign with its report."""
+"""Allowed time of the campaign with its report, s."""
 
 NEEDS_MORE = {"6_monte_carlo": "distributed", "7_one_loop": "the crate one-loop"}
-"""Examples that need what the wheel's extras do not bring."""
+"""Examples with the packages that the wheel's extras do not install."""
 
 
 FMUS = ("HubSlosh", "Spacecraft", "SloshTank")
@@ -41,10 +40,10 @@ FMUS = ("HubSlosh", "Spacecraft", "SloshTank")
 
 
 class Machine:
-    """An environment with the wheel and the system's programs, nothing else."""
+    """An environment with only the wheel and the system's programs."""
 
     def __init__(self, folder: Path) -> None:
-        """Make the environment."""
+        """Create the environment."""
         self.folder = folder
         venv = folder / "venv"
         subprocess.run([sys.executable, "-m", "venv", venv], check=True)
@@ -58,7 +57,7 @@ class Machine:
         path = os.pathsep.join([str(self.scripts), *system])
         for tool in ("cargo", "rustc"):
             if found := shutil.which(tool, path=path):
-                sys.exit(f"error: {found} is here; this is to be tried where no Rust is")
+                sys.exit(f"error: {found} exists; this check needs an environment without Rust")
         keep = ("SYSTEMROOT", "TEMP", "TMP", "TMPDIR", "LANG", "LC_ALL", "PIP_CACHE_DIR")
         self.environment = {name: os.environ[name] for name in keep if name in os.environ} | {
             "PATH": path,
@@ -69,7 +68,7 @@ class Machine:
         }
 
     def run(self, *command: str | Path) -> tuple[str, float]:
-        """Run a command; return its output and its time, s. If it fails, the program ends."""
+        """Run a command and return its output and duration (s); end the program if it fails."""
         begin = time.monotonic()
         done = subprocess.run(
             command, cwd=self.folder, env=self.environment, text=True, encoding="utf-8",
@@ -82,14 +81,14 @@ class Machine:
 
 
 def within(what: str, seconds: float, limit: float) -> None:
-    """Print how long something took, and fail if it took longer than ``limit``."""
+    """Print a duration, and end the program if it is above ``limit``."""
     print(f"{what}: {seconds:.2f} s (allowed: {limit:g} s)", flush=True)
     if seconds > limit:
-        sys.exit(f"error: {what} took too long")
+        sys.exit(f"error: {what}: more than {limit:g} s")
 
 
 def main() -> None:
-    """Install, and use."""
+    """Check the wheel in a new environment."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -103,7 +102,7 @@ def main() -> None:
 
 
 def check(machine: Machine, args: argparse.Namespace) -> None:
-    """Use everything that the wheel contains."""
+    """Use all parts of the wheel."""
     run, python = machine.run, machine.python
     begin = time.monotonic()
     source = (
@@ -125,7 +124,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
 
     program = shutil.which("hubslosh", path=machine.environment["PATH"])
     if program is None:
-        sys.exit("error: the wheel has brought no command hubslosh")
+        sys.exit("error: the wheel installs no command hubslosh")
     print(run(program, "--version")[0].strip(), "at", program)
     fmus = [Path(line).stem for line in run(program, "fmus")[0].splitlines()]
     kinds = ("", "-fmi3", "-fmi3-arrays")
@@ -136,7 +135,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
     for command in ([program], [python, "-m", "hubslosh"]):
         address = run(*command, "book")[0].splitlines()[0]
         if not address.endswith("/book/index.md"):
-            sys.exit(f"error: hubslosh book does not say where the book is: {address}")
+            sys.exit(f"error: hubslosh book does not print the book's address: {address}")
     drawing = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     run(program, "tank", drawing, "--fill", "1.2", "--out", "tank.json")
     run(program, "run", "--profile", "exp-sweep:amplitude=0.1,duration=300", "--out", "sweep.csv")
@@ -148,7 +147,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
         sys.exit(f"error: {report} has {report.stat().st_size} bytes")
     within("the campaign and its report", seconds, REPORT)
 
-    # the package finds the command that pip has installed with it
+    # the package finds the command that pip installed with it
     plan = (
         'title = "Two pulses"\\nprofile = "pulse:amplitude=0.05,start=1,width=1,duration=10"\\n'
         '[vary]\\nslosh.model = ["linear", "spherical"]\\n'
@@ -165,7 +164,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
         _, seconds = run(python, script)
         print(f"example {name}: {seconds:.1f} s", flush=True)
     for name, what in NEEDS_MORE.items():
-        print(f"example {name}: not run, it needs {what}")
+        print(f"example {name} is not run: it needs {what}")
 
 
 if __name__ == "__main__":

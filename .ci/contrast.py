@@ -1,6 +1,6 @@
-"""Findings of axe-core on a page in a browser: contrast, and the rest of WCAG 2 A and AA.
+"""Findings of axe-core on a page in a browser, by the rules of WCAG 2 A and AA.
 
-``harness/web/axe`` has axe-core's version in npm's lock file; ``.ci/browser`` installs it.
+The lock file in ``harness/web/axe`` sets axe-core's version; ``.ci/browser`` installs it.
 """
 
 import json
@@ -16,9 +16,8 @@ RUN = """async () => {
   return [found, passes.find(({ id }) => id === "color-contrast")?.nodes.length ?? 0];
 }"""
 
-# Axe leaves out text in SVG, whose colour is `fill`, and what lies over a canvas, as the picture's
-# legend does: these against the background of the nearest element that has one. Curves and dots
-# need 3 : 1 (WCAG 1.4.11).
+# Axe does not measure text in SVG, whose colour is `fill`, and text over a canvas, such as the
+# picture's legend. This script compares them with the nearest opaque background.
 OVER = """() => {
   const channel = (c) => (c <= 10 ? c / 3294.6 : ((c / 255 + 0.055) / 1.055) ** 2.4);
   const luminance = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
@@ -50,15 +49,15 @@ OVER = """() => {
 
 
 def findings(page: Page, axe: Path) -> tuple[list[str], int]:
-    """Return what is wrong with the page as it is, and how many texts have enough contrast."""
+    """Return the findings on the page, and the number of texts with enough contrast."""
     page.evaluate(f"{axe.read_text(encoding='utf-8')}; null")
     wrong, passed = page.evaluate(RUN)
     return [*wrong, *page.evaluate(OVER)], passed
 
 
 def demand(page: Page, axe: Path, name: str) -> int:
-    """Fail if axe-core has findings on the page; return how many texts it has measured."""
+    """Fail if axe-core has findings on the page; return the number of texts that it measured."""
     wrong, passed = findings(page, axe)
     assert not wrong, f"{name}: {json.dumps(wrong, indent=1, ensure_ascii=False)}"
-    assert passed > 5, f"{name}: axe-core has measured {passed} texts"
+    assert passed > 5, f"{name}: axe-core measured only {passed} texts"
     return passed

@@ -1,9 +1,9 @@
-"""Checks of the packed FMU by others: XML schema, fmpy's validation, fmutool, FMI Library, CasADi.
+"""Checks of a packed FMU by other tools.
 
-As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything.
-An FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here; one with
-arrays to neither.
-``.ci/importers`` makes the environment (requirements-importers.txt) and calls it.
+The tools are FMI's XML schema, fmpy's validation, fmutool, FMI Library and CasADi. The command
+``python importers.py dist/HubSlosh.fmu`` exits with 1 if a tool has a finding. FMI Library reads
+FMI 2.0 here, CasADi checks FMUs of FMI 3.0; neither checks an FMU with arrays. ``.ci/importers``
+creates the environment (requirements-importers.txt) and runs the command.
 """
 
 import subprocess
@@ -21,12 +21,12 @@ from lxml import etree
 
 
 def version_of(fmu: Path) -> int:
-    """Return the version of FMI of an FMU, 2 or 3."""
+    """Return the FMI version of an FMU, 2 or 3."""
     return int(read_model_description(str(fmu), validate=False).fmiVersion[0])
 
 
 def schema_findings(fmu: Path) -> list[str]:
-    """Return the findings of FMI's XML schema, as fmpy contains it, about modelDescription.xml."""
+    """Return the errors of modelDescription.xml against FMI's XML schema, which fmpy contains."""
     name = f"fmi{version_of(fmu)}"
     folder = Path(fmpy.__file__).parent / "schema" / name
     schema = etree.XMLSchema(etree.parse(str(folder / f"{name}ModelDescription.xsd")))
@@ -37,7 +37,7 @@ def schema_findings(fmu: Path) -> list[str]:
 
 
 def fmpy_findings(fmu: Path) -> list[str]:
-    """Return the findings of fmpy's validation, and the error if fmpy cannot simulate the FMU."""
+    """Return the findings of fmpy's validation, and the error if its simulation fails."""
     findings = [str(problem) for problem in validate_fmu(str(fmu))]
     for interface in ("CoSimulation", "ModelExchange"):
         try:
@@ -46,30 +46,30 @@ def fmpy_findings(fmu: Path) -> list[str]:
             findings.append(f"{interface}: {error}")
         else:
             if abs(result["time"][-1] - 1.0) > 1e-9:
-                findings.append(f"{interface} ended at {result['time'][-1]} s, not at 1 s")
+                findings.append(f"{interface} ends at {result['time'][-1]} s instead of 1 s")
     return findings
 
 
 def fmutool_findings(fmu: Path, version: int) -> list[str]:
-    """Return what ``fmutool -check`` (PyPI's fmu-manipulation-toolbox) says but for "all well"."""
+    """Return the findings of ``fmutool -check`` (PyPI's fmu-manipulation-toolbox)."""
     program = Path(sys.executable).with_name("fmutool")
     done = subprocess.run(
         [program, "-input", fmu, "-check"], capture_output=True, text=True, check=False
     )
     said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-    # Each check ends with one sentence of its own when it has found nothing.
+    # Each of its checks without a finding prints one of these sentences.
     well = (
         f"seems to be compliant with FMI-{version}.0",
         f"No semantic error against the FMI-{version} standard",
     )
     findings = [line for line in said if not line.startswith("INFO")]
-    findings += [f'does not say "{words}"' for words in well if words not in done.stdout]
-    return findings if done.returncode == 0 else [*said, f"ended with {done.returncode}"]
+    findings += [f'the sentence "{words}" is missing' for words in well if words not in done.stdout]
+    return findings if done.returncode == 0 else [*said, f"exit code {done.returncode}"]
 
 
 def fmi_library_findings(fmu: Path) -> list[str]:
-    """Return the messages of Modelon's FMI Library in libcosim while it loads and steps the FMU."""
-    # Its messages are the process's, so it gets one of its own.
+    """Return the messages of Modelon's FMI Library while libcosim loads and steps the FMU."""
+    # Its messages go to the output of the process; therefore it runs in a separate process.
     program = """
 import sys
 from libcosimpy.CosimExecution import CosimExecution
@@ -83,15 +83,15 @@ sys.exit(not run.step(50))
     done = subprocess.run(
         [sys.executable, "-c", program, fmu.resolve()], capture_output=True, text=True, check=False
     )
-    # libcosim itself leaves enumerations out and says so; that is not a finding.
+    # libcosim reports that it ignores enumerations, which is no finding.
     skipped = "FMI 2.0 Enumeration variable type not supported"
     lines = (done.stdout + done.stderr).splitlines()
     said = [line for line in lines if line.strip() and skipped not in line]
-    return said if done.returncode == 0 else [*said, f"ended with {done.returncode}"]
+    return said if done.returncode == 0 else [*said, f"exit code {done.returncode}"]
 
 
 def casadi_findings(fmu: Path) -> list[str]:
-    """Return the failures of CasADi's Model Exchange, and Jacobians that differ from slopes."""
+    """Return failures of CasADi's Model Exchange, and Jacobians that differ from differences."""
     name = read_model_description(str(fmu)).modelName
     with tempfile.TemporaryDirectory() as folder:
         with zipfile.ZipFile(fmu) as archive:
@@ -104,7 +104,7 @@ def casadi_findings(fmu: Path) -> list[str]:
             )
         except RuntimeError as error:
             return [str(error)]
-        # CasADi has no start of states that parameters make, such as unit vectors: fmpy has.
+        # CasADi has no start values of states that follow from parameters, such as unit vectors.
         start = simulate_fmu(str(fmu), fmi_type="ModelExchange", stop_time=0.01, output=dae.x())
         x, u = (np.array(list(start[0])[1:]), np.array(dae.start(dae.u())).ravel())
         found = [np.array(part) for part in jacobians(x, u)]
@@ -132,12 +132,12 @@ def casadi_findings(fmu: Path) -> list[str]:
 
 
 def main() -> None:
-    """Run all tools, and print their findings."""
+    """Run all tools and print their findings."""
     if len(sys.argv) != 2:
         sys.exit("usage: python importers.py FMU")
     fmu = Path(sys.argv[1])
     if not fmu.is_file():
-        sys.exit(f"error: there is no file {fmu}; cargo run --release -- pack")
+        sys.exit(f"error: {fmu} does not exist; create it with: cargo run --release -- pack")
     version = version_of(fmu)
     asked = {
         f"XML schema of FMI {version}.0": schema_findings,

@@ -1,15 +1,16 @@
-"""Compares what fmpy, fmutool and VDMCheck2 report of FMUs 2.0 with one fault each.
+"""Counts the faults that fmpy, fmutool and VDMCheck2 report in FMUs 2.0 with one fault each.
 
     HUBSLOSH_KEEP_MUTANTS=target/mutants cargo test --release -p check --test all
     python3 harness/python/environment.py target/python/importers .ci/requirements-importers.txt
     target/python/importers/bin/python .ci/other_tools.py target/mutants
 
-VDMCheck2 is tried if VDMCHECK2 names its script (`VDMCheck2.sh` of a release of FMI-VDM-Model).
+VDMCheck2 runs if VDMCHECK2 is the path of its script (`VDMCheck2.sh` of a release of
+FMI-VDM-Model).
 
-Prints a table in Markdown. The tests of `check` write the FMUs and expect `check` to find each
-fault by the intended rule. A fault counts as reported if a tool reports anything: no tool reports
-anything on the faultless FMUs. A fault is in the archive (`zip`), the description (`xml`), the
-binaries as files (`bin`), or in the behaviour of the binary.
+The script prints a table in Markdown. The tests of `check` write the FMUs and require that `check`
+finds each fault by the intended rule. A fault counts as reported if a tool reports anything; no
+tool reports anything on the faultless FMUs. Faults are in the archive (`zip`), the description
+(`xml`), the files of the binaries (`bin`), or the behaviour of the binary.
 """
 
 import os
@@ -25,7 +26,7 @@ from importers import fmutool_findings
 IN_FILES = ("zip", "xml", "bin")
 
 
-def passes_fmpy(fmu: Path) -> bool:
+def fmpy_reports(fmu: Path) -> bool:
     """Return True if ``fmpy.validation.validate_fmu`` reports anything."""
     try:
         return bool(validate_fmu(str(fmu)))
@@ -33,22 +34,22 @@ def passes_fmpy(fmu: Path) -> bool:
         return True
 
 
-def passes_fmutool(fmu: Path) -> bool:
+def fmutool_reports(fmu: Path) -> bool:
     """Return True if ``fmutool -check`` reports anything."""
     return bool(fmutool_findings(fmu, 2))
 
 
-def passes_vdmcheck(fmu: Path) -> bool:
-    """Return True if VDMCheck2 reports anything, that is, prints no "No errors found."."""
+def vdmcheck_reports(fmu: Path) -> bool:
+    """Return True if VDMCheck2 reports anything, without the line "No errors found."."""
     done = subprocess.run(
         [os.environ["VDMCHECK2"], fmu.resolve()], capture_output=True, text=True, check=False
     )
     return "No errors found." not in done.stdout.splitlines()
 
 
-TOOLS = {"`fmpy validate`": passes_fmpy, "`fmutool -check`": passes_fmutool}
+TOOLS = {"`fmpy validate`": fmpy_reports, "`fmutool -check`": fmutool_reports}
 if "VDMCHECK2" in os.environ:
-    TOOLS["VDMCheck2"] = passes_vdmcheck
+    TOOLS["VDMCheck2"] = vdmcheck_reports
 
 
 def main() -> None:
@@ -62,7 +63,7 @@ def main() -> None:
     for file, name, rules in rows:
         found = {tool: of(folder / file) for tool, of in TOOLS.items()}
         if not rules:
-            assert not any(found.values()), f"{file}, {name}, is faultless: {found}"
+            assert not any(found.values()), f"a tool reports the faultless {file} ({name}): {found}"
             continue
         group = rules.split(".")[0]
         group = f"`{group}`" if group in IN_FILES else "behaviour"

@@ -1,4 +1,4 @@
-"""Pages in Debian's Chromium, driven by Playwright; ``.ci/browser`` gets both."""
+"""Access to pages in Debian's Chromium by Playwright; ``.ci/browser`` installs both."""
 
 import shutil
 import sys
@@ -11,10 +11,10 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """Yield the browser Chromium, which draws without a graphics processor."""
+    """Yield Chromium, which draws without a graphics processor."""
     program = shutil.which("chromium")
     if program is None:
-        sys.exit("no chromium: .ci/browser installs it")
+        sys.exit("error: chromium is missing: .ci/browser installs it")
     flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=flags)
@@ -25,7 +25,7 @@ def chromium() -> Iterator[Browser]:
 def open_page(browser: Browser, file: Path, width: int, scheme: str = "light", **more: str) -> Page:
     """Open a page and wait until it is drawn.
 
-    A page that fetches anything from the network is an error.
+    An error of the page or a request to the network fails.
     """
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme, **more)
     faults: list[str] = []
@@ -36,5 +36,5 @@ def open_page(browser: Browser, file: Path, width: int, scheme: str = "light", *
     )
     page.goto(file.absolute().as_uri())
     page.wait_for_function("document.documentElement.dataset.drawn === 'yes'", timeout=180_000)
-    assert not faults, f"faults or fetched: {faults[:3]}"
+    assert not faults, f"errors and requests of the page: {faults[:3]}"
     return page

@@ -1,4 +1,7 @@
-"""Compares findings of `hubslosh check` on public FMUs with the reviewed ones; see public-fmus."""
+"""Compares findings of `hubslosh check` on public FMUs with the reviewed findings.
+
+`.ci/public-fmus` describes it.
+"""
 
 import argparse
 import csv
@@ -15,18 +18,18 @@ from pathlib import Path
 
 LIST = Path("harness/check/public/fmus.csv")
 CACHE = Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "public-fmus"
-# Text of findings that depend on the load of the machine or on licences. The column of_machine also
-# names, noted by hand, findings of chance: of FMUs that write into memory that is not theirs.
+# Texts of findings that depend on the load of the machine or on licences. The column of_machine
+# names these findings and, by hand, random findings of FMUs that write into memory of others.
 OF_MACHINE = ("no end after", "license")
-# Rules that look at files alone, the same on every machine.
+# Rules that check files only, with equal findings on every machine.
 OF_FILES = ("zip.", "xml.", "bin.")
-# The record was made on this platform; on another one only the rules of files are compared.
+# True on the platform of the record; on others only the rules of files are compared.
 IS_PLATFORM = (sys.platform, platform.machine()) == ("linux", "x86_64")
 SECONDS_OF_GIT = 600
 
 
 def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file in hexadecimal digits."""
+    """Return the SHA-256 of a file as hexadecimal digits."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -44,7 +47,7 @@ def git(folder: Path, *arguments: str) -> bytes | None:
 
 
 def fetch(repository: str, rows: list[dict]) -> None:
-    """Download the FMUs of one repository into the cache, as far as the network allows."""
+    """Download the FMUs of one repository that can be reached into the cache."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         git(folder, "init", "--quiet", "--bare")
@@ -65,7 +68,7 @@ def fetch(repository: str, rows: list[dict]) -> None:
 def findings(fmu: Path) -> tuple[dict[str, set[str]], set[str]]:
     """Return the rules with errors, the rules with warnings, and the machine-dependent rules.
 
-    The findings of the last ones may differ between machines.
+    Findings of machine-dependent rules may differ between machines.
     """
     with tempfile.TemporaryDirectory() as name:
         report = Path(name) / "report.json"
@@ -138,7 +141,7 @@ def main() -> None:
     for repository, count in sorted(Counter(row["repository"] for row in absent).items()):
         print(f"unreachable: {count} FMUs of {repository}")
     if not there:
-        print("no public FMU can be reached from here: nothing was compared")
+        print("no public FMU can be reached: nothing is compared")
     else:
         print(f"{len(there)} of {len(rows)} FMUs compared, {len(differences)} differences")
         print(f"{sum(seconds) / len(seconds):.1f} s per FMU, {max(seconds):.1f} s at most")

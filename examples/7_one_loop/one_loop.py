@@ -278,7 +278,7 @@ def main() -> None:
     """Compare the hosts, then the masters."""
     parser = argparse.ArgumentParser(description="One loop in several hosts.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
-    parser.add_argument("--folder", type=Path, default=Path("dist"), help="folder with Controller.fmu")
+    parser.add_argument("--folder", type=Path, default=Path("dist"), help="Controller.fmu's folder")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     parser.add_argument("--hosts-only", action="store_true", help="compare the hosts only")
     args = parser.parse_args()
