@@ -1,8 +1,8 @@
-% HubSlosh in Simulink (R2020b or newer): a fresh model with the FMU as a Co-Simulation block, driven
+% HubSlosh in Simulink (R2020b or newer): a new model with the FMU as a Co-Simulation block, driven
 % by a sine near the slosh frequency.
 %
-% Tried in Octave: everything up to "The model". UNTRIED: the rest, written from Simulink's
-% documentation; nobody has run it. Octave has no Simulink.
+% Tried in Octave: everything up to "The model". UNTRIED: the rest, which follows Simulink's
+% documentation and has never been run, because Octave has no Simulink.
 %
 %   >> cd harness/hosts
 %   >> hubslosh_simulink                  % or first: fmu = 'path/HubSlosh.fmu';
@@ -10,7 +10,7 @@
 if ~exist('fmu', 'var')
     fmu = fullfile(pwd, '..', '..', 'dist', 'HubSlosh.fmu');
 end
-assert(exist(fmu, 'file') == 2, 'there is no %s: cargo run --release -- pack --all-platforms', fmu);
+assert(exist(fmu, 'file') == 2, '%s does not exist; create it with: cargo run --release -- pack --all-platforms', fmu);
 
 % Parameters in SI units. Simulink shows their dots as levels of a structure or as underscores; an
 % enumeration is set by the name of its item.
@@ -32,13 +32,13 @@ shown = {'omega', 'slosh_angle', 'slosh_angle_radial'};
 [known, ports] = ismember(shown, outputs);
 assert(all(known), 'outputs: %s', strjoin(outputs, ', '));
 known = ismember(letters(settings(:, 1)), letters(variables(strcmp(causality, 'parameter'))));
-assert(all(known), 'no parameter %s', strjoin(settings(~known, 1), ', '));
+assert(all(known), 'the FMU has no parameter %s', strjoin(settings(~known, 1), ', '));
 fprintf('inputs: %s\n', strjoin(inputs, ', '));
 for k = 1:numel(shown)
     fprintf('output %d: %s\n', ports(k), shown{k});
 end
 if isempty(which('new_system'))
-    fprintf('Simulink is not here: no model is built\n');
+    fprintf('Simulink is missing: no model is built\n');
     return
 end
 
@@ -50,18 +50,18 @@ end
 new_system(model);
 plant = [model '/HubSlosh'];
 add_block('simulink_extras/FMU Import/FMU', plant, 'FMUName', fmu);
-% The FMU offers both interfaces. If your release has taken Model Exchange, choose Co-Simulation in
-% the block's dialog, with 0.02 s as its step.
+% The FMU has both interfaces. If your release chooses Model Exchange, select Co-Simulation with a
+% step of 0.02 s in the block's dialog.
 
 mask = Simulink.Mask.get(plant);
 names = {mask.Parameters.Name};
 for k = 1:size(settings, 1)
     here = find(strcmp(letters(names), letters(settings{k, 1})), 1);
-    assert(~isempty(here), 'no parameter %s among: %s', settings{k, 1}, strjoin(names, ', '));
+    assert(~isempty(here), 'the block has no parameter %s among: %s', settings{k, 1}, strjoin(names, ', '));
     try
         set_param(plant, names{here}, settings{k, 2});
     catch refusal
-        % where a release takes no enumeration, slosh.kind takes the item's number
+        % if a release sets no enumerations, set slosh.kind to the item's number
         if ~strcmp(settings{k, 1}, 'slosh_model'), rethrow(refusal); end
         kind = find(strcmp(letters(names), 'sloshkind'), 1);
         set_param(plant, names{kind}, '4'); % spherical

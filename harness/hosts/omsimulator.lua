@@ -1,6 +1,6 @@
--- HubSlosh in OMSimulator 2, both interfaces: driven by a sine in Co-Simulation, released in Model
--- Exchange with CVODE. Tried with 2.1.3 on Linux; OMSimulator 3 has Python in place of Lua: see
--- omsimulator.py.
+-- HubSlosh in OMSimulator 2 with both interfaces. In Co-Simulation a sine drives it; in Model
+-- Exchange the liquid is released, with CVODE. Tried with 2.1.3 on Linux. OMSimulator 3 uses Python
+-- instead of Lua: see omsimulator.py.
 --
 --   OMSimulator harness/hosts/omsimulator.lua        (from the project's root)
 --   python harness/hosts/compare.py dist/omsimulator_cs.csv dist/HubSlosh.fmu --prefix cs.root.plant. --driven slosh.model=4 init.slosh_angle=0.3 init.omega=0.1
@@ -14,7 +14,7 @@ local function check(status)
   end
 end
 
--- A model of one system with the FMU; kind: oms_system_wc for Co-Simulation, oms_system_sc for Model Exchange.
+-- Creates a model with the FMU; kind is oms_system_wc for Co-Simulation, oms_system_sc for Model Exchange.
 local function build(model, kind, stop)
   check(oms_newModel(model))
   check(oms_addSystem(model .. ".root", kind))
@@ -40,7 +40,7 @@ build("cs", oms_system_wc, 60.0)
 check(oms_setFixedStepSize("cs.root", step))
 check(oms_instantiate("cs"))
 check(oms_initialize("cs"))
--- OMSimulator adds its steps up: asked for n * step itself, it sometimes takes one more.
+-- OMSimulator sums its steps with rounding errors: with an end of n * step it sometimes takes one step more.
 for n = 1, 60 / step do
   check(oms_setReal("cs.root.plant.tau_cmd", 0.05 * math.sin(2 * math.pi * 2.4 * (n - 1) * step)))
   check(oms_stepUntil("cs", n * step - 1e-9))

@@ -5,10 +5,10 @@ function [G, parts] = read_lft(file, delta)
 %   G = read_lft('craft.mat', delta)  A, B, C, D in a struct at values of Delta, -1 to 1 each
 %   [G, parts] = ...                  also the content of the file
 %
-% Delta is diagonal and real: parts.deltas{k} stands parts.repetition(k) times in it. In physical
-% units its parameter is parts.middle(k) + parts.radius(k)*delta(k).
-% The first form needs MATLAB's Robust Control Toolbox and is UNTRIED: nobody has run it. The second
-% is matrix arithmetic, for MATLAB and Octave.
+% Delta is diagonal and real: parts.deltas{k} occurs parts.repetition(k) times. In physical units
+% its parameter is parts.middle(k) + parts.radius(k)*delta(k).
+% The first form needs MATLAB's Robust Control Toolbox and is UNTRIED: it has never been run. The
+% second form is matrix arithmetic and works in MATLAB and Octave.
 
 parts = load(file);
 n = size(parts.A, 1);
@@ -32,7 +32,7 @@ if nargin < 2
     return
 end
 
-assert(numel(delta) == numel(counts), 'Delta has %d values, not %d', numel(counts), numel(delta));
+assert(numel(delta) == numel(counts), 'Delta has %d values, but %d are given', numel(counts), numel(delta));
 D_x = diag(repelem(delta(:), counts));
 z = 1:w;
 u = w + 1:size(parts.B, 2);

@@ -1,8 +1,8 @@
 /* Slosh bench with effects that HubSlosh does not have; foreign_plants.py compiles and calls it.
  *
  * The hub (inertia I_a, angle theta) carries the motor, the gyro and the bearing's dry friction. A second body (I_b, angle
- * phi) hangs on it by a shaft with a spring, a damper and a play. The tank is on the hub or on the second body. Linear slosh
- * is a pendulum for each mode with the angle a,
+ * phi) is connected to it by a shaft with a spring, a damper and backlash. The tank is on the hub or on the second body.
+ * Linear slosh is a pendulum for each mode with the angle a,
  *     I w' = N + r sum m (g a + 2 zeta wn l a'),   a'' = -2 zeta wn a' - g a / l - r w' / l,
  * planar and spherical slosh are the pendulum without linearisation (one mode). The fourth-order Runge-Kutta method
  * integrates; the instants at which the hub stops and breaks away are found by bisection.
@@ -15,15 +15,15 @@ enum { THETA, W, PHI, V, MODE, N = MODE + 8 };
 
 /* SI units */
 struct bench {
-    double I_a, I_b;           /* with the liquid that does not move */
+    double I_a, I_b;           /* including the rigid liquid */
     double stiffness, shaft_damping, play;
     double r, g, m[2], l[2], zeta[2];
     double b, c, d, omega_s, asymmetry;
-    double drag;               /* N.m.s2, of the rate's square */
+    double drag;               /* N.m.s2, factor of the square of the rate */
     double cable;              /* N.m/rad */
-    double imbalance;          /* N.m, times the sine of the angle */
-    double periodic;           /* part of the dry friction that follows the cosine of the angle */
-    double drift;              /* part by which the friction grows until the end */
+    double imbalance;          /* N.m, factor of the sine of the angle */
+    double periodic;           /* fraction of the dry friction that varies as the cosine of the angle */
+    double drift;              /* fraction by which the friction grows until the end */
     double zeta_amplitude;     /* growth of the damping ratio with the slosh angle, 1/rad */
     double hardening;          /* growth of the stiffness with the square of the slosh angle, 1/rad2 */
     double leak_I, leak_m, leak_l; /* relative growth of I_a, m and l until the end */
@@ -44,7 +44,7 @@ static double torque(const struct now *n, double t)
     return n->u[0] * (1 - x) * (1 - 2 * x) + n->u[1] * 4 * x * (1 - x) + n->u[2] * x * (2 * x - 1);
 }
 
-/* dry friction at a rate in the direction of sign, per N.m of its law; the law drifts and follows the angle */
+/* Returns the dry friction at a rate in the direction of sign, per N.m of its law; it drifts and varies with the angle. */
 static double grows(const struct bench *p, double t, double theta)
 {
     return (1 + p->drift * t / p->duration) * (1 + p->periodic * cos(theta));
@@ -89,7 +89,7 @@ static double slosh(const struct bench *p, double part, const double *y, double 
         double m = p->m[i] * (1 + p->leak_m * part), l = p->l[i] * (1 + p->leak_l * part), wn = sqrt(g / l);
         double a = y[2 * i], ad = y[2 * i + 1];
         double zeta = p->zeta[i] + p->zeta_amplitude * sqrt(a * a + ad * ad / (wn * wn));
-        /* the pendulum's acceleration if its hinge rests */
+        /* acceleration of the pendulum with its hinge at rest */
         dy[2 * i + 1] = -2 * zeta * wn * ad - g / l * a * (1 + p->hardening * a * a);
         all -= r * m * l * dy[2 * i + 1];
     }
@@ -102,7 +102,7 @@ static double slosh(const struct bench *p, double part, const double *y, double 
     return held ? all : wd;
 }
 
-/* Writes the derivatives; returns the torque on a hub that rests. */
+/* Writes the derivatives; returns the torque on the hub at rest. */
 static double rates(const struct now *n, double t, const double *y, double *dy)
 {
     const struct bench *p = n->p;
@@ -147,7 +147,7 @@ static void advance(const struct now *n, double t, double h, const double *from,
     for (int i = 0; i < N; i++) to[i] = from[i] + h / 6 * (k[0][i] + 2 * k[1][i] + 2 * k[2][i] + k[3][i]);
 }
 
-/* Returns true if the contact of the hub changes before this state. */
+/* Returns true if the hub stops or breaks away before this state. */
 static int changes(const struct now *n, double t, const double *y)
 {
     double dy[N];
@@ -174,7 +174,7 @@ int simulate(const struct bench *p, long steps, const double *begin, const doubl
             }
             double h = end - t;
             advance(&n, t, h, y, next);
-            /* a hub that creeps back and forth within one step goes on as it is */
+            /* a hub that stops and breaks away many times within one step keeps its contact until the end of the step */
             if (tries < 50 && changes(&n, end, next)) {
                 double low = 0, high = h;
                 for (int i = 0; i < 45; i++) {

@@ -1,10 +1,10 @@
-/* The host under which step_cost.py counts instructions: STEPS communication steps of H seconds of any FMU 2.0.
+/* Host in which step_cost.py counts instructions: it makes STEPS communication steps of H seconds with any FMU 2.0.
  *
  *   step_cost LIBRARY GUID TOLERANCE STEPS H W0 W1 LONG [r REFERENCE VALUE | i REFERENCE VALUE | u REFERENCE SIZE]...
  *
- * Sets reals (r) and integers (i) before the start. Inputs (u) swing with SIZE in straight lines between communication
- * points, at an angular frequency that goes from W0 to W1, rad/s. With LONG > 0 a last step of LONG seconds follows,
- * whose status may be anything: a bounded FMU refuses it. */
+ * Sets reals (r) and integers (i) before the start. Inputs (u) oscillate with the amplitude SIZE, linearly between communication
+ * points, at an angular frequency that changes from W0 to W1, rad/s. With LONG > 0 a last step of LONG seconds follows.
+ * Its status is not checked, because an FMU with bounded steps rejects it. */
 #include <dlfcn.h>
 #include <math.h>
 #include <stdio.h>
