@@ -481,7 +481,7 @@ def main() -> None:
                 assert page.evaluate("document.documentElement.scrollWidth") <= width
                 contrast.demand(page, arguments.axe, f"{case.name}, {scheme}, {width} px")
                 if width == 400:
-                    # On a wide screen the legend is beside the picture.
+                    # On a wide screen the legend must not cover the letters of the axes.
                     hidden = page.evaluate(HIDDEN)
                     assert not hidden, f"{case.name}: the legend lies over {hidden}"
                 page.wait_for_timeout(300)

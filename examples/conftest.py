@@ -1,4 +1,6 @@
-"""Fixtures of the tests of the examples: packed FMUs. To run the tests by hand:
+"""Fixtures of the tests of the examples: packed FMUs.
+
+Run the tests by hand with:
 
     cargo run --release -- pack
     cargo run --release -p one-loop -- dist/HubSlosh.fmu dist

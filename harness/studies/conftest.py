@@ -1,4 +1,6 @@
-"""Fixtures of the tests of the studies: packed FMUs and the program. To run the tests by hand:
+"""Fixtures of the tests of the studies: packed FMUs and the program.
+
+Run the tests by hand with:
 
     for model in HubSlosh Spacecraft SloshTank; do
         cargo run --release -- pack --model $model --out dist/$model.fmu

@@ -33,9 +33,9 @@ from .quantities import (
     Modes,
     full_names,
     mode_quantity,
-    slosh_mass_error,
     nominal_value,
     short_name,
+    slosh_mass_error,
 )
 from .requirements import Requirement, judged, requirements_of
 from .review_point import Point, Vector

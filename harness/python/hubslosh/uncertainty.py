@@ -70,7 +70,7 @@ from .loop import Loop
 from .operating_point import warn_of_attitude, warn_of_rotation
 from .plant import Plant
 from .progress import Progress
-from .quantities import KINDS, TURN, full_name, slosh_mass_error, rigid_rest, short_name
+from .quantities import KINDS, TURN, full_name, rigid_rest, short_name, slosh_mass_error
 from .short import names
 from .simulation import parameters_of
 from .stability import minimal

@@ -1,4 +1,6 @@
-r"""Fixtures of all tests, such as the packed FMU. To run the tests by hand:
+r"""Fixtures of all tests, such as the packed FMU.
+
+Run the tests by hand with:
 
     cargo run --release -- pack
     cargo run --release -- pack --python

@@ -66,7 +66,7 @@ def not_called(values: dict) -> dict[str, float]:
 
 
 def test_a_resumed_study_returns_every_value_with_its_type(tmp_path: Path) -> None:
-    """This includes rows that an earlier call with fewer runs has stored."""
+    """Rows stored by an earlier call with fewer runs are included."""
     whole = study(None)
     study(tmp_path, 17)
     resumed = study(tmp_path)
