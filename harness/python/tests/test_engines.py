@@ -116,7 +116,7 @@ def test_errors_name_each_wrong_engine_and_pulse(craft: Craft) -> None:
         ("roll", (0, 1, 2)): "pulses must be",
         ("roll", ((0.2, 0.1),)): "must end after it starts",
         ("roll", ((0.1, 0.3), (0.2, 0.4))): "must not overlap",
-        ("roll", ((0.1, 3),)): "from 0 to stop = 1 s",
+        ("roll", ((0.1, 3),)): "between 0 and stop = 1 s",
     }.items():
         given = dict([firing]) if isinstance(firing, tuple) else firing
         with pytest.raises(FmuError, match=text):

@@ -72,7 +72,7 @@ def test_a_torque_that_is_not_a_number_is_refused(fmu: Path) -> None:
 
 def test_a_missing_fmu_raises_an_error_with_the_command_that_builds_it(tmp_path: Path) -> None:
     """The message contains the command that builds the FMU."""
-    with pytest.raises(FmuError, match="pack makes it"):
+    with pytest.raises(FmuError, match="pack builds it"):
         Plant(tmp_path / "none.fmu")
 
 

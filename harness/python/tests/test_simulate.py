@@ -227,7 +227,7 @@ def test_an_unknown_model_raises_an_error_with_suggestions(tmp_path: Path) -> No
     """An FMU is opened by name and by file; a file that is not an FMU is refused."""
     with pytest.raises(FmuError, match='no FMU "HubSlush" here'):
         simulate("HubSlush")
-    with pytest.raises(FmuError, match="pack makes it"):
+    with pytest.raises(FmuError, match="pack builds it"):
         simulate(tmp_path / "none.fmu")
     (tmp_path / "text.fmu").write_text("no zip")
     with pytest.raises(FmuError, match="is not an FMU: the file is not a zip archive"):
