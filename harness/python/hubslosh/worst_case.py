@@ -28,6 +28,8 @@ SMALLEST = 0.25  # Smallest step of the search, in units in which the range of a
 
 ASIDE = 0.01  # Relative distance of the simulated gains from the gain margin, on both sides
 
+STEPS = 11  # Number of gains, from the margin to a simulated gain, at which the critical pole is followed
+
 RATE = 1e-8  # Disturbance at the start of a simulation: angular velocity about each axis, rad/s
 
 GROWTH = 9.0  # Logarithm of the largest growth in a simulation, so that motions stay small
@@ -176,14 +178,18 @@ def confirm(point: "Point") -> Confirmation:
     the prediction.
     """
     rows = point.margins.crossings.query("crossing == 'phase' and frequency > 0")
-    if not point.margins.stable or rows.empty:  # there is no gain margin
+    gain, T = point.loop.gain(), point.loop.period
+    if not point.margins.stable or rows.empty:  # there is no gain margin: compare the slowest pole
         command, factor, factors = None, 1.0, [1.0]
+        criticals = [_critical(gain)]
     else:
         row = rows.loc[rows["gain_margin"].abs().idxmin()]
         command, factor = str(row["loop"]), float(10 ** (row["gain_margin"] / 20))
         factors = [factor * (1 - ASIDE), factor * (1 + ASIDE)]
+        at_limit = np.exp(2j * np.pi * row["frequency"] * T)
+        criticals = [_followed(gain, command, at_limit, (factor, end)) for end in factors]
     with ThreadPoolExecutor() as pool:
-        found = list(pool.map(lambda scale: _compare(point, command, scale), factors))
+        found = list(pool.map(lambda *of: _compare(point, gain, command, *of), factors, criticals))
     runs = {scale: run for scale, (run, _, _) in zip(factors, found, strict=True)}
     expected, simulated = ([row[i] for row in found] for i in (1, 2))
     if command is None:
@@ -201,24 +207,21 @@ def confirm(point: "Point") -> Confirmation:
     )  # fmt: skip
 
 
-def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, complex, complex]:
-    """Simulate a point with a factor of one command's gain.
+def _compare(
+    point: "Point", gain: LinearModel, command: str | None, factor: float, critical: complex
+) -> tuple[Run, complex, complex]:
+    """Return a run, and the predicted and the simulated pole that decides stability (1/s).
 
-    Return the run, and the predicted and the simulated pole that decides stability, 1/s.
+    ``gain`` is the loop gain of the point, and ``critical`` the predicted pole in the z plane with
+    the gain of ``command`` multiplied by ``factor``.
     """
-    loop = point.loop
-    _, commands = loop.names
+    loop, T = point.loop, point.loop.period
     law = loop.linear()
     assert law is not None
     if command is not None:
-        scale = np.ones((len(commands), 1))
-        scale[commands.index(command)] = factor
-        law = replace(law, C=scale * law.C, D=scale * law.D)
-    loop = replace(loop, controller=law)
-    gain, T = loop.gain(), loop.period
+        gain, law = (_scaled(of, gain.inputs.index(command), factor) for of in (gain, law))
+        loop = replace(loop, controller=law)
     poles = _closed(gain)
-    neutral = _is_neutral(gain, poles)
-    critical = _critical(poles if neutral.all() else poles[~neutral], at_limit=command is not None)
     s = np.log(critical) / T
     times = [1 / max(abs(s.real), 1e-9)]
     times += [20 * 2 * np.pi / abs(s.imag)] if s.imag else []
@@ -256,14 +259,39 @@ def _showing(gain: LinearModel, pole: complex) -> list[str]:
     return [name for name, size in zip(gain.inputs, share, strict=True) if size >= share.max() / 3]
 
 
-def _critical(poles: NDArray[np.complex128], *, at_limit: bool) -> complex:
-    """Return the pole of a closed loop that grows fastest or decays slowest (z plane).
+def _scaled(model: LinearModel, output: int, factor: float) -> LinearModel:
+    """Return a model with one of its outputs multiplied by a factor."""
+    scale = np.ones((len(model.D), 1))
+    scale[output] = factor
+    return replace(model, C=scale * model.C, D=scale * model.D)
 
-    At a gain margin (``at_limit``) and in a stable loop, only oscillating poles are considered if
-    the loop has any. A negative real pole oscillates at half the sampling rate.
+
+def _followed(
+    gain: LinearModel, command: str, pole: complex, factors: tuple[float, float]
+) -> complex:
+    """Return the pole of the closed loop (z plane) into which ``pole`` moves with a gain.
+
+    The gain of one command is multiplied by the first, and in small steps up to the second of
+    ``factors``. The pole that decides stability at the first need not be the slowest at the second:
+    a slosh mode with little damping may decay more slowly.
     """
+    for factor in np.linspace(*factors, STEPS):
+        poles = _closed(_scaled(gain, gain.inputs.index(command), factor))
+        pole = complex(poles[np.argmin(np.abs(poles - pole))])
+    return pole
+
+
+def _critical(gain: LinearModel) -> complex:
+    """Return the pole of a closed loop that grows fastest, or decays slowest (z plane).
+
+    In a stable loop it is an oscillating pole, if the loop has one; a negative pole oscillates with
+    half the sampling rate. Neutral poles do not count, unless all poles are neutral.
+    """
+    poles = _closed(gain)
+    neutral = _is_neutral(gain, poles)
+    poles = poles if neutral.all() else poles[~neutral]
     moving = poles[(poles.imag > 0) | (poles.real < 0) & (poles.imag == 0)]
-    unstable = np.abs(poles).max() >= 1 and not at_limit
+    unstable = np.abs(poles).max() >= 1
     chosen = poles[poles.imag >= 0] if unstable or not len(moving) else moving
     return complex(chosen[np.argmax(np.abs(chosen))])
 

@@ -193,6 +193,39 @@ def test_the_search_finds_the_worst_corner_of_the_ranges(craft: Craft) -> None:
     assert found.confirmation.simulated_factor == pytest.approx(found.confirmation.factor, rel=0.01)
 
 
+@pytest.mark.parametrize(("delay", "mass"), [(0.03, 2.0), (0.03, 0.2), (0.06, 0.2)])
+def test_the_simulation_confirms_a_limit_that_is_not_the_slowest_pole(
+    craft: Craft, delay: float, mass: float
+) -> None:
+    """A lander with an array at 3 Hz, with the gain at which its array or the delay is critical.
+
+    1 % below this gain the slosh, whose damping is 0.1 %, still decays more slowly.
+    """
+    tank = replace(craft.tanks["ox"], position=(0.8, 0, 0.3))
+    tanks = {"ox": tank, "fuel": replace(tank, position=(-0.8, 0, 0.3))}
+    arm, inertia = 1.2, 2 * mass
+    participation = np.array([0, 0, mass * arm, inertia, 0, 0]) / np.sqrt(inertia)
+    array = hubslosh.Appendage((0, 1.0, 0.8), 3.0, participation)
+    lander = Craft(
+        1500, (900, 850, 800), (0, 0, 0.9), tanks, 5000.0, appendages={"array": array},
+        model=craft.model,
+    )  # fmt: skip
+    # 2 kp and kd give 0.2 Hz with a damping ratio of 0.7; each signal has a filter at 5 Hz
+    law = gains(0.5 * 1.58 * 1500, 1.76 * 1500)
+    w = 2 * np.pi * 5
+    law = hubslosh.LinearModel(-w * np.eye(6), w * np.eye(6), law, np.zeros((3, 6)), (), (), ())
+    fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal", "draws": 0}
+    found = lander.review(law, PERIOD, ["50%"], delay=delay, **fixed)
+    rows = found.worst.margins.crossings.dropna(subset="gain_margin")
+    row = rows.loc[rows["gain_margin"].abs().idxmin()]
+    compared = found.confirmation
+    assert compared.agrees, compared.summary
+    assert compared.command == row["loop"]
+    assert compared.frequency == pytest.approx(row["frequency"], rel=1e-3)
+    assert compared.simulated_frequency == pytest.approx(row["frequency"], rel=1e-3)
+    assert compared.simulated_factor == pytest.approx(compared.factor, rel=1e-3)
+
+
 def test_the_confirmation_reports_a_simulation_that_leaves_the_range_of_its_model(
     craft: Craft,
 ) -> None:
