@@ -217,26 +217,15 @@ class Loop:
         """Return the units of the wheels' torques and speeds, which are not in the FMU."""
         return units_of(torque_names(self.wheels))
 
-    def _without_wheels(self) -> "Loop":
-        """Return an equivalent loop without wheels, whose controller commands the craft's torque.
-
-        It has the same margins if the craft does not turn at the operating point.
-        """
-        turned, K = self._turned, self.linear()
-        if not turned or K is None:
-            return self
-        commands = self.names[1]
-        plain = [name for name in commands if name not in turned]
-        new = [*plain, *(name for name in BODY_TORQUE if name not in plain)]
-        new.sort(key=Fmu.open(self.model).names("input").index)
-        share = np.zeros((len(new), len(commands)))
-        for j, name in enumerate(commands):
-            if name in turned:
-                share[[new.index(axis) for axis in BODY_TORQUE], j] = turned[name].direction
-            else:
-                share[new.index(name), j] = 1.0
-        K = replace(K, C=share @ K.C, D=share @ K.D, outputs=tuple(new) if K.outputs else ())
-        return replace(self, controller=K, command=new, wheels={})
+    @property
+    def _acting_inputs(self) -> list[str]:
+        """Inputs of the FMU on which the commands act: a wheel acts as a torque on the craft."""
+        turned, commands = self._turned, self.names[1]
+        if not turned:
+            return commands
+        inputs = [name for name in commands if name not in turned]
+        inputs += [name for name in BODY_TORQUE if name not in inputs]
+        return sorted(inputs, key=Fmu.open(self.model).names("input").index)
 
     def linear(self) -> LinearModel | None:
         """Return the controller as a sampled linear model.
@@ -314,9 +303,21 @@ class Loop:
         plain = [name for name in command if name not in turned]
         inputs = list(dict.fromkeys([*plain, *BODY_TORQUE, *MOMENTUM]))
         model = linearize(self.model, every, inputs, measured, all_states=all_states)
-        torque, h = ([inputs.index(name) for name in names] for names in (BODY_TORQUE, MOMENTUM))
-        # in a craft that turns, the momentum of a wheel causes a gyroscopic torque, so that the
-        # speed of the wheel is a further state
+        return self._with_wheels(model, command, all_states=all_states)
+
+    def _with_wheels(
+        self, model: LinearModel, inputs: list[str], *, all_states: bool = False
+    ) -> LinearModel:
+        """Return a model whose inputs are ``inputs``, with torques of the wheels among them.
+
+        The other ``inputs`` are inputs of ``model``, which also has the inputs torque and h_wheels.
+        The momentum of a wheel acts in a craft that turns, so that its speed is then a further
+        state.
+        """
+        turned = self._turned
+        torque, h = (
+            [model.inputs.index(name) for name in names] for names in (BODY_TORQUE, MOMENTUM)
+        )
         speeds, by_speed = [], []
         for name, wheel in turned.items():
             column = np.vstack([model.B, model.D])[:, h] @ wheel.direction * wheel.inertia
@@ -324,10 +325,10 @@ class Loop:
                 speeds.append(name)
                 by_speed.append(column)
         n, m = len(model.A), len(speeds)
-        B, D = np.zeros((n + m, len(command))), np.zeros((len(model.C), len(command)))
-        for j, name in enumerate(command):
+        B, D = np.zeros((n + m, len(inputs))), np.zeros((len(model.C), len(inputs)))
+        for j, name in enumerate(inputs):
             if name not in turned:
-                B[:n, j], D[:, j] = (of[:, inputs.index(name)] for of in (model.B, model.D))
+                B[:n, j], D[:, j] = (of[:, model.inputs.index(name)] for of in (model.B, model.D))
                 continue
             B[:n, j], D[:, j] = (
                 of[:, torque] @ turned[name].direction for of in (model.B, model.D)
@@ -339,7 +340,7 @@ class Loop:
         for k, column in enumerate(by_speed, n):
             A[:n, k], C[:, k] = column[:n], column[n:]
         states = (*model.states, *map(speed_name, speeds))
-        return LinearModel(A, B, C, D, states, tuple(command), model.outputs)
+        return LinearModel(A, B, C, D, states, tuple(inputs), model.outputs)
 
     def gain(self, parameters: Parameters | None = None, *, more_delay: float = 0.0) -> LinearModel:
         """Return the loop gain L, opened at the commands; the closed loop satisfies u = -L u.

@@ -47,7 +47,7 @@ its controllable and observable part, which does not change the model.
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,6 +74,7 @@ from .quantities import KINDS, TURN, full_name, rigid_rest, short_name, slosh_ma
 from .short import names
 from .simulation import parameters_of
 from .stability import minimal
+from .wheels import MOMENTUM, TORQUE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -964,27 +965,29 @@ class UncertainModel:
             }  # fmt: skip
         return new
 
-    def _controller(self, loop: Loop) -> LinearModel:
-        """Return the controller of a loop, or raise FmuError if the loop does not fit the model."""
-        loop._must_be_linear()
-        if loop._turned and self._craft.omega.any():
+    def _around(self, loop: Loop) -> tuple["UncertainModel", LinearModel]:
+        """Return this model with the commands of a loop as inputs, and the loop's controller.
+
+        A wheel's torque T acts on the craft, and its momentum h by the torque -w × h, with h' = -T.
+        Raises FmuError if the loop does not fit the model.
+        """
+        K, M, width = loop._must_be_linear(), self.M, self.order
+        measured, inputs = loop.names[0], loop._acting_inputs
+        if (measured, inputs) != (list(M.outputs[width:]), list(M.inputs[width:])):
+            wanted = repr(inputs) if loop._turned else "loop.names[1]"
             raise FmuError(
-                "in a craft that spins, the momentum that wheels gain turns with the craft, which "
-                "the uncertain model does not include: use torque as the command of the loop"
+                f"the loop measures {', '.join(measured)} and commands {', '.join(inputs)}, but "
+                f"the outputs of the uncertain model are {', '.join(M.outputs[width:])}, and its "
+                f"inputs {', '.join(M.inputs[width:])}. They must be the same in the same order: "
+                f"create the model with uncertain(…, inputs={wanted}, outputs=loop.names[0])"
             )
-        given, loop = loop, loop._without_wheels()
-        K = loop._must_be_linear()
-        measured, commands = loop.names
-        outputs, inputs = self.M.outputs[self.order :], self.M.inputs[self.order :]
-        if (measured, commands) != (list(outputs), list(inputs)):
-            wanted = "loop.names[1]" if given is loop else repr(commands)
-            raise FmuError(
-                f"the loop measures {', '.join(measured)} and commands {', '.join(commands)}, but "
-                f"the outputs of the uncertain model are {', '.join(outputs)}, and its inputs "
-                f"{', '.join(inputs)}. They must be the same in the same order: create the model "
-                f"with uncertain(…, inputs={wanted}, outputs=loop.names[0])"
-            )
-        return K
+        if not loop._turned:
+            return self, K
+        torque = [M.inputs.index(name) for name in TORQUE]
+        B, D = (np.hstack([of, of[:, torque] @ -_cross(self._craft.omega)]) for of in (M.B, M.D))
+        M = replace(M, B=B, D=D, inputs=(*M.inputs, *MOMENTUM))
+        M = loop._with_wheels(M, [*M.inputs[:width], *loop.names[1]])
+        return replace(self, M=M), K
 
     def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return the response N of the closed loop from the outputs to the inputs of Δ.
@@ -997,6 +1000,8 @@ class UncertainModel:
         ----------
         loop : Loop
             Loop with a linear controller that measures the model's outputs and commands its inputs.
+            A model with the three components of torque among its inputs also takes a loop that
+            commands wheels; the momentum that they gain is included.
         frequency : array_like, shape (n,)
             Frequencies, Hz, above 0 and below half the sampling rate.
 
@@ -1010,14 +1015,14 @@ class UncertainModel:
         FmuError
             If the loop does not fit the model.
         """
-        K = self._controller(loop)
+        model, K = self._around(loop)
         f = np.atleast_1d(floats(frequency))
         w = TURN * f
         late = loop.delay + loop.latency * loop.period
         hold = np.sinc(w * loop.period / TURN) * np.exp(-1j * w * (loop.period / 2 + late))
         gains = K.response(f) * hold[:, None, None]
-        n, P = self.order, self.M.response(f)
-        gain = loop._gain(self.at(np.zeros(len(self.counts))), K)
+        n, P = model.order, model.M.response(f)
+        gain = loop._gain(model.at(np.zeros(len(self.counts))), K)
         across = np.eye(gains.shape[1]) + gain.response(f)
         found: NDArray[np.complex128] = P[:, :n, :n] - P[:, :n, n:] @ np.linalg.solve(
             across, gains @ P[:, n:, :n]
@@ -1105,8 +1110,8 @@ class UncertainModel:
         check_ranges(most=most)
         if not gap > 1:
             raise FmuError(f"gap = {gap!r} must be above 1, such as 1.05")
-        K, least = self._controller(loop), self._least
-        delta_search = DeltaSearch(self, loop, K, progress)
+        (model, K), least = self._around(loop), self._least
+        delta_search = DeltaSearch(model, loop, K, progress)
         search = Search(
             lambda f: self.closed(loop, f), delta_search.poles, self.counts, loop.period, progress
         )
@@ -1139,7 +1144,7 @@ class UncertainModel:
                     solved += search.scalings.solved
                 break
             if size:
-                data |= self._checked(loop, K) | {"size": np.array(size)}
+                data |= model._checked(loop, K) | {"size": np.array(size)}
                 break
         ends = {name: float(x) for name, x in zip(self.deltas, least, strict=True)
                 if np.isfinite(x)}  # fmt: skip
@@ -1201,7 +1206,8 @@ class UncertainModel:
             range.
         """
         check_ranges(largest=largest)
-        return DeltaSearch(self, loop, self._controller(loop), progress).worst(largest)
+        model, K = self._around(loop)
+        return DeltaSearch(model, loop, K, progress).worst(largest)
 
     def _of_kind(self, kind: str) -> list[int]:
         """Return the indices of the δ of one kind of quantity, such as "zeta"."""

@@ -9,7 +9,16 @@ from scipy.optimize import brentq
 from test_uncertain import MEASURED, POINT, RANGES, TORQUE, difference
 
 import hubslosh
-from hubslosh import Craft, FmuError, FmuWarning, Loop, MountedTank, UncertainModel, uncertain
+from hubslosh import (
+    Craft,
+    FmuError,
+    FmuWarning,
+    Loop,
+    MountedTank,
+    UncertainModel,
+    Wheel,
+    uncertain,
+)
 
 CYLINDER = {"density": 1000, "shape": {"cylinder": {"radius": 0.3, "height": 0.6}}}
 RATES = [f"omega[{i}]" for i in (1, 2, 3)]
@@ -175,14 +184,69 @@ def test_the_worst_case_of_a_spinner_with_slosh_is_the_limit_of_a_new_loop(spinn
     assert 0 < found.size <= worst.size < 1.05 * found.size
 
 
-def test_wheels_of_a_spinner_are_refused(spinner: Craft) -> None:
-    """The momentum of the wheels would be a further state of the uncertain model."""
-    wheels = {"x": hubslosh.Wheel((1, 0, 0), 0.02, 0.2, 300)}
-    wheeled = replace(spinner, wheels=wheels)
-    loop = wheeled.loop(np.ones((1, 3)), 0.1, "50%", measured="omega", command="wheels")
-    model = wheeled.uncertain("50%", {"craft.Jxx": "5%"}, outputs=RATES)
-    with pytest.raises(FmuError, match=r"momentum that wheels gain .* torque as the command"):
+WHEELS = {
+    "a": Wheel((1, 0, 0.3), 0.5, 5, 3000), "b": Wheel((-0.2, 1, 0), 0.4, 5, 3000),
+    "c": Wheel((0, 0.1, 1), 0.3, 5, 3000),
+}  # fmt: skip
+"""Three wheels; the third is nearly along the spin of the craft."""
+
+
+def test_every_draw_has_the_momentum_that_wheels_gain(spacecraft: Path) -> None:
+    """Vertices and interior points agree with the model of a new loop, and the loops with it."""
+    ranges = RANGES | {"appendage[1].frequency": "10%", "appendage[1].zeta": "50%"}
+    point = TUMBLING | {"h_wheels[1]": 7.0, "h_wheels[2]": -4.0, "h_wheels[3]": 25.0}
+    commands = ["b.torque", "force[2]", "c.torque", "a.torque"]
+    gains = np.random.default_rng(2).normal(0, 100, (4, 3))
+    loop = Loop(gains, 0.1, spacecraft, point, RATES, commands, delay=0.07, wheels=WHEELS)
+    model = uncertain(point, ranges, outputs=RATES, model=spacecraft)
+    with pytest.raises(FmuError, match=r"inputs=\['force\[2\]', 'torque\[1\]', .*, outputs="):
         model.worst_case(loop)
+    model = uncertain(point, ranges, ["force[2]", *TORQUE], RATES, model=spacecraft)
+    mine, controller = model._around(loop)
+    assert mine.M.states[-3:] == ("a.speed", "b.speed", "c.speed")
+    random, count = np.random.default_rng(3), len(ranges)
+    f = np.geomspace(0.01, 4.9, 40)
+    for delta in [*random.choice([-1.0, 1.0], (10, count)), *random.uniform(-1, 1, (10, count))]:
+        new = replace(loop, parameters=model.parameters(delta))
+        theirs = new.plant()
+        kept = [theirs.states.index(state) for state in mine.M.states]
+        matrices = theirs.A[np.ix_(kept, kept)], theirs.B[kept], theirs.C[:, kept], theirs.D
+        for a, b in zip(mine.at(delta), matrices, strict=True):
+            assert np.abs(a - b).max() <= 1e-11 * np.abs(b).max()
+        a, b = loop._gain(mine.at(delta), controller).response(f), new.gain().response(f)
+        assert np.abs(a - b).max() < 1e-8 * np.abs(b).max()
+
+
+def test_the_worst_case_of_wheels_on_a_spinner_is_its_total_momentum(spinner: Craft) -> None:
+    """Wheels across the spin damp the rates of a craft only if its momentum is against the spin.
+
+    Without an external torque the momentum about the centre of mass is J s + h along the spin s,
+    and k feeds the rates across back to the wheels. These turn with the momentum h_E = h_1 + j h_2:
+    (I/k) h_E'' + [1 + j (I s - J s - h)/k] h_E' + j s h_E = 0, which is at the limit of stability
+    with h_E' = -j s h_E where J s + h = 0. A delay turns k by a phase, which does not move it.
+    """
+    s, along, h, k = 0.7, 520.0, -480.0, 150.0
+    wheels = {"x": Wheel((1, 0, 0), 0.5, 5, 3000), "y": Wheel((0, 1, 0), 0.5, 5, 3000)}
+    wheels["z"] = Wheel((0, 0, 1), 0.5, 5, 3000, speed=h / 0.5)
+    dry = Craft(900, [400, 400, along], spin=s, wheels=wheels, model=spinner.model)
+    loop = dry.loop(k * np.eye(3), 0.1, 0, measured="omega", command="wheels", delay=0.05)
+    model = dry.uncertain(0, {"craft.Jzz": "10%"}, outputs=RATES)
+    worst = model.worst_case(loop, largest=10)
+    assert model.values(worst.delta)["craft.Jzz"] == pytest.approx(-h / s, rel=1e-3)
+    assert worst.frequency == pytest.approx(s / (2 * np.pi), rel=1e-3)
+    # with slosh, and the same wheels on a craft of another kind
+    full = replace(spinner, wheels=wheels | {"z": replace(wheels["z"], speed=-600 / 0.5)})
+    loop = full.loop(k * np.eye(3), 0.1, "50%", measured="omega", command="wheels", delay=0.05)
+    names = ("left.frequency[1]", "right.bob[1]", "craft.Jzz")
+    model = full.uncertain("50%", {name: NAMED[name] for name in names}, outputs=RATES)
+    worst = model.worst_case(loop, largest=20)
+    assert worst.delta
+    for share, stable in ((0.999, True), (1.001, False)):
+        delta = np.maximum(share * model.delta(worst.delta), model._least)
+        new = replace(loop, parameters=model.parameters(delta))
+        assert hubslosh.margins(new).stable is stable
+    found = model.certify(loop, largest=20, worst=worst)
+    assert 0 < found.size <= worst.size < 1.05 * found.size
 
 
 def test_a_spin_of_the_craft_or_of_a_tank_applies_to_the_craft_and_all_liquids(
