@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from .certificate import WorstCase, corners
 from .fmu import FmuError
-from .linearization import LinearModel, exponential
+from .linearization import LinearModel
 from .progress import Line, Progress
-from .stability import _is_neutral, _may_be_neutral
+from .stability import _closed_matrix, _is_neutral, _may_be_neutral
 
 if TYPE_CHECKING:
     from .loop import Loop
@@ -60,45 +60,6 @@ class DeltaSearch:
         self.states = len(loop._gain(model.at(np.zeros(len(model.counts))), K).A)
         self.line = Line(progress)
 
-    def matrices(self, deltas: Matrix) -> Matrix:
-        """Return the closed loop's state matrix for each Δ; NaN if no craft has this Δ."""
-        model, loop, K = self.model, self.loop, self.K
-        width, (A, B, C, D) = model.order, model.M
-        n, m = len(A), B.shape[1] - width
-        D_x = np.repeat(deltas, model.counts, axis=1)
-        seen = np.hstack([C[:width], D[:width, width:]])
-        closing = np.linalg.solve(
-            np.eye(width) - D[:width, :width] * D_x[:, None, :],
-            np.broadcast_to(seen, (len(deltas), *seen.shape)),
-        )
-        whole = np.block([[A, B[:, width:]], [C[width:], D[width:, width:]]])
-        every = whole + np.vstack([B[:, :width], D[width:, :width]]) @ (D_x[:, :, None] * closing)
-        plant = np.zeros((len(deltas), n + m, n + m))
-        plant[:, :n] = every[:, :n]
-        cycles, rest = loop.whole_delay
-        full = exponential(plant * loop.period)
-        late = exponential(plant * (loop.period - rest))[:, :n, n:] if rest else full[:, :n, n:]
-        # states: states of the craft; delayed commands, oldest first; states of the controller
-        k, way = len(K.A), m * (cycles + 1)
-        found = np.zeros((len(deltas), n + way + k, n + way + k))
-        found[:, :n, :n] = full[:, :n, :n]
-        found[:, :n, n : n + m] = full[:, :n, n:] - late
-        seen = np.zeros((len(deltas), len(C) - width, n + way))
-        seen[:, :, :n], seen[:, :, n : n + m] = every[:, n:, :n], every[:, n:, n:]
-        found[:, n + way :, : n + way] = K.B @ seen
-        found[:, n + way :, n + way :] = K.A
-        new = np.concatenate(
-            [-K.D @ seen, np.broadcast_to(-K.C, (len(deltas), *K.C.shape))], axis=2
-        )
-        # the new command is appended to the delayed commands; without delay it acts at once
-        if cycles:
-            found[:, :n, n + m : n + 2 * m] += late
-            found[:, n : n + way - m, n + m : n + way] = np.eye(way - m)
-        else:
-            found[:, :n] += late @ new
-        found[:, n + way - m : n + way] = new
-        return found
-
     def poles(self, deltas: Matrix) -> Complex:
         """Return the poles of the closed loop for each Δ; a neutral pole is replaced by 0.
 
@@ -110,15 +71,12 @@ class DeltaSearch:
     def _poles(self, deltas: Matrix) -> Complex:
         try:
             with np.errstate(all="ignore"):
-                matrices = self.matrices(deltas)
-        except np.linalg.LinAlgError:
+                matrices = _closed_matrix(self.loop._gain(self.model._plants(deltas), self.K))
+                found = np.linalg.eigvals(matrices).astype(complex)
+        except (FmuError, np.linalg.LinAlgError):
             if len(deltas) > 1:
                 return np.concatenate([self._poles(delta[None]) for delta in deltas])
             return np.full((1, self.states), np.nan, complex)
-        gone = ~np.isfinite(matrices).all(axis=(1, 2))
-        matrices[gone] = 0.0
-        found = np.linalg.eigvals(matrices).astype(complex)
-        found[gone] = np.nan
         for k in np.flatnonzero(_may_be_neutral(matrices, found, self.loop.period)):
             gain = self.loop._gain(self.model.at(deltas[k]), self.K)
             found[k, _is_neutral(gain, found[k])] = 0.0

@@ -165,11 +165,11 @@ class LinearModel:
 
     def _then(self, other: "LinearModel", prefix: str) -> "LinearModel":
         """Return this model in series with ``other``; names of its states begin with ``prefix``."""
-        n, m = len(self.A), len(other.A)
+        nothing = np.zeros((self.A.shape[-1], len(other.A)))
         return LinearModel(
-            np.block([[self.A, np.zeros((n, m))], [other.B @ self.C, other.A]]),
-            np.vstack([self.B, other.B @ self.D]),
-            np.hstack([other.D @ self.C, other.C]),
+            _block([[self.A, nothing], [other.B @ self.C, other.A]]),
+            _block([[self.B], [other.B @ self.D]]),
+            _block([[other.D @ self.C, other.C]]),
             other.D @ self.D,
             (*self.states, *(f"{prefix}{name}" for name in other.states)),
             self.inputs,
@@ -242,7 +242,7 @@ class LinearModel:
         depends directly on an input has the value just before a new command acts, because this is
         what the controller measures.
         """
-        n, m = self.B.shape
+        n, m = self.B.shape[-2:]
         _check_states(n + m * (cycles + 1), cycles, period)
         (step, full), (_, later) = _held(self, period), _held(self, period - rest)
         if not np.isfinite(step).all():
@@ -252,16 +252,16 @@ class LinearModel:
                 f"{fastest:.3g} 1/s"
             )
         on_the_way = m * (cycles + 1)  # delayed commands, oldest first: it acts in this cycle
-        A, B = np.zeros((n + on_the_way, n + on_the_way)), np.zeros((n + on_the_way, m))
-        A[:n, :n], A[:n, n : n + m] = step, full - later
-        effect = np.hstack([A, B])  # the new input comes after the delayed commands
-        effect[:n, n + m : n + 2 * m] = later
-        effect[n:, n + m :] = np.eye(on_the_way)
-        C = np.hstack([self.C, self.D, np.zeros((len(self.C), m * cycles))])
+        # the new input comes after the delayed commands
+        effect = np.zeros((*self.A.shape[:-2], n + on_the_way, n + on_the_way + m))
+        effect[..., :n, :n], effect[..., :n, n : n + m] = step, full - later
+        effect[..., :n, n + m : n + 2 * m] = later
+        effect[..., n:, n + m :] = np.eye(on_the_way)
+        C = _block([[self.C, self.D, np.zeros((self.C.shape[-2], m * cycles))]])
         states = [f"{u}[-{k}]" for k in range(cycles + 1, 0, -1) for u in self.inputs]
         return LinearModel(
-            effect[:, : n + on_the_way],
-            effect[:, n + on_the_way :],
+            effect[..., : n + on_the_way],
+            effect[..., n + on_the_way :],
             C,
             np.zeros_like(self.D),
             (*self.states, *states),
@@ -376,9 +376,17 @@ def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
 @lru_cache(maxsize=32)
 def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
     """Return exp(A t), and the change of the states if each input is 1 for the time t."""
-    n, m = model.B.shape
-    whole = exponential(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
-    return whole[:n, :n], whole[:n, n:]
+    n, m = model.B.shape[-2:]
+    whole = exponential(_block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
+    return whole[..., :n, :n], whole[..., :n, n:]
+
+
+def _block(rows: list[list[Matrix]]) -> Matrix:
+    """Return a matrix of blocks, or a stack of matrices if a block is a stack."""
+    stack = np.broadcast_shapes(*(block.shape[:-2] for row in rows for block in row))
+    return np.block([
+        [np.broadcast_to(block, (*stack, *block.shape[-2:])) for block in row] for row in rows
+    ])  # fmt: skip
 
 
 def exponential(A: Matrix) -> Matrix:

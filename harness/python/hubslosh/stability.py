@@ -329,7 +329,7 @@ def _broken_at(gain: LinearModel, i: int) -> LinearModel:
 
 def _closed_matrix(gain: LinearModel) -> Matrix:
     A, B, C, D = gain
-    found: Matrix = A - B @ np.linalg.solve(np.eye(len(D)) + D, C)
+    found: Matrix = A - B @ np.linalg.solve(np.eye(D.shape[-1]) + D, C)
     return found
 
 

@@ -860,19 +860,22 @@ class UncertainModel:
         LinearModel
             The model from u to y.
         """
-        width, (A, B, C, D) = self.order, self.M
-        D_x = np.repeat(self.delta(delta), self.counts)
-        closing = np.linalg.solve(np.eye(width) - D[:width, :width] * D_x,
-                                  np.hstack([C[:width], D[:width, width:]]))  # fmt: skip
-        through = D_x[:, None] * closing
-        n = len(A)
+        plant, scale = self._plants(self.delta(delta)), self._scale(delta)
+        return replace(plant, A=plant.A * scale / scale[:, None], B=plant.B / scale[:, None],
+                       C=plant.C * scale)  # fmt: skip
+
+    def _plants(self, deltas: Matrix) -> LinearModel:
+        """Return the linear model at Δ with the states of M; a stack of them for many Δ as rows."""
+        width, (A, B, C, D), n = self.order, self.M, len(self.M.A)
+        D_x = np.repeat(deltas, self.counts, axis=-1)
+        seen = np.hstack([C[:width], D[:width, width:]])
+        seen = np.broadcast_to(seen, (*D_x.shape[:-1], *seen.shape))
+        closing = np.linalg.solve(np.eye(width) - D[:width, :width] * D_x[..., None, :], seen)
         every = np.block([[A, B[:, width:]], [C[width:], D[width:, width:]]])
-        every += np.vstack([B[:, :width], D[width:, :width]]) @ through
-        scale = self._scale(delta)
+        every = every + np.vstack([B[:, :width], D[width:, :width]]) @ (D_x[..., None] * closing)
         return LinearModel(
-            every[:n, :n] * scale / scale[:, None], every[:n, n:] / scale[:, None],
-            every[n:, :n] * scale, every[n:, n:], self.M.states, self.M.inputs[width:],
-            self.M.outputs[width:],
+            every[..., :n, :n], every[..., :n, n:], every[..., n:, :n], every[..., n:, n:],
+            self.M.states, self.M.inputs[width:], self.M.outputs[width:],
         )  # fmt: skip
 
     def _scale(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
