@@ -193,7 +193,10 @@ def check_table(table: Any, what: str) -> None:
     import pandas as pd
 
     if not isinstance(table, pd.DataFrame):
-        raise FmuError(f"{what} must be a pandas.DataFrame, not {table!r}")
+        advice = ""
+        if isinstance(table, pd.Series):
+            advice = f": give the whole table instead of its column {table.name!r}"
+        raise FmuError(f"{what} must be a pandas.DataFrame, not {type(table).__name__}{advice}")
 
 
 def not_columns(table: Any, names: Iterable[str], what: str) -> list[str]:

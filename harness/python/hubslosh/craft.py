@@ -1549,7 +1549,8 @@ class Craft:
         tanks and modes; its start values are the craft's values, so that a host needs to set
         nothing. ``craft.ssv`` holds these values, and ``craft.ssp`` holds FMU and values as a
         system (SSP 1.0). ``craft.mat`` has the linear model from ``torque`` to ``q`` and ``omega``,
-        the parameters and the inputs. ``craft_simulink.m`` builds a Simulink model from the FMU and
+        the parameters and the inputs; if the craft spins, the model has no ``q``, because the
+        attitude is not steady. ``craft_simulink.m`` builds a Simulink model from the FMU and
         ``craft.mat``.
 
         Parameters
@@ -1584,7 +1585,8 @@ class Craft:
         from .export import export
 
         given = self.parameters(fill, parameters=parameters)
-        linear = self.linearize(fill, parameters=parameters)
+        outputs = ["omega"] if self._omega.any() else ["q", "omega"]
+        linear = self.linearize(fill, outputs=outputs, parameters=parameters)
         return export(folder, self.model, given, linear)
 
     def columns(self, fill: Fill) -> list[str]:

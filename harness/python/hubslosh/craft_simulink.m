@@ -2,9 +2,9 @@
 %
 % Tried in Octave: everything up to "The model". UNTRIED: the rest, written from Simulink's
 % documentation. The FMU starts with the values of the craft, so that no parameter has to be set.
-% craft.mat has the linear model (A, B, C, D, states, inputs, outputs) from torque to q and omega at
-% this fill, the parameters (parameter_names, parameter_values) and the inputs at the start
-% (input_names, input_values), in SI units.
+% craft.mat has the linear model (A, B, C, D, states, inputs, outputs) at this fill from torque to q
+% and omega (only to omega if the craft spins), the parameters (parameter_names, parameter_values)
+% and the inputs at the start (input_names, input_values), in SI units.
 %
 %   >> craft_simulink
 

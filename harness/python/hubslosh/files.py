@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from . import temporary
+from .arguments import check_table
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -24,15 +25,12 @@ class AsDict(Protocol):
 
 
 def _check_table(table: Any, path: Any, ending: str) -> Path:
-    import pandas as pd
-
     if isinstance(table, str | os.PathLike):
         raise FmuError(
             "the arguments are exchanged: give the table first, then the file: "
             f"(table, {str(table)!r})"
         )
-    if not isinstance(table, pd.DataFrame):
-        raise FmuError(f"the table must be a pandas.DataFrame, not {type(table).__name__}")
+    check_table(table, "the table")
     return temporary.check_path(path, ending)
 
 

@@ -1,10 +1,12 @@
 """Uncertain models, margins, worst cases and reviews of craft that spin."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 from scipy.optimize import brentq
 from test_uncertain import MEASURED, POINT, RANGES, TORQUE, difference
 
@@ -295,6 +297,17 @@ def test_the_attitude_of_a_spinner_is_no_steady_state(spinner: Craft) -> None:
     ):
         with pytest.warns(FmuWarning, match=r"no steady state of q: .*Measure omega instead"):
             call()
+
+
+def test_files_of_a_spinner_have_a_linear_model_at_its_steady_state(
+    spinner: Craft, tmp_path: Path
+) -> None:
+    """The attitude, of which the other calls warn, is not among its outputs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FmuWarning)
+        found = loadmat(spinner.export(tmp_path, "50%")["mat"], squeeze_me=True)
+    assert [name.strip() for name in found["outputs"]] == RATES
+    assert (found["A"] == spinner.linearize("50%", outputs="omega").A).all()
 
 
 def test_a_review_simulates_the_worst_case_at_the_spin(spinner: Craft) -> None:

@@ -129,6 +129,7 @@ def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> Non
         "give the table first, then the file": lambda: hubslosh.to_csv("a.csv", table),
         "must end in .mat": lambda: hubslosh.to_mat(table, "a.csv"),
         "DataFrame, not list": lambda: hubslosh.to_parquet([1], "a.parquet"),
+        "whole table instead of its column 'time'": lambda: hubslosh.quantiles(table["time"]),
         "the name of a file must be a str or a Path": lambda: hubslosh.to_csv(table, 3),
         "cannot be written": lambda: hubslosh.to_csv(table, tmp_path / "none" / "a.csv"),
         "the same name in MATLAB: a.b, a_b": lambda: hubslosh.to_mat(
