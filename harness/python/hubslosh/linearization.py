@@ -383,10 +383,16 @@ def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
 
 def _block(rows: list[list[Matrix]]) -> Matrix:
     """Return a matrix of blocks, or a stack of matrices if a block is a stack."""
-    stack = np.broadcast_shapes(*(block.shape[:-2] for row in rows for block in row))
-    return np.block([
-        [np.broadcast_to(block, (*stack, *block.shape[-2:])) for block in row] for row in rows
-    ])  # fmt: skip
+    stack = max((block.shape[:-2] for row in rows for block in row), key=len)
+    size = sum(row[0].shape[-2] for row in rows), sum(block.shape[-1] for block in rows[0])
+    found, y = np.empty((*stack, *size)), 0
+    for row in rows:
+        x, below = 0, y + row[0].shape[-2]
+        for block in row:
+            found[..., y:below, x : x + block.shape[-1]] = block
+            x += block.shape[-1]
+        y = below
+    return found
 
 
 def exponential(A: Matrix) -> Matrix:
