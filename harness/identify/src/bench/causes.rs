@@ -3,6 +3,7 @@
 use names::hubslosh::{hub, slosh, wheel};
 use serde::Serialize;
 
+use super::nominal::PARAMETERS;
 use super::system::{ADDITIONAL_TORQUES, BenchSystem, Target};
 use crate::engine::cause::Effect;
 use crate::estimate::prose;
@@ -68,6 +69,7 @@ pub fn words(target: &Target) -> String {
         Target::Parameter(name) if name == slosh::ZETA_AMPLITUDE => {
             "damping that grows with the amplitude"
         }
+        Target::Parameter(name) | Target::Stated(name) => return format!("a wrong value of {name}"),
         Target::ProportionalTorque(kind) => {
             let follows = ADDITIONAL_TORQUES.get(*kind).map_or("the motion", |one| one.follows);
             return format!("a torque that follows {follows}");
@@ -99,6 +101,10 @@ pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
             Some((names::hubslosh::friction::SIGMA0, 1.0 / value, "N.m/rad")),
         ),
         Target::SecondMode => (format!("--set {}=2", slosh::MODES), None),
+        Target::Stated(name) => (format!("--start {name} without its standard deviation"), None),
+        Target::Parameter(name) if PARAMETERS.contains(&name.as_str()) => {
+            (format!("{} in place of --set", start(name, value)), None)
+        }
         Target::Parameter(name) => {
             let unit = if name == hub::K { "N.m/rad" } else { "1" };
             (start(name, value), Some((name.as_str(), value, unit)))

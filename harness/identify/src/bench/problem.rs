@@ -298,6 +298,7 @@ pub fn system<'a>(
     refuse_overridden(fmu, &settings, &unknowns, &targets)?;
     let values = |start: &Start| -> Vec<f64> {
         let of = |(unknown, target): (&Unknown, &Target)| match target {
+            _ if unknown.part == Part::Candidate => unknown.start,
             Target::Length => start.length,
             Target::MassRatio => start.mass_ratio,
             Target::Inertia => start.inertia,
@@ -382,6 +383,22 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     for (name, reach, used) in [(hub::K, 0.02, true), (slosh::ZETA_AMPLITUDE, 0.005, !frozen)] {
         let unknown = Unknown { part: Part::Candidate, reach, ..list.nonnegative(name, 0.0) };
         all.extend((used && !is_set(name)).then(|| (Target::Parameter(name.into()), unknown)));
+    }
+    // values that the user states may be wrong
+    for (name, value) in options.settings.iter().filter(|(n, _)| PARAMETERS.contains(&n.as_str())) {
+        let stated = value.parse::<f64>().ok().filter(|value| *value > 0.0);
+        if let Some(value) = stated.filter(|_| !(frozen && name.starts_with("slosh."))) {
+            let unknown = Unknown { part: Part::Candidate, ..list.parameter(name, value) };
+            all.push((Target::Parameter(name.clone()), unknown));
+        }
+    }
+    for (name, ..) in &options.known {
+        let Some(j) = list.unknowns.iter().position(|u| u.name == *name) else { continue };
+        let (unit, reach) = (&list.unknowns[j].unit, list.unknowns[j].reach);
+        let ends = (f64::NEG_INFINITY, f64::INFINITY);
+        let unknown = Unknown::linear(name, unit, Role::Stated(j), (0.0, reach), ends);
+        let unknown = Unknown { part: Part::Candidate, ..unknown };
+        all.push((Target::Stated(name.clone()), unknown));
     }
     if list.fmu.description().variable(ADDITIONAL_TORQUE).is_ok() {
         let torques = (0..ADDITIONAL_TORQUES.len()).map(Target::ProportionalTorque);

@@ -63,6 +63,8 @@ pub enum Target {
     /// Compliance of the bearing, rad/(N·m): the elastic twist divided by the torque, before it slips.
     Compliance,
     SecondMode,
+    /// Error of a value that the user states with a standard deviation.
+    Stated(String),
     ProportionalTorque(usize),
 }
 

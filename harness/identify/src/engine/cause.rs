@@ -29,7 +29,7 @@ use super::{ALIKE, DECIDES, ENDS, Fit, SEEN, Solution, Unknown, Z};
 use crate::news::News;
 
 /// Largest number of candidates that are fitted. They are the candidates with the largest scores.
-const FITTED: usize = 3;
+const FITTED: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
@@ -118,27 +118,35 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
     let chance = DECIDES + (base.point.e.len() as f64).ln();
     let noise = fit.noise.clone();
     let at_bound = fit.stuck(&base.point.z).len();
-    let mut found = Vec::new();
+    let (mut firsts, mut least) = (Vec::new(), base.point.cost - 2.0 * chance);
     for score in first_scores.iter().take(FITTED).filter(|s| s.score.abs() >= LIMIT) {
         let j = score.unknown;
-        fit.set(noise.clone(), 1.0);
         let mut free = fit.free.clone();
         free[j] = true;
         let mut z = base.point.z.clone();
         let reach = problem.unknowns[j].reach;
         let mut size = score.size.abs().max(0.3 * reach);
         // far from its minimum an effect that can have only one sign may seem to have the opposite sign
-        if fit.ends[j].0 < 0.0 {
+        if fit.ends[j].0 < z[j] {
             size = size.copysign(score.size);
         }
-        z[j] = size.clamp(fit.ends[j].0, fit.ends[j].1);
-        let end = End { gain: ALIKE, ..End::new(8, ENDS.0) };
+        z[j] = (z[j] + size).clamp(fit.ends[j].0, fit.ends[j].1);
+        let end = End { gain: ALIKE, above: least + chance, ..End::new(8, ENDS.0) };
         let Ok(first) = fit.minimise(&z, &free, None, end) else { continue };
-        if base.point.cost - first.point.cost < chance {
-            continue;
-        }
+        news(&News::Detail(format!(
+            "with {} the sum of squares is {:.1}, {:.0} simulations",
+            name(j),
+            first.point.cost,
+            fit.simulations()
+        )));
+        least = least.min(first.point.cost);
+        firsts.push((j, first));
+    }
+    let mut found = Vec::new();
+    for (j, first) in firsts.into_iter().filter(|(_, first)| first.point.cost < least + chance) {
+        fit.set(noise.clone(), 1.0);
         fit.renew_noise(&first.point);
-        let z = first.point.z.clone();
+        let (z, free) = (first.point.z.clone(), first.free.clone());
         let Ok(mut other) = fit.minimise(&z, &free, None, End::new(6, ENDS.0 * 0.2)) else {
             continue;
         };
@@ -162,7 +170,9 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
             asked.retain(|score| score.score.abs() >= LIMIT);
             (!asked.is_empty()).then(|| format!("noise is left that asks for {}", words(&asked)))
         };
-        let size = (other.point.z[j], std(j));
+        let value = problem.unknowns[j].value(other.point.z[j]);
+        let slope = if problem.unknowns[j].log { value } else { 1.0 };
+        let size = (value, slope * std(j));
         news(&News::Detail(format!(
             "with {} = {:.3e} ± {:.1e}, −2 ln L falls by {gain:.1}, and {}",
             name(j),

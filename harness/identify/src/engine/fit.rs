@@ -165,9 +165,14 @@ impl<'p> Fit<'p> {
     }
 
     fn stacked(&self, residuals: Vec<Vec<f64>>, z: &[f64]) -> Vec<f64> {
-        let priors = self.problem.unknowns.iter().zip(z);
-        let deviations = priors.filter_map(|(u, z)| u.prior.map(|(mean, std)| (z - mean) / std));
-        self.innovations(residuals).concat().into_iter().chain(deviations).collect()
+        let unknowns = &self.problem.unknowns;
+        let mut all = self.innovations(residuals).concat();
+        for (j, (unknown, own)) in unknowns.iter().zip(z).enumerate() {
+            let Some((mean, std)) = unknown.prior else { continue };
+            let wrong = unknowns.iter().zip(z).filter(|(other, _)| other.role == Role::Stated(j));
+            all.push((own - mean - wrong.map(|(_, by)| by).sum::<f64>()) / std);
+        }
+        all
     }
 
     /// Returns the number of priors, whose deviations follow the residuals in `Point::e`.
@@ -207,6 +212,11 @@ impl<'p> Fit<'p> {
         for (j, unknown) in self.problem.unknowns.iter().enumerate() {
             if let Some((_, std)) = unknown.prior {
                 found.matrix[(row, j)] = 1.0 / std;
+                for (k, other) in self.problem.unknowns.iter().enumerate() {
+                    if which[k] && other.role == Role::Stated(j) {
+                        found.matrix[(row, k)] = -1.0 / std;
+                    }
+                }
                 row += 1;
             }
         }

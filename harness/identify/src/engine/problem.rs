@@ -37,6 +37,8 @@ pub enum Role {
     /// The second output times the unknown is added to the first output. If both indices are equal, the unknown is the scale
     /// error of the sensor.
     Gain(usize, usize),
+    /// Error of a stated value: it moves the mean of the prior of the unknown with this index.
+    Stated(usize),
     /// The unknown changes no output, only quantities that [`System::derive`] computes.
     Derived,
 }
@@ -128,7 +130,7 @@ impl Unknown {
         match self.role {
             Role::Run(of) | Role::Bias(_, of) => of.is_none_or(|of| of == recording),
             Role::Delay(_) | Role::Gain(..) => true,
-            Role::Derived => false,
+            Role::Stated(_) | Role::Derived => false,
         }
     }
 }

@@ -94,6 +94,8 @@ pub fn solve<'p>(
     let mut random = Random::new(26, 0);
     starts.extend((0..problem.drawn).map(|_| drawn(problem, &mut random)));
     let mut best: Option<Found> = None;
+    // the start that led to the best minimum, and whether another one led to it too
+    let (mut winner, mut is_confirmed) = (0, false);
     let (mut tried, mut error, mut course): (usize, _, Vec<(f64, f64)>) = (0, None, Vec::new());
     let ways = [(0..given, &PARTS[..]), (0..1, &[]), (given..starts.len(), &PARTS)];
     for (number, parts) in ways.into_iter().flat_map(|(all, parts)| all.map(move |k| (k, parts))) {
@@ -101,7 +103,8 @@ pub fn solve<'p>(
         if let Some(best) = best.as_mut().filter(|_| number == 0 && is_whole || number == given) {
             // the starts of the problem have led to no lower minimum: random starts are the last resort
             best.judge(&mut fit, ceiling, news)?;
-            if best.is_noise || number >= given && !best.is_loud || best.deviance > ceiling {
+            let is_found = number >= given && (!best.is_loud || is_confirmed);
+            if best.is_noise || is_found || best.deviance > ceiling {
                 break;
             }
         }
@@ -131,10 +134,12 @@ pub fn solve<'p>(
         let is_least = found.as_ref().is_some_and(|found| found.point.cost < DECIDES);
         let agrees =
             best.as_ref().is_some_and(|best| (best.first - deviance).abs() < 2.0 * DECIDES);
+        is_confirmed |= agrees && number != winner;
         if let Some(found) = found
             && best.as_ref().is_none_or(|best| deviance < best.first)
         {
             (best, course) = (Some(Found::new(&fit, found, deviance)), own);
+            (winner, is_confirmed) = (number, is_confirmed && agrees);
         }
         if let Some(best) = best.as_mut().filter(|best| is_least || agrees || best.first > ceiling)
         {

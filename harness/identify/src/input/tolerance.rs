@@ -56,7 +56,7 @@ pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
     let large: Vec<String> = large
         .map(|s| format!("{} {:.0} % (most by {})", s.name, 100.0 * s.share, s.most))
         .collect();
-    (!large.is_empty()).then(|| {
+    (!large.is_empty() && !known.is_empty()).then(|| {
         format!(
             "The intervals include tolerances of quantities that the recording does not show ({}). Their share of the variance: \
              {}. --tolerance sets them.",
