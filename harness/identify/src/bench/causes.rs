@@ -69,7 +69,9 @@ pub fn words(target: &Target) -> String {
         Target::Parameter(name) if name == slosh::ZETA_AMPLITUDE => {
             "damping that grows with the amplitude"
         }
-        Target::Parameter(name) | Target::Stated(name) => return format!("a wrong value of {name}"),
+        Target::Parameter(name) | Target::Stated(name) => {
+            return format!("a wrong value of {name}");
+        }
         Target::ProportionalTorque(kind) => {
             let follows = ADDITIONAL_TORQUES.get(*kind).map_or("the motion", |one| one.follows);
             return format!("a torque that follows {follows}");

@@ -16,7 +16,8 @@
 //!
 //! An effect may imitate another one that is not among the candidates. For example, a lag with a negative delay changes the gain
 //! over the frequency as a wrong inertia does. Therefore a fitted effect is not accepted as the cause if an output then precedes
-//! its input, if another unknown then lies at a bound, or if another candidate still has a score that chance does not explain.
+//! its input, if another unknown then lies at a bound, if the known values would together be beyond their tolerances, or if
+//! another candidate still has a score that chance does not explain.
 
 use analysis::innovations::LIMIT;
 use anyhow::Result;
@@ -163,6 +164,8 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
             Some("more than noise is left".into())
         } else if fit.is_early(&other.point.z, Z * fit.delay().map_or(0.0, std)) {
             Some("the rate would precede the torque".into())
+        } else if fit.pull(&other.point.z) > LIMIT {
+            Some("known values would be beyond their tolerances".into())
         } else if fit.stuck(&other.point.z).len() > at_bound {
             Some("an unknown is at its bound".into())
         } else {

@@ -284,6 +284,14 @@ impl Fit<'_> {
         places(&self.free).into_iter().filter(is_stuck).collect()
     }
 
+    /// Returns the distance of all known values from their stated values: the root of the sum of squares of their differences,
+    /// each over its standard deviation.
+    pub fn pull(&self, z: &[f64]) -> f64 {
+        let known = self.problem.unknowns.iter().zip(z).filter(|(u, _)| u.part == Part::Tolerance);
+        let own = known.filter_map(|(u, z)| u.prior.map(|(mean, std)| ((z - mean) / std).powi(2)));
+        own.sum::<f64>().sqrt()
+    }
+
     /// Returns the minimum, or a lower one: if a start of the problem has a smaller sum of squares than the minimum, the search
     /// is repeated from this start.
     ///
