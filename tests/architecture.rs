@@ -190,7 +190,7 @@ fn a_script_runs_every_test_that_is_ignored() {
         let text = script.split(&format!("\n{name}=(")).nth(1).expect("a list of the script");
         text.split(')').next().expect("its end").split_whitespace().collect()
     };
-    let (random, readers) = (list("random"), list("readers"));
+    let (nightly, readers) = (list("nightly"), list("readers"));
     let fuzz = fs::read_to_string(root.join(".ci/fuzz-readers")).expect("the script");
     let has = |words: &[&str], name: &str| words.iter().any(|word| name.contains(word));
     let mut files = Vec::new();
@@ -203,11 +203,11 @@ fn a_script_runs_every_test_that_is_ignored() {
             let name = after.split("fn ").nth(1).and_then(|rest| rest.split('(').next());
             let name = name.expect("a test after its attribute");
             let reason = after.split(']').next().expect("the end of the attribute");
-            let (is_random, is_reader) = (has(&random, name), has(&readers, name));
+            let (is_nightly, is_reader) = (has(&nightly, name), has(&readers, name));
             let runs_it = if reason.contains(": .ci/long-tests") {
-                !is_random && !is_reader
+                !is_nightly && !is_reader
             } else if reason.contains(": .ci/run --nightly") {
-                is_random
+                is_nightly
             } else {
                 reason.contains(": .ci/fuzz-readers") && is_reader && fuzz.contains(name)
             };
@@ -216,7 +216,7 @@ fn a_script_runs_every_test_that_is_ignored() {
         }
     }
     assert!(names.len() > 10, "{names:?}");
-    let all = [random, readers].concat();
+    let all = [nightly, readers].concat();
     let stale: Vec<&&str> =
         all.iter().filter(|word| !names.iter().any(|name| name.contains(**word))).collect();
     assert!(stale.is_empty(), "no ignored test has these words in its name: {stale:?}");

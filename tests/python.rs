@@ -108,7 +108,7 @@ fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
 
 /// Runs pytest on harness/studies; each study compares its results with the numbers in the book.
 #[test]
-#[ignore = "minutes: .ci/long-tests"]
+#[ignore = "minutes: .ci/run --nightly"]
 fn the_studies_compute_the_numbers_of_the_book() {
     for model in &MODELS {
         pack::packed_model_for_tests(model);

@@ -8,7 +8,7 @@ Run the tests by hand with:
     pytest -c harness/python/pyproject.toml harness/studies
 
 ``cargo test --release`` runs test_analysis.py and test_benchmark.py with the FMUs that it packs;
-``.ci/long-tests`` runs all files.
+``.ci/long-tests --nightly`` runs all files.
 """
 
 import os
@@ -28,12 +28,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
-    parser.addoption("--long", action="store_true", help="all tests, as .ci/long-tests")
+    parser.addoption("--long", action="store_true", help="all tests, as .ci/long-tests --nightly")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker of tests that take several seconds each."""
-    config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests) runs it")
+    config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests --nightly) runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -1,7 +1,7 @@
 """Short forms of the studies: numbers and pictures of the book equal those that studies compute.
 
 Studies that take only seconds have files of their own: `test_measured`, `test_cluster` and
-`test_analysis`. `cargo test` runs `test_analysis`, and `.ci/long-tests` runs all others.
+`test_analysis`. `cargo test` runs `test_analysis`, and `.ci/long-tests --nightly` runs all others.
 """
 
 import json

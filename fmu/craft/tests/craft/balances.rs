@@ -187,7 +187,7 @@ fn momentum_angular_momentum_and_energy_balance_over_10_s_of_random_craft() {
 
 /// As the test over 10 s, but over 100 s.
 #[test]
-#[ignore = "ten seconds of CPU time: .ci/long-tests"]
+#[ignore = "20 s: .ci/run --nightly"]
 fn momentum_angular_momentum_and_energy_balance_over_100_s_of_random_craft() {
     random_craft(END / 10);
 }

@@ -410,7 +410,7 @@ fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
 /// 20 simulated recordings of each kind: `cargo test --release -p identify --test all -- --ignored --nocapture
 /// coverage_with_adaptive_solvers`.
 #[test]
-#[ignore = "two minutes: .ci/long-tests"]
+#[ignore = "two minutes: .ci/run --nightly"]
 fn coverage_with_adaptive_solvers() {
     for rough in ["-DROUGH", "-DSTEADY"] {
         for deaf in ["-DDEAF", "-DHEEDS"] {

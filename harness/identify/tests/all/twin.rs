@@ -543,7 +543,7 @@ fn a_bench_of_another_size_is_estimated_only_if_its_inertia_is_stated() {
 
 /// A downward sweep approaches the resonance of softening slosh from higher frequencies, where rotary slosh begins.
 #[test]
-#[ignore = "half a minute: .ci/long-tests"]
+#[ignore = "a minute: .ci/run --nightly"]
 fn a_downward_sweep_shows_that_slosh_rotates() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,duration=400,f0=2.7,f1=2";
