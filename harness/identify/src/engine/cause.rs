@@ -26,6 +26,7 @@ use rayon::prelude::*;
 
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::Part;
+use super::search::{ABOVE, OWN};
 use super::{ALIKE, DECIDES, ENDS, Fit, SEEN, Solution, Unknown, Z};
 use crate::news::News;
 
@@ -119,7 +120,9 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
     let chance = DECIDES + (base.point.e.len() as f64).ln();
     let noise = fit.noise.clone();
     let at_bound = fit.stuck(&base.point.z).len();
-    let (mut firsts, mut least) = (Vec::new(), base.point.cost - 2.0 * chance);
+    // above this the noise is loud, so that the effect cannot be the cause
+    let loud = (ABOVE * OWN.0).powi(2) * base.point.e.len() as f64;
+    let (mut firsts, mut least) = (Vec::new(), loud.min(base.point.cost - chance) - chance);
     for score in first_scores.iter().take(FITTED).filter(|s| s.score.abs() >= LIMIT) {
         let j = score.unknown;
         let mut free = fit.free.clone();

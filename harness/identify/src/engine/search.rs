@@ -21,7 +21,7 @@ const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 const BEGINNING_NOISE: f64 = 0.03;
 /// Ratio of the residual's white noise to the noise between neighbouring rows, above which the residual is more than
 /// noise of the sensor.
-const ABOVE: f64 = 1.5;
+pub(super) const ABOVE: f64 = 1.5;
 /// Largest number of alternations between noise and minimum, and the sum of squares per row above which the alternation ends. The
 /// sum of squares per row is 1 if the noise matches the residual.
 const TURNS: usize = 8;
@@ -38,7 +38,7 @@ const KINKED: f64 = 0.8;
 const ASTRAY: (f64, f64) = (0.25, 3.0);
 /// Limits of the noise while a misfit is examined: largest white noise relative to the noise between neighbouring rows, largest
 /// relative size of the drift, and smallest correlation time of the drift, s.
-const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
+pub(super) const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
 pub struct Solution<'p> {
     /// The problem with the noise and the intersample behaviour that were found.
