@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
 
+use analysis::innovations::LIMIT;
 use analysis::statistics::{about_mean, correlation, deviation, peak};
 use anyhow::Result;
 use formulas::cylinder::XI;
@@ -241,6 +242,12 @@ fn findings(
             "the rate comes {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
              --also early_rate allows it)",
             -1e3 * z[j]
+        ));
+    }
+    let pull = solution.fit.pull(z);
+    if pull > LIMIT {
+        doubts.push(format!(
+            "the known values are together {pull:.1} standard deviations off their tolerances: check --set, --start and --tolerance"
         ));
     }
     for j in &solution.at_bound {
