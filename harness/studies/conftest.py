@@ -33,7 +33,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker of tests that take several seconds each."""
-    config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests --nightly) runs it")
+    config.addinivalue_line("markers", "long: takes seconds; --long runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

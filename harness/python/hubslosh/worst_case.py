@@ -28,7 +28,7 @@ SMALLEST = 0.25  # Smallest step of the search, in units in which the range of a
 
 ASIDE = 0.01  # Relative distance of the simulated gains from the gain margin, on both sides
 
-STEPS = 11  # Number of gains, from the margin to a simulated gain, at which the critical pole is followed
+STEPS = 11  # Number of gains at which the critical pole is followed from the margin
 
 RATE = 1e-8  # Disturbance at the start of a simulation: angular velocity about each axis, rad/s
 

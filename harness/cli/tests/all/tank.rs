@@ -268,11 +268,15 @@ fn a_stiffness_far_outside_its_formula_is_written_only_with_the_option_force() {
     let given: [&str; 6] =
         [&file, "--fill=1", "--gravity=1e-6", "--sigma=0.072", "--parameters", &set];
     let (ok, _, said) = tank(&given);
-    assert!(!ok && said.contains("k of mode 1 is not known: it adds"), "{said}");
+    assert!(!ok && said.contains("k of mode 1 is not known: surface tension adds"), "{said}");
     assert!(said.contains("--force") && !std::fs::exists(&set).unwrap(), "{said}");
     let (ok, _, said) = tank(&[&given[..], &["--force"]].concat());
     assert!(ok && said.contains("too much for a computation to first order"), "{said}");
-    assert!(std::fs::read_to_string(&set).unwrap().contains("# warning: capillarity: it adds"));
+    assert!(
+        std::fs::read_to_string(&set)
+            .unwrap()
+            .contains("# warning: capillarity: surface tension adds")
+    );
 }
 
 #[test]
