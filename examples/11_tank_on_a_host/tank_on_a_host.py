@@ -21,9 +21,9 @@ STEPS = (0.04, 0.02, 0.01, 0.005)
 """Communication steps, s."""
 RECORDED = [f"omega[{i}]" for i in (1, 2, 3)]
 MASS, CENTRE = 300.0, np.array([0.02, -0.01, 0.1])
-"""Mass (kg) and centre of mass from O (m) of the host. The tank, with 382 kg, is heavier."""
+"""Mass (kg) and centre of mass from O (m) of the dry craft. The liquid, with 382 kg, is heavier."""
 INERTIA = np.diag([210.0, 190.0, 150.0])
-"""Inertia of the host about its centre of mass, kg·m²."""
+"""Inertia of the dry craft about its centre of mass, kg·m²."""
 POSITION = np.array([0.3, 0.1, -0.2])
 """Position of the tank's origin from O, m."""
 M_0, H_0, I_0 = 253.493, 0.0563967, 3.67522
@@ -38,9 +38,9 @@ SIGNALS = {
     **{f"omega[{i}]": f"omega[{i}]" for i in (1, 2, 3)},
     **{f"omega_dot[{i}]": f"omega_dot[{i}]" for i in (1, 2, 3)},
 }
-"""Inputs of the tank, each with the output of the host that is connected to it."""
+"""Inputs of the tank's FMU, each with the output of the craft's FMU that is connected to it."""
 LOADS = {f"bias[{i}]": f"{'force' if i < 4 else 'torque'}[{(i - 1) % 3 + 1}]" for i in range(1, 7)}
-"""Inputs of the host, each with the output of the tank that is connected to it."""
+"""Inputs of the craft's FMU, each with the output of the tank's FMU that is connected to it."""
 
 Values = dict[str, float | int]
 
@@ -68,9 +68,10 @@ def tank(name: str) -> Values:
 
 
 def lumped() -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass, centre of mass and inertia of host and liquid as one rigid body.
+    """Return mass, centre of mass and inertia of craft and liquid as one rigid body.
 
-    The liquid is the rigid liquid and the bob at its hinge, as coupling = rigid_body expects.
+    The liquid counts as the rigid liquid plus the slosh mass at its hinge, because the tank's
+    parameter coupling = rigid_body requires this.
     """
     e = np.array([0.0, 0.0, 1.0])
     parts = [
@@ -86,7 +87,7 @@ def lumped() -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def simulate_whole(folder: Path | None) -> pd.DataFrame:
-    """Return the reference: the motion of host and tank, simulated by Spacecraft.fmu."""
+    """Return the reference: the motion of craft and tank, simulated by one Spacecraft.fmu."""
     settings = body(MASS, CENTRE, INERTIA) | tank("tank[1]") | {"tanks": 1} | START
     return hubslosh.simulate(
         fmu(folder, "Spacecraft"), settings, stop=STOP, step=STEPS[0], outputs=RECORDED,
@@ -100,10 +101,10 @@ def fmu(folder: Path | None, name: str) -> str | Path:
 
 
 def coupled(folder: Path | None, step: float, wrench: bool = False) -> pd.DataFrame:
-    """Simulate the coupled FMUs; the host steps first, and values are held over the step.
+    """Simulate the coupled FMUs; the craft's FMU steps first, and values are held over the step.
 
-    If ``wrench`` is true, the host receives the total force and torque of the tank, which is the
-    obvious coupling, but diverges.
+    If ``wrench`` is true, the craft's FMU receives the total force and torque of the tank; this
+    coupling is simple, but diverges.
     """
     if wrench:
         host_settings, loads = body(MASS, CENTRE, INERTIA), {p: p for p in LOADS.values()}
@@ -216,7 +217,7 @@ def in_libcosim(folder: Path | None, step: float) -> pd.DataFrame:
 
 
 def on_basilisk(folder: Path | None, step: float) -> pd.DataFrame:
-    """Simulate the tank on Basilisk's spacecraft (PyPI: bsk), whose hub is the lumped body."""
+    """Simulate the tank on Basilisk's spacecraft (PyPI: bsk), whose hub is the body of `lumped`."""
     from Basilisk.simulation import extForceTorque, spacecraft
     from Basilisk.utilities import SimulationBaseClass, macros
 
@@ -266,7 +267,7 @@ def error(found: pd.DataFrame, reference: pd.DataFrame) -> float:
 
 
 def table(folder: Path | None) -> dict[str, dict[float, float]]:
-    """Return the errors by host and step, for all hosts that are installed."""
+    """Return the errors by simulator and step, for all simulators that are installed."""
     reference = simulate_whole(folder)
     hosts = {"fmpy, host first": coupled, "libcosim (SSP)": in_libcosim, "Basilisk": on_basilisk}
     found: dict[str, dict[float, float]] = {}

@@ -20,20 +20,20 @@ def both(spacecraft: str) -> Path | None:
 
 
 def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
-    """The error is proportional to the step, for a tumbling host that is lighter than its tank."""
+    """The error is proportional to the step, for a tumbling craft that is lighter than its tank."""
     reference = simulate_whole(both)
     errors = [error(coupled(both, step), reference) for step in STEPS[:3]]
     assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
 
 
 def test_coupling_by_the_total_wrench_diverges(both: Path | None) -> None:
-    """With 20 ms steps it diverges within a second; the FMU reports that a pendulum turns over."""
+    """With steps of 20 ms the run diverges within a second, until a pendulum is upside down."""
     with pytest.warns(FmuWarning, match="leaves its range"):
         assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
 
 
 def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:
-    """Fmpy validates the file. Nine signals go from host to tank, and six from tank to host."""
+    """Fmpy validates the file. Nine signals go from craft to tank, and six from tank to craft."""
     archive = tmp_path / "TankOnHost.ssp"
     pack_ssp(both, archive, 0.02)
     system = read_ssd(str(archive), validate=True).system

@@ -1,4 +1,4 @@
-"""Properties of the loop that hold on a busy machine, too; no times are tested."""
+"""Tests of the loop that pass on a busy machine, too, because they compare no times."""
 
 import numpy as np
 from real_time import ANGLE, PERIOD, lines, run

@@ -31,7 +31,7 @@ MEASURED = ["q[2]", "omega[1]", "q[3]", "omega[2]", "q[4]", "omega[3]"]
 
 
 def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpace:
-    """Return a PID for each axis, from half angles and rates, with notch and roll-off (Hz)."""
+    """Return a PID controller of half angles and rates for each axis, with notch and roll-off."""
     s = control.tf("s")
     w, n, r = (2 * np.pi * f for f in (bandwidth, notch, 25 * bandwidth))
     filters = (s**2 + 0.2 * n * s + n**2) / (s**2 + 1.2 * n * s + n**2)

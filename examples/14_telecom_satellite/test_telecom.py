@@ -107,7 +107,7 @@ def test_the_worst_case_at_97_percent_is_found_where_two_frequencies_meet(spacec
 def test_a_certificate_is_checked_by_numpy_and_a_changed_one_is_refused(
     spacecraft: str, tmp_path: Path
 ) -> None:
-    """The changes are in the size, the list of intervals, the loop, or the scalings."""
+    """The test changes the certified size, the list of intervals, the loop, or the scalings."""
     found = certificate.certificate("40%", replace(telecom.craft, model=spacecraft))
     # the size of the worst case is at most 4.01 % larger than the certified size
     assert found.size == pytest.approx(1.81, rel=0.01) and found.gap < 1.0401

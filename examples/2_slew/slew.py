@@ -1,4 +1,4 @@
-"""Simulates a rest-to-rest slew by 90 degrees with a bang-stop-bang and with a smoothed profile.
+"""Simulates a rest-to-rest slew of 90 degrees with a bang-stop-bang and with a smoothed profile.
 
 python examples/2_slew/slew.py
 """
@@ -21,7 +21,7 @@ PERIOD, LATENCY = 0.02, 1
 BANDWIDTH, ZETA = 0.3, 0.7
 """Bandwidth and damping ratio of the PD for a rigid body: Hz, 1."""
 TOLERANCE = np.radians(0.001)
-"""The slew is over when the pointing error stays below this, rad."""
+"""The hub has settled when the pointing error stays below this angle, rad."""
 STOP = 40.0  # s
 FREE = {"friction.model": "none"}
 """Parameters without friction, because a spacecraft has no bearing."""

@@ -1,4 +1,4 @@
-"""Slosh in a PD loop with a delay, which decides whether the loop damps or drives the liquid.
+"""Slosh in a PD loop whose delay decides if the loop damps or destabilises the liquid.
 
     python examples/3_slosh_meets_the_controller/stability.py
 
@@ -194,13 +194,14 @@ def simulated_first_unstable(bench: Bench, cycle: Cycle, near: float) -> float:
 
 
 def harmonic_balance(bench: Bench, cycle: Cycle, amplitudes: np.ndarray, pendulum: str, dry: bool):
-    """Return the (bandwidth in Hz, rate amplitude in rad/s) of limit cycles by slosh angle.
+    """Return bandwidths (Hz) and rate amplitudes (rad/s) of limit cycles with given slosh angles.
 
     al = a cos(wt) and omega = Re(W exp(iwt)) are put into the equations of hub and pendulum (linear
     or planar; the documentation's page on the model has them); their first harmonics must vanish.
     This is the describing function of all nonlinear terms together. The unknowns are w, W and the
-    bandwidth. What the steps of the held torque do above half the sampling rate comes back to the
-    controller folded (aliased): the sampled model's response less that of hold and plant.
+    bandwidth. The held torque also excites the plant above half the sampling rate, and sampling
+    folds (aliases) this response back to w. The folded part is the response of the sampled model
+    minus the response of hold and plant.
     """
     names = ["hub.I", "tank.m_0", "slosh.mass[1]", "slosh.length[1]", "tank.r", "g_axial"]
     names += ["slosh.damping[1]", *(f"friction.{x}" for x in ("b", "c", "d", "omega_s"))]
@@ -264,7 +265,8 @@ def fundamental(time: np.ndarray, signal: np.ndarray) -> float:
 def predicted_rate(bench: Bench, bandwidth: float, pendulum: str, dry: bool) -> float:
     """Return the rate amplitude of the limit cycle at a bandwidth, by harmonic balance, rad/s.
 
-    It serves the cases with one limit cycle: linear with dry friction, planar without.
+    Use it only where one limit cycle exists: linear pendulum with dry friction, or planar pendulum
+    without dry friction.
     """
     amplitudes = np.geomspace(0.03, 1.0, 60)
     found, rate = harmonic_balance(bench, SLOW, amplitudes, pendulum, dry)
@@ -277,8 +279,8 @@ def predicted_rate(bench: Bench, bandwidth: float, pendulum: str, dry: bool) -> 
 def threshold(bench: Bench, bandwidth: float) -> float:
     """Return the rate amplitude (rad/s) between decay and growth, with dry friction.
 
-    A push is searched after which the motion neither decays nor grows for two minutes: this motion
-    stays near the unstable limit cycle.
+    The function searches for an initial slosh angle with which the motion neither decays nor grows
+    for two minutes; such a motion stays near the unstable limit cycle.
     """
 
     def run(push: float, stop: float, **options) -> pd.DataFrame:

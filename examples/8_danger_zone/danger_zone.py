@@ -52,12 +52,12 @@ class Craft:
 
     @property
     def bob(self) -> float:
-        """Height of the bob at rest, m."""
+        """Height of the bob at rest above the centre of mass of the rigid part, m."""
         return self.hinge - BOB[1]
 
     @property
     def force_height(self) -> float:
-        """Height of the gimbal, m."""
+        """Height of the gimbal above the centre of mass of the rigid part, m."""
         return GIMBAL - self.z_R
 
     @property
@@ -85,7 +85,7 @@ class Craft:
 
     @property
     def damping_needed(self) -> float:
-        """Smallest damping ratio of the liquid that keeps the loop stable; 0 if any does."""
+        """Smallest damping ratio with which the loop is stable; 0 if none is needed."""
         m, l, _ = BOB
         sigma = 1 + m / self.M + m * self.bob**2 / self.I
         # 2 zeta_p w_p = (c/m) sigma, c = 2 zeta m sqrt(g/l)
@@ -119,7 +119,7 @@ def closed_loop_poles(fmu: str, craft: Craft) -> np.ndarray:
 def growth(fmu: str, craft: Craft) -> float:
     """Return the real part of the slosh pole in the loop, 1/s.
 
-    The pole in pitch is the one above 1 rad/s that the loop shifts.
+    Of all poles above 1 rad/s, only the slosh pole in pitch is shifted by the loop.
     """
     poles = closed_loop_poles(fmu, craft)
     m, l, _ = BOB
@@ -168,7 +168,7 @@ def zone(fmu: str) -> tuple[float, float]:
 
 
 def predicted_zone() -> tuple[float, float]:
-    """Return the heights (m) with the hinge at the centre of mass and the bob at percussion."""
+    """Return the two predicted ends of the unstable heights of the tank, m."""
     hinge = brentq(lambda z: Craft(z).hinge, -1, 1)
     bob = brentq(lambda z: Craft(z).bob - Craft(z).percussion, 0, 2)
     return hinge, bob

@@ -3,7 +3,8 @@
 import pytest
 from danger_zone import Craft, growth, predicted_zone, simulated_growth, zone
 
-# Growth rates of an independent formulation of the craft in six axes; all digits agree.
+# Growth rates, 1/s, from an independent formulation of the craft in six axes; all digits of the
+# FMU's growth rates agree.
 GROWTH = {
     -1.60: -3.1726e-2, -0.45: -7.9994e-3, 0.14: 7.6250e-4, 0.20: 1.1911e-3, 0.50: 1.8675e-3,
     0.80: 4.5618e-4, 1.20: -3.2389e-3,

@@ -1,4 +1,4 @@
-"""Agile slew of an Earth observer with two tanks and an observer of the slosh torque.
+"""Agile slew of an Earth-observation satellite with two tanks and an observer of the slosh torque.
 
 Three runs are compared: rigid liquid, sloshing liquid, and sloshing liquid with the observer.
 
@@ -33,7 +33,7 @@ MASS, LENGTH, FIXED, ARM = 35.0, 0.15, 45.0, 0.5
 """Of each tank: sloshing mass (kg), pendulum (m), rigid liquid (kg), distance from roll (m)."""
 OWN = 0.5  # kg·m², inertia of a tank's rigid liquid about its own axis
 FREQUENCY, ZETA = 0.08, 0.01
-"""Frequency (Hz) and damping ratio of the weightless liquid on its diaphragm, craft held."""
+"""Frequency (Hz) and damping ratio of weightless liquid on its diaphragm in a fixed craft."""
 
 
 def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, float | int]:
@@ -91,7 +91,7 @@ class Observer:
         self.x = np.zeros(len(self.transition))
 
     def slosh_torque(self, x: np.ndarray) -> float:
-        """Return the slosh torque on the body with this inertia, N·m."""
+        """Return the torque of the sloshing liquid on a body with the inertia `inertia`, N·m."""
         return float(self.inertia * (self.A @ x))
 
     def update(self, measured: float, torque: float) -> tuple[float, float]:

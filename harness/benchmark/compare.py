@@ -66,7 +66,7 @@ def write_references(folder: Path) -> None:
 
 
 def agreement(case: str, folder: Path) -> float:
-    """Return the number of digits to which HubSlosh and the independent implementations agree."""
+    """Return the number of digits to which HubSlosh and the implementations `INDEPENDENT` agree."""
     specified = score.specification()[case]
     if specified["kind"] == "intervals":
         return math.nan

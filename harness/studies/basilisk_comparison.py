@@ -53,7 +53,7 @@ Vector = Sequence[float] | np.ndarray
 
 @dataclass(frozen=True)
 class Start:
-    """Start of a run; sin(angle) = displacement/length along x (radial) and y (tangential)."""
+    """Initial state and torque of a run; sin(angle) = displacement/length along x and y."""
 
     text: str
     angle_x: float = 0.0  # rad
@@ -87,7 +87,7 @@ class Case:
 
 
 def starts(length: float) -> dict[str, Start]:
-    """Return the start of each compared motion by its name, for a pendulum of ``length`` (m)."""
+    """Return the initial states of all compared motions, for a pendulum of ``length`` (m)."""
     cone = np.arcsin(0.3)
     conical = (GRAVITY / (length * np.cos(cone))) ** 0.5  # rate of a conical pendulum, rad/s
     return {
@@ -208,9 +208,9 @@ def basilisk(given: Case, mass: float, integrator: str = "RKF78", step: float = 
 def pendulum_of(given: Case) -> sphericalPendulum.SphericalPendulum:
     """Return Basilisk's pendulum, hinged at the position of the tank.
 
-    Its angles are zero at the start, so that the first axis of its frame points to the bob's start.
-    The third axis is as near to radial as possible, so that tangential motion changes the angle
-    phi, which has no singularity. The damping is the same in all directions.
+    Its angles are zero at the start, so that the first axis of its frame points to the initial
+    position of the bob. The third axis is as near to radial as possible, so that tangential motion
+    changes the angle phi, which has no singularity. The damping is the same in all directions.
     """
     start = given.start
     sines = np.sin([start.angle_x, start.angle_y])
@@ -228,7 +228,7 @@ def pendulum_of(given: Case) -> sphericalPendulum.SphericalPendulum:
 def pendulum_at(
     mass: float, length: float, place: Vector, drag: float, axes: Sequence[Vector], rate: Vector
 ) -> sphericalPendulum.SphericalPendulum:
-    """Return a pendulum hinged at ``place``; its first axis points to the start of the bob."""
+    """Return a pendulum hinged at ``place``, whose first axis points to the bob at the start."""
     _, second, third = axes
     pendulum = sphericalPendulum.SphericalPendulum()
     pendulum.massInit = mass
@@ -260,8 +260,8 @@ def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
 def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]:
     """Compare all cases at one mass of the hub.
 
-    Return the lines of a table, which has for each start the largest differences over both fills
-    and all damping ratios, and the largest difference of the whole table.
+    Return the lines of a table, and the largest difference in this table. The table has a row for
+    each initial state, with the largest differences over both fills and all damping ratios.
     """
     names = list(starts(1.0))
     cases = [(name, case(fmu, name, h, zeta)) for h in FILLS for name in names for zeta in DAMPING]
@@ -307,8 +307,9 @@ def integrators_table(fmu: Path) -> list[str]:
 def rounding(fmu: Path) -> tuple[dict[str, float], float]:
     """Measure how undamped motion magnifies small differences.
 
-    Return the change of the FMU's motion, by start, if the start angle is the next larger number,
-    and the change of the motion *very far* with a tolerance of 1e-12.
+    Return the change of the FMU's motion for two initial states, by name, if the initial angle is
+    replaced by the next larger floating-point number. Also return the change of the motion *very
+    far* with a solver tolerance of 1e-12 instead of `TOLERANCE`.
     """
     moved = {}
     for name in ("release far", "very far"):

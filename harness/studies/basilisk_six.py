@@ -7,8 +7,8 @@ dist/Spacecraft.fmu``) and Python 3.11 or newer. The first run creates a virtual
 target directory and needs the network. It takes a minute or two.
 
 In Basilisk, the hub is the dry craft with the rigid liquids, and each tank is a
-``sphericalPendulum``. Both craft fly freely from the same start, under forces and torques that are
-constant over some seconds.
+``sphericalPendulum``. Both craft fly freely from the same initial state, under forces and torques
+that are constant over some seconds.
 """
 
 import argparse
@@ -256,7 +256,7 @@ def basilisk(case: Case, integrator: str = "RKF78", step: float = 1e-3) -> Signa
 def pendulum_of(case: Case, tank: Tank) -> sphericalPendulum.SphericalPendulum:
     """Return Basilisk's pendulum for a tank.
 
-    Its angles are zero at the start, so that its first axis points to the start of the bob.
+    Its angles are zero at the start, so that its first axis points to the bob at the start.
     """
     axes = tank.axes()
     first = np.array(tank.p) / np.linalg.norm(tank.p)

@@ -95,7 +95,7 @@ def drive(model: str, growth: float, fill: float, seed: str, amplitude: float) -
 
 
 def case(key: tuple[str, float, float, str]) -> dict[str, object]:
-    """Return the numbers of the bench for one slosh model, damping growth, fill and seed."""
+    """Return accelerations and onset of rotary slosh for one combination in `cases`."""
     model, growth, fill, seed = key
     row: dict[str, object] = dict(
         zip(("model", "zeta_amplitude", "fill_m", "seed"), key, strict=True)

@@ -87,8 +87,8 @@ class Harness:
     def analyse(self) -> bool:
         """Write tables and report from the stored runs by ``hubslosh campaign``.
 
-        Return True if they contain all runs. The output of the program goes to the terminal. The
-        program also simulates runs that are not stored.
+        Return True if the stored runs are all runs of the plan. The output of the program goes to
+        the terminal. The program also simulates runs that are not stored.
         """
         return subprocess.run([self.program, *self._campaign()]).returncode == 0
 

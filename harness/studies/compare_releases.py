@@ -11,10 +11,11 @@ virtual environment in the target directory and needs the network. It takes some
 The runs are every slosh model with every friction law of version 0.1.0, with wheel and gyro, for
 300 s; and the 22 sine sweeps of Rubaga's thesis, 2700 s each, with the linear and the spherical
 model. For each output and scalar local variable that both builds have, the largest difference is
-divided by the maximum of the signal. This must be at most 1e-13, or at most SENSITIVE times the
-change of the older build if the last bit of a parameter changes, because the other digits of a
-motion that amplifies a last bit so much are not valid. Otherwise the program exits with 1.
-``omega_imu`` is left out, because version 0.1.0 took samples a step late from some 50 s on.
+divided by the maximum of the signal. The quotient must be at most 1e-13. If a motion amplifies
+rounding errors, its last digits are not valid; therefore the quotient may also be up to SENSITIVE
+times the quotient that the older build has when only the last bit of a parameter is changed.
+Otherwise the program exits with 1. ``omega_imu`` is left out, because in version 0.1.0 the gyro
+sampled one step too late from about 50 s on.
 """
 
 import argparse

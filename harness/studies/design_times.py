@@ -105,7 +105,7 @@ def loop_steps(loop: Any, inertia: float, runs: int, stop: float) -> list[Time]:
 
 
 def now(fills: int, points: int, runs: int, stop: float) -> tuple[list[Time], dict[str, Any]]:
-    """Return the times of the design steps in this version, and the loop as a dict for a file."""
+    """Return the times of the design steps in this version, and the loop for `before`."""
     import numpy as np
 
     import hubslosh

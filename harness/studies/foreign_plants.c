@@ -147,7 +147,7 @@ static void advance(const struct now *n, double t, double h, const double *from,
     for (int i = 0; i < N; i++) to[i] = from[i] + h / 6 * (k[0][i] + 2 * k[1][i] + 2 * k[2][i] + k[3][i]);
 }
 
-/* Returns true if the hub stops or breaks away before this state. */
+/* Returns true if the hub has stopped or broken away between the start of the step and this state. */
 static int changes(const struct now *n, double t, const double *y)
 {
     double dy[N];

@@ -139,7 +139,7 @@ BOX = "density = 998.2\nbox = [0.5, 0.05]\n"
 
 
 def rectangular_tanks() -> tuple[list[Row], str]:
-    """Compare 52 frequencies of the first mode over the depth, for waves of unknown amplitude."""
+    """Compare 52 frequencies of mode 1 at different depths; the wave amplitudes are unknown."""
     data, name = table("rectangular_tanks.csv"), "Addington (1960)"
     depth, measured = data["h_over_L"].to_numpy(), data["omega_sqrt_L_over_g"].to_numpy()
     unit = "density = 1000\nbox = [1, 1.5]\n"
@@ -274,7 +274,7 @@ DEPTH = 0.078  # m
 
 
 def cylinder_decay() -> tuple[list[Row], str]:
-    """Compare frequency and damping of water in a cylinder after a motion, by measured moments."""
+    """Compare frequency and damping after a motion of a cylinder, from measured moments."""
     name = "Soprani, Di Leva et al. (2025), free decay"
     of, _ = tank(CYLINDER, DEPTH, sigma=TENSION)
     omega, zeta = frequency(of), of["zeta[1]"]
@@ -444,8 +444,8 @@ def circling(parameters: dict[str, float], radius: float, rates: list[float]) ->
     """Return the height of the rotary wave, m, at each angular frequency of a circular motion.
 
     The motion of ``radius``, m, starts from rest; it keeps each of the ``rates``, rad/s, for 80
-    periods and changes to the next within 10. The height is that between the highest and the lowest
-    point at the wall, averaged over the last 20 periods.
+    periods and changes to the next within 10. The height of the wave is the difference between the
+    highest and the lowest point at the wall, averaged over the last 20 periods.
     """
     step, edges, values = 0.02, [0.0], [rates[0]]
     for before, rate in zip([rates[0], *rates[:-1]], rates, strict=True):
@@ -475,13 +475,13 @@ def circling(parameters: dict[str, float], radius: float, rates: list[float]) ->
 
 
 def cylinder_circular() -> tuple[list[Row], str]:
-    """Rotary waves of a cylinder whose axis moves on a circle, over the frequency."""
+    """Compare heights of rotary waves in a cylinder whose axis moves on a circle."""
     data, diameter = table("cylinder_circular.csv"), 0.287
     rows, panels = [], []
     names = {0.01: "Reclari (2013)", 0.02: "Reclari et al. (2014)"}
     for left, (path_share, name) in zip((60, 390), names.items(), strict=True):
         chosen = data[data["path_over_D"] == path_share]
-        # mode 1 alone, and heights of more than ten steps of the figure's grid
+        # use only frequencies at which mode 1 dominates, and heights that the figure resolves
         chosen = chosen[
             (chosen["height_over_D"] >= 0.02) & (chosen["frequency_over_natural"] < 1.5)
         ]
@@ -555,7 +555,7 @@ def planar_wave_breaks(parameters: dict[str, float], rate: float, amplitude: flo
 
 
 def cylinder_planar() -> tuple[list[Row], str]:
-    """Limits of the frequency between which a wave in the plane of the motion is unstable."""
+    """Compare the ends of the frequency band in which a wave in the plane of motion is unstable."""
     name, radius = "Royon-Lebeaud et al. (2007), 12 limits of planar waves", 0.15
     data = table("cylinder_planar_limits.csv")
     parameters, _ = tank(wall_cylinder(radius), 1.2 * radius, sigma=TENSION, model="SloshTank")
@@ -590,7 +590,7 @@ def cylinder_planar() -> tuple[list[Row], str]:
 
 
 def small_cylinders() -> tuple[list[Row], str]:
-    """Waves in small cylinders whose contact line does not move."""
+    """Compare frequency and damping of waves in small cylinders whose contact line is pinned."""
     rows = []
     for _, row in table("small_cylinders.csv").iterrows():
         mode = int(row["mode"])
@@ -656,8 +656,9 @@ def largest_roll(settings: dict, period: float) -> float:
     """Return the largest roll angle, rad, within 30 s of the rig with the moving mass.
 
     The mass m at the distance xi = 0.1 m sin(2 pi t/period) from the pivot has the torque -m g xi
-    cos(phi) - d(m xi^2 phi')/dt about it. The roll angle phi in it is that of the run before, until
-    the largest angle changes by less than 0.01 %.
+    cos(phi) - d(m xi^2 phi')/dt about it. Because the roll angle phi in this torque is not known
+    before the run, the run is repeated with the roll angle of the run before, until the largest
+    angle changes by less than 0.01 %.
     """
     mass, time = 4.978, np.arange(3001) * 0.01
     rate = 2 * math.pi / period
@@ -680,9 +681,9 @@ def largest_roll(settings: dict, period: float) -> float:
 
 
 def roll_damper() -> tuple[list[Row], str]:
-    """Roll angle of a driven rig with liquid in its tank, over that of the empty rig."""
+    """Compare the largest roll angle of a driven rig with liquid, relative to the empty rig."""
     name = "Bulian et al. (2010), SPHERIC test case 9"
-    # the record's name has 1.94 s, table 1 has 3.26 rad/s
+    # the name of the recording states a period of 1.94 s, table 1 states 3.26 rad/s
     periods = (1.94, 2 * math.pi / 3.26)
     empty = [largest_roll({"tanks": 0}, period) for period in periods]
     rows = []
@@ -705,7 +706,7 @@ def roll_damper() -> tuple[list[Row], str]:
                 "nonlinear",
                 "1",
                 measured,
-                # of both angles
+                # the ratio has the errors of two angles
                 math.sqrt(2) * UNSTATED["amplitude"] * measured + 0.005,
                 (max(ours) + min(ours)) / 2,
                 (max(ours) - min(ours)) / 2,
@@ -719,10 +720,11 @@ def roll_damper() -> tuple[list[Row], str]:
 
 
 def stands(ratio: float) -> bool:
-    """Return True if a spinning spheroid full of water stands, after a push that tilts it by 1°.
+    """Return True if a spinning spheroid full of water stays upright after a tilt by 1°.
 
-    ``ratio`` is the polar over the equatorial diameter. Where the source states nothing, the
-    diameter is 0.1 m, the rate 10 turns a second, and the shell a tenth of the water's mass.
+    ``ratio`` is the polar over the equatorial diameter. The source does not state diameter, rate
+    and mass of the shell; they are set to 0.1 m, 10 turns per second, and a tenth of the water's
+    mass.
     """
     a, spin = 0.05, 20 * math.pi
     c = ratio * a
@@ -762,7 +764,7 @@ def stands(ratio: float) -> bool:
 
 
 def tops() -> tuple[list[Row], str]:
-    """Tops that are filled with water stand if they are oblate."""
+    """Compare which tops filled with water stay upright: measurements say the oblate ones."""
     data = table("tops.csv")
     ours = np.array([stands(ratio) for ratio in data["polar_over_equatorial"]])
     name, quantity = "Kelvin (1876), Perry (1890), two tops", "share that stand or fall as computed"
@@ -771,7 +773,7 @@ def tops() -> tuple[list[Row], str]:
 
 
 def fits() -> tuple[list[Row], str]:
-    """Compare damping ratios with two published fits to measurements, and with one number.
+    """Compare damping ratios with two published formulas fitted to measurements, and one number.
 
     The contours deviate from the measured shapes by 1 to 2 %, so that the program computes their
     damping as for a shape without measurements.
@@ -872,7 +874,7 @@ SEEDS = range(1, 11)  # seeds of the gyro's noise
 
 
 def built_sweep(fill: dict, amplitude: float, gyro: str = "omega") -> tuple[float, bool]:
-    """Return the peak acceleration (rad/s²) in a sweep of the bench, and True if rotary."""
+    """Return the peak acceleration (rad/s²) of the bench as built, and True if slosh is rotary."""
     plan = tomllib.loads(PLAN.read_text(encoding="utf-8"))
     run = hubslosh.simulate(
         FMUS["HubSlosh"],
@@ -909,7 +911,7 @@ BREAKING = ((0.03, 0.66), (0.09, 0.60))
 
 
 def as_built() -> list[Row]:
-    """Compare the same quantities with the plan bench_as_built."""
+    """Compare the quantities of `bench` with simulations of the plan bench_as_built."""
     name = "Rubaga's thesis, bench as built"
     fills = [flat(run) for run in tomllib.loads(PLAN.read_text(encoding="utf-8"))["run"]]
     rows = []
@@ -995,7 +997,7 @@ def short(value: float, digits: int = 3) -> str:
 
 
 def ours_of(row: Row) -> str:
-    """Return the computed value of a comparison as text; for a share, the smallest that passes."""
+    """Return the computed value of a comparison as text, or the smallest allowed share."""
     if row.unit == "share":
         return f"at least {short(row.ours - row.band)}"
     return with_band(row.ours, row.band)
@@ -1044,7 +1046,7 @@ def page(rows: list[Row], cfd: float) -> str:
         ("experiment", "quantity", "measured ± its error", "computed ± its band", "result"),
         [
             (
-                # once, in its first row
+                # print the name of an experiment only in its first row
                 "" if before and before.experiment == row.experiment else row.experiment,
                 name_of(row),
                 with_band(row.measured, row.error),

@@ -12,7 +12,7 @@ by 10 %, because compilers differ by some per cent.
 | --- | --- |
 | hub | HubSlosh's bench, spherical model, no friction |
 | held | a craft with the same liquid, one tank and mode, under 1 g, which turns about one axis |
-| one | 1180 kg under 2400 N, one tank, one mode, constant damping law, as in all releases |
+| one | 1180 kg under 2400 N, one tank, one mode, the damping law that all releases have |
 | two | the same, two tanks of one mode, as in the comparison with Basilisk |
 | four | the same, four tanks of three modes each |
 | planar | one tank, one mode that swings in only one plane |

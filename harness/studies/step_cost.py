@@ -1,4 +1,4 @@
-"""Counts the instructions of fmi2DoStep by callgrind: median, largest, and of a bounded step.
+"""Counts the instructions of fmi2DoStep by callgrind: median, maximum, and upper bound of a step.
 
     python3 harness/studies/step_cost.py dist/HubSlosh.fmu --step 0.001 --swing tau_cmd=0.1 \
         --set slosh.model=spherical --max-steps 1000

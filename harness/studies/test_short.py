@@ -68,7 +68,7 @@ def style() -> None:
 def test_the_picture_of_rotary_slosh_in_the_readme_is_reproduced(
     fmu: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It shows two sweeps of 2700 s."""
+    """The picture shows two sweeps of 2700 s."""
     monkeypatch.setattr(rotary_branch, "FMU", fmu)
     same_picture(rotary_branch.draw(), rotary_branch.PICTURE)
 

@@ -153,7 +153,7 @@ def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, floa
 
 
 def basilisk() -> list[tuple[str, float, float]]:
-    """Return the rows of RK4 in basilisk.md: step (ms), CPU time relative to the FMU, error."""
+    """Return the rows of basilisk.md on RK4: step (ms), CPU time over the FMU's, error."""
     rows = re.findall(
         r"^\| Basilisk's RK4 \| (\S+) \| (\S+) \| (\S+) \|$",
         (PAGES / "basilisk.md").read_text(),

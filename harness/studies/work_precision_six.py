@@ -186,7 +186,7 @@ def error(found: np.ndarray) -> float:
 
 
 def without_rates(found: np.ndarray) -> np.ndarray:
-    """Return the columns of the benchmark from omega, velocity, and p and p' of both bobs."""
+    """Return the columns that the benchmark scores: all columns except p' of both bobs."""
     return np.hstack([found[:, :9], found[:, 12:15]]) if found.shape[1] == 18 else found
 
 

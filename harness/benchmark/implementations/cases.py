@@ -1,4 +1,4 @@
-"""Functions of all implementations: they read parameters and inputs, and write results.csv."""
+"""Functions that all implementations share: reading parameters and inputs, writing results.csv."""
 
 import csv
 import sys

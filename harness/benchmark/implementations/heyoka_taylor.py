@@ -154,7 +154,8 @@ class Bench:
             )
             for side, way in ((1, down), (-1, up))
         }
-        # separate integrator for the start of sliding, where an event could find rate 0 as an end
+        # separate integrator without events for the start of sliding, where the event at rate 0
+        # would end it at once
         self.leave = hy.taylor_adaptive(sliding, zeros, pars=[0, 0], **options)
         self.stick = hy.taylor_adaptive(sticking, zeros, pars=[0], t_events=leave, **options)
         self.load = hy.cfunc([load], [*coordinates, *rates])
@@ -171,7 +172,7 @@ class Bench:
         return np.array([0.0, x / k, y / k, 0.0, 0.0, 0.0])
 
     def columns(self, y):
-        """Return the columns of a row."""
+        """Return the values of one row of results.csv after the time."""
         if not self.spherical:
             return [y[0], y[2], y[1]]
         k = 2 / (1 + y[1] ** 2 + y[2] ** 2)
@@ -454,7 +455,7 @@ def wave(s, kappa, g, l):
 
 
 def backbones():
-    """Return frequencies from the time to the middle, and of circles from the balance of forces."""
+    """Return frequencies from quarter periods or, for circles, from the balance of forces."""
     rows = []
     s, kappa = hy.par[0], hy.par[1]
     lagrangian, _, places, rates = wave(s, kappa, 1.0, 1.0)

@@ -154,7 +154,7 @@ class Bench:
         return np.array(rows)
 
     def outputs(self, y):
-        """Return the columns of a row."""
+        """Return the values of one row of results.csv after the time: the first states."""
         return y[:3] if not self.spherical else y[:4]
 
 
@@ -210,7 +210,7 @@ def draining_rates(p, y, force, torque):
     own = p["iota"] * liquid * np.diag([1.0, 1.0, 0.0])
     own_d = -p["iota"] * f * np.diag([1.0, 1.0, 0.0])
 
-    def moment(mass, a, b):  # term of the integral of r x (w x r)
+    def moment(mass, a, b):  # returns one term of the integral of r x (w x r) over the mass
         return -mass * skew(a) @ skew(b)
 
     rigid_inertia_d = own_d + moment(rigid_d, s, s) + moment(rigid, s_d, s) + moment(rigid, s, s_d)
@@ -314,7 +314,7 @@ def linearisation():
 
 
 def backbones():
-    """Return the frequencies over the amplitude."""
+    """Return the frequency of free waves for each amplitude in the input of the case."""
     rows = []
     for number, (_, degrees, s, kappa) in enumerate(cases.inputs_of_backbones(), 1):
         largest = np.sin(np.radians(degrees))

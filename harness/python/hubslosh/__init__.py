@@ -5,16 +5,16 @@
     start = {"tank.h": (50, "mm"), "init.slosh_angle": (10, "deg")}
     run = hubslosh.simulate(parameters=start, stop=60)
 
-`simulate` returns a table of time histories; `closed_loop` does so for an FMU with a sampled
-controller, and `margins` returns the stability margins of that loop. `monte_carlo` repeats a
-simulation with parameters drawn at random. `linearize` returns a state-space model, `uncertain` a
-state-space model with uncertain parameters. `frequency_response` estimates a frequency response
-from a time history; `fit` fits a transfer function to the estimate. `tank` and `liquid_modes`
-compute slosh modes; `mode_errors` shows how many modes a model needs. `read_recording` reads
-recordings of data loggers, `identify` fits parameters to them, and `posterior` samples the
-parameters from their posterior distribution. `view` shows a run in 3-D, and the module `plot` draws
-diagrams. `Plant` is an FMU instance that you advance step by step yourself. `analyse`, `campaign`,
-`check`, `identify` and `view` call the program ``hubslosh``.
+`simulate` returns a table of time histories, `closed_loop` returns such a table for an FMU under a
+sampled controller, and `margins` returns the stability margins of this control loop. `monte_carlo`
+repeats a simulation with parameters drawn at random. `linearize` returns a state-space model,
+`uncertain` a state-space model with uncertain parameters. `frequency_response` estimates a
+frequency response from a time history; `fit` fits a transfer function to the estimate. `tank` and
+`liquid_modes` compute slosh modes; `mode_errors` shows how many modes a model needs.
+`read_recording` reads recordings of data loggers, `identify` fits parameters to them, and
+`posterior` samples the parameters from their posterior distribution. `view` shows a run in 3-D, and
+the module `plot` draws diagrams. `Plant` is an FMU instance that you advance step by step yourself.
+`analyse`, `campaign`, `check`, `identify` and `view` call the program ``hubslosh``.
 """
 
 from importlib import import_module

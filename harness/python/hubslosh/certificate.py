@@ -45,7 +45,8 @@ ROUNDING = 1e-9  # Smallest margin that proves X < 0; X is scaled so that the di
 # Largest number of times that an interval is halved with the same scalings.
 HALVINGS = 8
 
-# Factors by which the size is divided, one after the other, until a size can be certified.
+# `UncertainModel.certify` divides the size of Δ that it tries to certify by each of these factors,
+# one after the other, until a size can be certified.
 SIZES = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 SMALLEST_BOX = 1e-3  # Smallest width of a box, as a fraction of the whole range

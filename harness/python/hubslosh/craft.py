@@ -786,7 +786,7 @@ class Craft:
     def _resolve(
         self, fill: Fill, parameters: Parameters | None, **options: Any
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
-        """Return untrimmed parameters, the slosh-mode quantities among the given, and the delay.
+        """Return untrimmed parameters, given values of slosh modes by name, and the given delay.
 
         The delay is None if ``parameters`` has none.
         """
@@ -817,9 +817,10 @@ class Craft:
         *,
         trimmed: bool = True,
     ) -> OperatingPoint:
-        """Return the operating point of ``every``, with the slosh-mode quantities in ``modes``.
+        """Return the operating point of a craft with the parameters ``every``.
 
-        ``factors`` are multipliers of the frequencies of slosh modes, by name.
+        ``modes`` has new values of slosh modes by name, for example of ``tank[1].frequency[1]``.
+        ``factors`` has factors by which frequencies of slosh modes are multiplied, by name.
         """
         model = self.model
         if trimmed:
@@ -937,9 +938,11 @@ class Craft:
     ) -> dict[str, Quantity]:
         """Return the parameters of Spacecraft with tanks that drain, starting at a fill.
 
-        The FMU stops where the liquid leaves the fill table. The table has damping ratios and
-        third-order coefficients at every fill; a warning names the fills at which the coefficients
-        are not known and are bounded by the coefficients at other fills.
+        The FMU stops with an error when the liquid of a tank falls below the lowest fill of the
+        fill table, or rises above the highest. The table has damping ratios and third-order
+        coefficients at every fill. At some fills no formula gives the third-order coefficients;
+        there the table has values that are interpolated between the nearest fills with known
+        coefficients, and a warning names these fills.
 
         Parameters
         ----------
@@ -1127,9 +1130,9 @@ class Craft:
         True
 
         An engine whose thrust misses the centre of mass turns the craft. Margins do not depend on
-        this torque, because the loop belongs to the equilibrium at which the controller holds it. A
-        simulation from rest adds it as a constant, which ends in an attitude error of torque over
-        gain:
+        this torque, because the loop is linearised at the equilibrium, in which the controller
+        balances the torque. In a simulation from rest the torque acts as a constant disturbance, so
+        that the attitude error approaches torque divided by gain:
 
         >>> engine = hubslosh.Engine((0.01, 0, 0), (0, 0, 1), 50)
         >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, engines={"main": engine})
@@ -1532,7 +1535,7 @@ class Craft:
         """
         shift = self.trim(fill).shift
         F, action, torque = self._resultant()
-        # trimming moves O, and with it the engines that burn
+        # in the FMU, trimming moves O, and with it the line of action of the engines that burn
         wrenches = {
             name: engine.wrench(action if engine.burns else action + shift)
             for name, engine in self.engines.items()

@@ -23,7 +23,7 @@ AROUND = 1.3  # Ratio of a diagram's range in dB to the largest gain margin that
 # the loop gain changes more, frequencies are inserted.
 TURN = 0.12
 
-ODD = (-900, -540, -180, 180)  # Phases at which the loop gain is negative, deg
+ODD = (-900, -540, -180, 180)  # Phases at which the loop gain is real and negative, deg
 
 # Circle of the loop gains at the distance 0.5 from -1, the usual requirement of a modulus margin.
 CIRCLE = -1 + 0.5 * np.exp(1j * np.linspace(0, 2 * np.pi, 200))

@@ -158,7 +158,7 @@ class DeltaSearch:
     def _followed(self, start: Complex, largest: float) -> Iterator[WorstCase]:
         """Yield limits of stability that are found by following each lightly damped pole.
 
-        The direction in Δ is the sign of the derivative of the pole's magnitude by each δ.
+        Each δ changes in the direction that increases the magnitude of the pole.
         """
         count, seen = len(self.least), set()
         light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]

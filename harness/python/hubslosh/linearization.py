@@ -164,7 +164,7 @@ class LinearModel:
         return np.asarray(self.C @ states + self.D, np.complex128)
 
     def _then(self, other: "LinearModel", prefix: str) -> "LinearModel":
-        """Return this model in series with ``other``; names of its states begin with ``prefix``."""
+        """Return this model in series with ``other``, whose states get the prefix ``prefix``."""
         nothing = np.zeros((self.A.shape[-1], len(other.A)))
         return LinearModel(
             _block([[self.A, nothing], [other.B @ self.C, other.A]]),
@@ -251,7 +251,7 @@ class LinearModel:
                 f"the model cannot be sampled with a period of {period:g} s: a mode grows by "
                 f"{fastest:.3g} 1/s"
             )
-        on_the_way = m * (cycles + 1)  # delayed commands, oldest first: it acts in this cycle
+        on_the_way = m * (cycles + 1)  # delayed commands, the oldest first
         # the new input comes after the delayed commands
         effect = np.zeros((*self.A.shape[:-2], n + on_the_way, n + on_the_way + m))
         effect[..., :n, :n], effect[..., :n, n : n + m] = step, full - later

@@ -379,7 +379,7 @@ def identify(
     inputs, outputs : sequence of str
         With ``free``: columns of the data, by the names of the FMU's inputs and outputs.
     prior : mapping, optional
-        With ``free``: mean and standard deviation of unknowns that are known from elsewhere.
+        With ``free``: mean and standard deviation of unknowns of which estimates exist already.
     settings : mapping, optional
         Values of other parameters.
     out : str or Path, optional

@@ -353,10 +353,10 @@ def rigid_rest(
 ) -> tuple[float, float, float, float]:
     """Return mass, height and inertia of the rigid liquid after point masses are added to it.
 
-    ``points`` has pairs of a mass and its height. The fourth result is 0 or negative: an inertia
-    across the axis that must be subtracted from the dry craft, because the inertia of the rigid
-    liquid itself would become negative, as in a sphere. Dry craft and rigid liquid move together,
-    so that only the sum of their inertias acts.
+    ``points`` has pairs of a mass and its height. The fourth result is 0 or, if the inertia of the
+    rigid liquid across the axis would become negative, as in a sphere, this negative inertia; the
+    returned inertia is then raised to 0, and the caller must add the negative inertia to the dry
+    craft. Dry craft and rigid liquid move together, so that only the sum of their inertias acts.
     """
     moment = m_0 * H_0
     inertia = I_0 + moment * H_0

@@ -327,7 +327,7 @@ def _results(
 
 
 def _text(name: str, of: Range) -> str:
-    """Return a string that identifies a range; runs that were stored for others are not reused."""
+    """Return a string that identifies a range; stored runs are reused only if it is unchanged."""
     if hasattr(of, "ppf"):
         shape = ", ".join(f"{of.ppf(share):.17g}" for share in (0.01, 0.2, 0.5, 0.8, 0.99))
         kind = getattr(getattr(of, "dist", None), "name", type(of).__name__)

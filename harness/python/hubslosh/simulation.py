@@ -26,7 +26,8 @@ from .wheels import Wheel, columns_of, follow, torques_of, units_of
 
 Real = NDArray[np.float64]
 
-# Columns of a torque history (``hubslosh torque``) that have the slope of an input, by this input.
+# Columns of a torque history (``hubslosh torque``) that contain the slope of an input, each with
+# the name of this input.
 SLOPES = {"tau_slope": TORQUE}
 
 DEFAULT_STEP = 0.02  # Step if neither the rows of the inputs nor the FMU specify one, s

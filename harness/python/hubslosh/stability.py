@@ -587,7 +587,7 @@ def _unit_eigenvalues(
 ) -> list[tuple[float, float]]:
     """Return frequencies (rad/s) at which an eigenvalue of L has the magnitude 1.
 
-    Each is returned after the delay (s) that rotates the eigenvalue to -1.
+    Each item is the delay (s) that rotates the eigenvalue to -1, followed by the frequency.
     """
     period = gain.period or 0.0
     roots = [np.linalg.eigvals(gain.A).astype(complex), closed]

@@ -85,7 +85,8 @@ def _candidates(
 ) -> list[tuple[str, LinearModel]]:
     """Return candidate filters, each with its description, for one slosh mode.
 
-    This is an unstable slosh mode or, if all are stable, the mode with the largest loop gain.
+    The filters are placed at an unstable slosh mode or, if all modes are stable, at the mode with
+    the largest loop gain.
     """
     if slosh.empty:
         return []

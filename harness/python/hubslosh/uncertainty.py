@@ -6,8 +6,9 @@ its origin at d, its axis along e, and the axes E = (x, y) across e; e × E = E 
 S = [0 -1; 1 0]. A slosh mode has the mass m, the natural frequency ω (in a fixed tank under the
 present specific force) and the damping ratio ζ. Its slosh mass, the bob, is at rest in the tank at
 r = d + b e. At the operating point, the specific force at the bob is A = a + w' × r + W W r with
-X = γ X_f + X_c, where X_c is the acceleration that rotation alone causes, and γ is a factor of the
-other accelerations.
+X = γ X_f + X_c, where X_c is the acceleration that rotation alone causes, X_f is the acceleration
+due to force and torque, and the uncertain factor γ multiplies X_f. M_tot is the mass matrix of
+craft and liquid about O.
 
     g = e·A = γ g_f + g_c - b |w_E|²        β = E^T A       w_E = E^T w,  w_e = e·w,  w_e' = e·w'
     κ = S^T E^T w'                          G_r = -(W r)× - W r×   change of W W r by δw
@@ -35,13 +36,14 @@ displacement η_0. With y = p η and D, the derivative of the inertia about O by
     M_tot δX = … - u η'' - [w' × y + W W y; y × a + D w' η + W D w η] - [2 W p; W l + D w] η'
 
 The equations of the tanks are Newton's law of the bob, linearised after the force of the rod is
-eliminated (book, Spacecraft: equations). Because m scales the state s, m multiplies only α.
-M_tot X = m_b [A; r_b × A] + [0; J w'] + liquid, with A = a + w' × r_b. The number of products with
-an uncertain parameter is the number of its repetitions in Δ. In a craft that does not spin these
-are: m 2, ζ 2, ω 4, b 4 and γ 2 for each mode; dry mass 3; a moment of inertia 1; a product of
-inertia 2; a coordinate of r_b 4. If a free surface is not at rest, ω and b may have 1 or 2 more; in
-a craft that spins, b and inertias may have 1 or 2 more. Finally, each repeated block is reduced to
-its controllable and observable part, which does not change the model.
+eliminated (book, Spacecraft: equations). Because m scales the state s, m multiplies only α. For a
+dry craft with the mass m_b, the centre of mass r_b and the inertia J, M_tot X = m_b [A; r_b × A] +
+[0; J w'] + the share of the liquid, with A = a + w' × r_b. The number of products with an uncertain
+parameter is the number of its repetitions in Δ. In a craft that does not spin these are: m 2, ζ 2,
+ω 4, b 4 and γ 2 for each mode; dry mass 3; a moment of inertia 1; a product of inertia 2; a
+coordinate of r_b 4. If a free surface is not at rest, ω and b may have 1 or 2 more; in a craft that
+spins, b and inertias may have 1 or 2 more. Finally, each repeated block is reduced to its
+controllable and observable part, which does not change the model.
 """
 
 import json
@@ -657,7 +659,7 @@ def _partitioned(
 
 
 def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
-    """Return a mask of those of the first ``inside`` signals that inputs reach and outputs show."""
+    """Return a mask: which of the first ``inside`` signals inputs affect and outputs depend on."""
     size = np.abs(M).max(axis=1, keepdims=True)
     joined = np.abs(M) > 1e-14 * size
     reached = joined[:inside, inside:].any(axis=1)

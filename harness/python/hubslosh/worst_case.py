@@ -269,11 +269,12 @@ def _scaled(model: LinearModel, output: int, factor: float) -> LinearModel:
 def _followed(
     gain: LinearModel, command: str, pole: complex, factors: tuple[float, float]
 ) -> complex:
-    """Return the pole of the closed loop (z plane) into which ``pole`` moves with a gain.
+    """Return the closed-loop pole (z plane) into which ``pole`` moves while a gain changes.
 
-    The gain of one command is multiplied by the first, and in small steps up to the second of
-    ``factors``. The pole that decides stability at the first need not be the slowest at the second:
-    a slosh mode with little damping may decay more slowly.
+    ``factors`` has the first and the last factor of the gain of one command; ``pole`` is a pole at
+    the first factor. The factor changes in small steps, so that the pole can be followed. The
+    followed pole need not have the slowest decay at the last factor, because a slosh mode with
+    little damping may decay more slowly.
     """
     for factor in np.linspace(*factors, STEPS):
         poles = _closed(_scaled(gain, gain.inputs.index(command), factor))
