@@ -149,7 +149,7 @@ class Margins:
     """Stability margins of a loop: distances of its loop gain to -1."""
 
     gain: float
-    """Largest factor of the gains with which the loop is stable, dB; below 0 it is unstable."""
+    """Largest factor of the gains with which the loop is stable, dB; negative if unstable."""
     modulus: float
     """Smallest distance of the loop gain to -1; 0 if the loop is unstable."""
     slosh_gain: float

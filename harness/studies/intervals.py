@@ -228,9 +228,9 @@ def planned_bench(bench: Bench, draws: int) -> Iterator[Result]:
 
 
 def campaign(friction: str) -> Draws:
-    """Return a function that yields features of slow sweeps, each with another seed of the gyro.
+    """Return a function that yields features of a slow sweep, each with another seed of gyro noise.
 
-    The true value is the feature of the run without a gyro.
+    The true value is the feature of the sweep without gyro noise.
     """
 
     def draw(bench: Bench, draws: int) -> Iterator[Result]:
@@ -325,7 +325,7 @@ def tank_damping(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def each(method: Callable[[Bench, np.random.Generator], Result]) -> Draws:
-    """Return a function that draws a method with the seeds 0, 1, and so on."""
+    """Return a function that yields the result of a method for each of the seeds 0, 1, 2, …."""
 
     def draw(bench: Bench, draws: int) -> Iterator[Result]:
         for seed in range(draws):

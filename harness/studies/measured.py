@@ -332,7 +332,7 @@ def cylinder_decay() -> tuple[list[Row], str]:
 
 
 def ramp(duration: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the motion law from 0 to 1 and its derivatives.
+    """Return the robot's motion law, which rises from 0 to 1, and its first two derivatives.
 
     The acceleration is a trapezoid with cosine ramps of T/8: positive up to 3/8 T, through 0 at
     T/2, negative up to 7/8 T. The way back is the same.

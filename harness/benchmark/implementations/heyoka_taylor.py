@@ -220,7 +220,7 @@ class Bench:
         return np.array(rows)
 
     def contact(self, y, tau: float) -> int:
-        """Return the contact of a hub at rest."""
+        """Return 0 if a hub at rest sticks, or the sign of the sliding that begins."""
         load = self.load(y, pars=np.array([tau]))[0]
         return 0 if abs(load) <= self.most else int(np.sign(load))
 

@@ -116,7 +116,7 @@ def call(
 
 
 def _end(child: "subprocess.Popen[str]") -> None:
-    """End the program, which ends its guarded processes first."""
+    """End the program, which first ends the processes in which it runs FMUs."""
     child.terminate()
     try:
         child.wait(5)

@@ -109,8 +109,8 @@ class MountedTank:
         Contact angle between surface and wall, deg.
     spin : float, optional
         Rate at which liquid, tank and craft rotate about the tank's axis, rad/s; by default it
-        follows from the ``spin`` of the `Craft`. The liquid then has an inertia of spin and its
-        modes gyroscopic coefficients.
+        follows from the ``spin`` of the `Craft`. The parameters of the FMU then include the spin
+        inertia of the liquid and the gyroscopic coefficients of its modes.
 
     Examples
     --------

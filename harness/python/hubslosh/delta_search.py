@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-DRAWS = 500  # Number of random Δ in each box
+DRAWS = 500  # Number of random Δ that are tried in each box of Δ
 
 # Magnitude of a pole above which the loop counts as unstable. It is a little above 1, because the
 # undamped poles of uncontrollable modes are computed with rounding errors.
@@ -28,7 +28,7 @@ UNSTABLE = 1 + 1e-9
 
 FIRST_STEP, LAST_STEP = 0.2, 2e-3  # Largest and smallest step of δ in a pattern search
 
-SHRINK = (0.9, 1 - 3e-3)  # Ratios of the next box to the present box, tried one after the other
+SHRINK = (0.9, 1 - 3e-3)  # Ratios of the next to the present size of the box of Δ, tried in turn
 
 TOGETHER = 64  # Number of Δ whose poles are computed together, so that the matrices fit the cache
 

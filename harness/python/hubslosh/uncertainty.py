@@ -659,7 +659,7 @@ def _partitioned(
 
 
 def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
-    """Return a mask: which of the first ``inside`` signals inputs affect and outputs depend on."""
+    """Return which of the first ``inside`` signals depend on an input and affect an output."""
     size = np.abs(M).max(axis=1, keepdims=True)
     joined = np.abs(M) > 1e-14 * size
     reached = joined[:inside, inside:].any(axis=1)

@@ -26,9 +26,9 @@ STARTS = 2  # Number of points from which the search starts, at different fills
 
 SMALLEST = 0.25  # Smallest step of the search, in units in which the range of a quantity is -1 to 1
 
-ASIDE = 0.01  # Relative distance of the simulated gains from the gain margin, on both sides
+ASIDE = 0.01  # Relative difference of the two simulated gains from the gain at the limit, ±
 
-STEPS = 11  # Number of gains at which the critical pole is followed from the margin
+STEPS = 11  # Gains between the limit and a simulated gain at which the pole is followed
 
 RATE = 1e-8  # Disturbance at the start of a simulation: angular velocity about each axis, rad/s
 

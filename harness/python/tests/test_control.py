@@ -86,8 +86,8 @@ def test_a_compiled_controller_is_bit_identical_to_the_controller_in_python(
 ) -> None:
     """A linear controller runs in compiled code; the same controller as a Python function agrees.
 
-    It has three commands, six measurements, a filter with a state, a quaternion, a reference and
-    substeps.
+    The controller has three commands, six measurements among which is a quaternion, a filter with a
+    state, and a reference; the run has substeps.
     """
     loop = three_axes(spacecraft)
     slew = attitude.slew(np.radians(30), 20, (1, 0.3, 0), inertia=np.diag([300.0, 170.0, 260.0]))

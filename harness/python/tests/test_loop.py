@@ -118,7 +118,7 @@ def test_all_errors_in_the_arguments_of_a_loop_are_reported_at_once(fmu: Path) -
 
 
 def test_the_name_of_a_vector_stands_for_all_its_components(fmu: Path) -> None:
-    """Loops, linear models and recorded outputs accept it."""
+    """Loops, linear models and recorded outputs accept names such as ``omega``."""
     craft = fmu.with_name("Spacecraft.fmu")
     start = {"force[3]": 100.0, "init.omega[1]": 0.01}
     whole = Loop(np.eye(3), 0.1, craft, start, "omega", "torque")

@@ -269,7 +269,7 @@ def test_the_cost_of_a_worst_case_search_is_limited(craft: Craft, largest: objec
 
 
 def test_a_quantity_that_cannot_be_given_names_the_parameter_to_leave_out(craft: Craft) -> None:
-    """The values follow from the fill table of ``mass_flow``, or from the diameter of a tank."""
+    """The frequency follows from the fill table for ``mass_flow``, or from the diameter."""
     frequency, given = ModeQuantity(1, "frequency", 1), craft.parameters("50%")
     drains = Modes(craft.model, given | {"tank[1].fill.points": 3}).problem(frequency)
     assert drains.endswith("cannot be given; leave out mass_flow, or vary the fill instead")

@@ -99,7 +99,7 @@ def _diagonal(blocks: list[np.ndarray]) -> np.ndarray:
 
 
 def test_every_public_object_prints_in_20_lines(made: dict[str, Callable[[], Any]]) -> None:
-    """The ``repr`` of each public object is also no longer than a paragraph."""
+    """The ``repr`` of each public object is at most as long as a paragraph."""
     public = {n for n in hubslosh.__all__ if inspect.isclass(getattr(hubslosh, n))}
     assert public <= set(made)
     for name, make in made.items():

@@ -91,7 +91,7 @@ def closed_form(craft: Craft, fill: str) -> tuple[float, float, float, float]:
 def test_the_kind_of_stabilisation_depends_on_the_height_of_the_tank(
     craft: Craft, height: float, order: str, phase: float
 ) -> None:
-    """Hinge and slosh mass are both ahead of the centre of mass, on both sides, or both behind.
+    """Hinge and slosh mass are above, on both sides of, or below the centre of mass.
 
     The controller moves the pole by Kd (ω_z² - ω_p²)/(2 I ω_p²), so that the mode is stabilised by
     phase if the zero has the lower frequency.

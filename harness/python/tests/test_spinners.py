@@ -254,7 +254,7 @@ def test_the_worst_case_of_wheels_on_a_spinner_is_its_total_momentum(spinner: Cr
 def test_a_spin_of_the_craft_or_of_a_tank_applies_to_the_craft_and_all_liquids(
     spinner: Craft,
 ) -> None:
-    """It is set either as ``spin`` of the craft, or as ``spin`` of a tank."""
+    """The spin is set either as ``spin`` of the craft, or as ``spin`` of a tank."""
     values = spinner.parameters("50%")
     assert values["init.omega[3]"] == 0.7 and values["init.omega[1]"] == 0
     assert values["tank[1].spin_inertia"] > 0 and values["tank[2].spin_inertia"] > 0
