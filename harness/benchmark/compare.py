@@ -126,7 +126,7 @@ def table(rows: Iterable[dict[str, str]]) -> str:
 
 
 def with_table(text: str, rows: list[dict[str, str]]) -> str:
-    """Return the page with the table between its marks."""
+    """Return the page with the table between the comments that mark its place."""
     begin, end = (text.index(mark) for mark in MARKS)
     return f"{text[:begin]}{MARKS[0]}\n\n{table(rows)}\n\n{text[end:]}"
 

@@ -141,10 +141,10 @@ def reference(case: str, specified: dict) -> Table:
 
 
 def match(path: Path, table: Table, wanted: Table) -> list[dict[str, float]]:
-    """Return the rows of a table that the reference has, too, in the order of the reference.
+    """Return the rows of a table that the reference has, too, in ascending order.
 
-    Rows are matched by the first column. The table may have further rows, for example at more
-    times.
+    Rows are matched and sorted by the first column. The table may have further rows, for example at
+    more times.
     """
     key = next(iter(wanted.columns))
     keys = sorted((row[key], i) for i, row in enumerate(table.rows))

@@ -1022,9 +1022,10 @@ def verdict(rows: list[Row]) -> str:
 
 
 def computed() -> float:
-    """Return the largest relative difference of our frequencies from those by CFD.
+    """Return the largest relative difference of our frequencies from published CFD results.
 
-    These are separate from the comparisons, because computations are no measurements.
+    They are kept apart from the comparisons with measurements, because computations are no
+    measurements.
     """
     data = table("box_cfd.csv")
     ours = [

@@ -72,7 +72,7 @@ def names(*groups: str) -> list:
 
 
 def attitude(q, w, a):
-    """Return q', and the vector ``a`` transformed to inertial axes."""
+    """Return the derivative of the quaternion q, and ``a`` transformed to inertial axes."""
     s, v = q[0], q[1:]
     q_d = [-0.5 * dot(v, w), *(0.5 * x for x in add(scale(s, w), cross(v, w)))]
     t = scale(2.0, cross(v, a))
@@ -485,7 +485,7 @@ def backbones():
 
 
 def forced():
-    """Return cosine and sine of the liquid's centre of mass over the last 15 of 150 periods."""
+    """Return cosine and sine amplitude of the liquid's centre over the last 15 of 150 periods."""
     p = cases.parameters("forced")
     natural = np.sqrt(p["g"] / p["l"])
     lagrangian, motion, places, rates = wave(p["s"], p["kappa"], p["g"], p["l"])

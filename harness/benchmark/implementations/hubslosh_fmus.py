@@ -292,7 +292,7 @@ def hermite(x: np.ndarray, y: np.ndarray, slope: np.ndarray) -> float:
 
 
 def forced() -> np.ndarray:
-    """Return cosine and sine of the liquid's centre of mass over the last 15 of 150 periods."""
+    """Return cosine and sine amplitude of the liquid's centre over the last 15 of 150 periods."""
     p, rows = cases.parameters("forced"), []
     natural = math.sqrt(p["g"] / p["l"])
     pieces = 384  # linear pieces of the input per period; every sixth point is used, as on the page

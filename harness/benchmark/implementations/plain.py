@@ -336,7 +336,7 @@ def backbones():
 
 
 def forced():
-    """Return cosine and sine of the liquid's centre of mass over the last 15 of 150 periods."""
+    """Return cosine and sine amplitude of the liquid's centre over the last 15 of 150 periods."""
     p, rows = cases.parameters("forced"), []
     m, l, g, s, kappa = (p[name] for name in ("m", "l", "g", "s", "kappa"))
     natural = np.sqrt(g / l)

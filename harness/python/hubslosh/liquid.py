@@ -484,7 +484,7 @@ class _Tank(NamedTuple):
 
     @contextmanager
     def solid(self) -> "Iterator[tuple[Any, int, Sequence[float], float]]":
-        """Yield gmsh, the rotated interior of the tank as a solid, its bounding box and its volume.
+        """Yield the module gmsh, the rotated tank as a solid, its bounding box and its volume.
 
         The volume is computed before the rotation, because OpenCASCADE computes the volume of round
         shapes exactly only if they are not rotated.

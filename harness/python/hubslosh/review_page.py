@@ -167,7 +167,7 @@ def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure],
 
 
 def _signs(margin: str, drawn: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the signs of the lines of a required margin; a gain margin has lines on both sides."""
+    """Return the signs with which a required margin is drawn: + and - for a gain margin, else +."""
     if margin == "gain_margin":
         return (1, -1) if "gain_up" in drawn else ()
     return (1,) if margin in drawn else ()

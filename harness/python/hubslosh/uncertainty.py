@@ -363,7 +363,7 @@ def _read(
                 )).tolist()  # fmt: skip
                 if f > 0:
                     length = g_ref / ((TURN * f) ** 2 - k / m)
-                # gyroscopic_stiffness = ε + 1 - 2 C, and 0 with C = 1 is a pendulum
+                # the parameter gyroscopic_stiffness is ε + 1 - 2 C; a pendulum has C = ε = 1
                 swirl = (2 * (1 - C) * float(axes[:, 2] @ omega) + (stiffness + 2 * C - 1) * V) * V
                 if (C, stiffness) == (1.0, 0.0):
                     swirl = 0.0

@@ -291,7 +291,7 @@ def test_small_tilts_change_frequencies_by_their_square() -> None:
 
     upright, small, twice = (frequency(degrees) for degrees in (0, 4, 8))
     assert small < upright
-    # the fourth order is 5 % of the second order at 8°; errors of the meshes are 1e-5 of 5e-3
+    # at 8° the fourth order is 5 % of the second order, 5e-3; the errors of the meshes are 1e-5
     assert (upright - twice) / (upright - small) == pytest.approx(4, rel=0.1)
 
 

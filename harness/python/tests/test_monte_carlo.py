@@ -170,7 +170,7 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
 def test_a_share_is_a_range_about_the_nominal_value(tmp_path: Path) -> None:
     """A share gives the same draws and the same stored study as (low, high).
 
-    It needs a nominal value.
+    A share needs a nominal value.
     """
     ranges, nominal = {"a": "10%", "b": "± 5 %", "c": ["x", "y"]}, {"a": 2.0, "b": -4.0}
     ends = {"a": (1.8, 2.2), "b": (-4.2, -3.8), "c": ["x", "y"]}

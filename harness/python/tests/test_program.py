@@ -269,8 +269,8 @@ def test_identification_gives_typed_estimates(
     viscous = found.parameters["friction.b"]
     assert viscous.unit == "N.m.s" and 0 < viscous.std < 0.05 * viscous.value
     assert abs(viscous.value - 0.03793) < 4 * viscous.std
-    # a simulation with the file of results differs from the recording by far less than its noise,
-    # 1e-4 rad/s
+    # a simulation with the identified parameters differs from the recording by far less than the
+    # noise of the recording, 1e-4 rad/s
     twin = hubslosh.simulate(fmu, tmp_path / "result.json", inputs, outputs=["omega"])
     assert np.std(twin["omega"] - clean["omega"]) < 3e-5
     (tmp_path / "other.json").write_text("[]")

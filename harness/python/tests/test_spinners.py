@@ -272,7 +272,7 @@ def test_a_spin_of_the_craft_or_of_a_tank_applies_to_the_craft_and_all_liquids(
 
 
 def test_an_error_names_both_of_two_spins_that_contradict_each_other(spinner: Craft) -> None:
-    """The message also says which of them to leave out."""
+    """The message also says which spin to leave out."""
     tank = replace(spinner.tanks["axial"], spin=0.4)
     with pytest.raises(
         FmuError, match=r"axial: spin = 0\.4 rad/s, but .* at 0\.7 rad/s .*give the spin"

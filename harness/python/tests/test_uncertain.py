@@ -72,7 +72,7 @@ def test_every_draw_is_the_linear_model_of_the_fmu(spacecraft: Path) -> None:
     deltas = [np.zeros(count), np.ones(count), -np.ones(count), 1.5 * (-1.0) ** np.arange(count)]
     for delta in [*deltas, *random.uniform(-1, 1, (40, count))]:
         assert difference(model, delta, spacecraft) < 1e-11
-    # the ranges have an effect
+    # the uncertain parameters change the matrices
     assert np.abs(model.at(deltas[1]).A - model.at(deltas[0]).A).max() > 1e-3
     # the parameters at Δ = 0 are the middles of the ranges
     assert model.values(deltas[0])["tank[2].frequency[1]"] == pytest.approx(0.215, rel=1e-12)
