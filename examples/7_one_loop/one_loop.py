@@ -183,7 +183,8 @@ def adaptive(fmu: str | Path, folder: Path, tolerance: float) -> tuple[np.ndarra
         while loop.time < STOP - 1e-9:
             until = jump(loop)
             saved, start = loop.save(), loop.time
-            # a step ends neither after a jump nor just before it
+            # equal steps up to the next jump, so that a step ends exactly there and none is very
+            # short
             left = np.ceil((until - start) / step)
             end = until if left == 1 else start + (until - start) / left
             whole = go(end)

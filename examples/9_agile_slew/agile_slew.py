@@ -24,13 +24,13 @@ BANDWIDTH, DAMPING = 0.25, 0.9
 """Bandwidth and damping ratio of attitude control for a rigid craft: rad/s, 1."""
 NOISE = 2e-6  # rad/s, standard deviation of a gyro sample
 UNKNOWN = 1e-3
-"""Process noise of the filter in the liquid's rate, 1/s per cycle."""
+"""Standard deviation of the filter's process noise in the liquid's rate, 1/s per cycle."""
 POINTING, RATE = np.radians(2e-3), np.radians(1e-3)
 """Imaging begins when the errors stay below these limits: rad, rad/s."""
 
 J_XX = 450.0  # kg·m², inertia of the dry craft about roll
 MASS, LENGTH, FIXED, ARM = 35.0, 0.15, 45.0, 0.5
-"""Of each tank: sloshing mass (kg), pendulum (m), rigid liquid (kg), distance from roll (m)."""
+"""Each tank: slosh mass (kg), pendulum length (m), rigid liquid (kg), distance from roll (m)."""
 OWN = 0.5  # kg·m², inertia of a tank's rigid liquid about its own axis
 FREQUENCY, ZETA = 0.08, 0.01
 """Frequency (Hz) and damping ratio of weightless liquid on its diaphragm in a fixed craft."""

@@ -35,7 +35,7 @@ TANK = """
 density = 1000.0
 shape = { cylinder = { radius = 0.4, height = 1.0 } }
 """
-# position of each tank's origin from O, which is its lowest point, m
+# position from O of the origin of each tank, which is the tank's lowest point, m
 PLACES = ((0.0, 0.0, -0.75), (0.0, 0.0, 0.45))
 FILLS = (0.6, 0.35)  # m
 NOISE = {  # gyro noise per row and drift, rad/s; accelerometer, m/s²; biases, scale, alignment

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 Vector = npt.NDArray[np.float64]
 Result = dict[str, tuple[float, ...]]
-"""True value and ends of each interval; for `design` also the ratio of its width to the fit's."""
+"""True value and interval ends by quantity; for `design` also predicted over fitted width."""
 
 GYRO = 4.07e-4
 """Standard deviation of the gyro's noise in one row, rad/s."""

@@ -649,7 +649,7 @@ ROLL = {
     "craft.Jyy": 26.9 - 29.2**2 / 100,
     "craft.Jzz": 26.9 - 29.2**2 / 100,
 }
-"""The rig of SPHERIC test case 9, table 1: about the pivot I_0 = 26.9 kg.m2, S_G = -29.2 kg.m."""
+"""Rig of SPHERIC test case 9 (table 1): inertia 26.9 kg.m2, first moment -29.2 kg.m about pivot."""
 
 
 def largest_roll(settings: dict, period: float) -> float:
@@ -907,7 +907,7 @@ def flat(settings: dict, prefix: str = "") -> dict:
 
 
 BREAKING = ((0.03, 0.66), (0.09, 0.60))
-"""Growth and onset of wave breaking: both ends of the ranges in book/damping.md."""
+"""Growth and onset of damping by breaking waves: both ends of their ranges in book/damping.md."""
 
 
 def as_built() -> list[Row]:

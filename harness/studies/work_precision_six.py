@@ -46,7 +46,7 @@ MARKS = ("<!-- six axes: written by harness/studies/work_precision_six.py -->", 
 FMU = ROOT / "dist" / "Spacecraft.fmu"
 CASE = "thrust"
 ROUNDS = 20
-"""Repetitions of the inputs; in every second one torque and lateral force have opposite signs."""
+"""Repetitions of the inputs; in every second repetition torque and lateral force change sign."""
 RUNS = 7
 """Number of repetitions of each measurement; the shortest time counts."""
 

@@ -455,7 +455,7 @@ def wave(s, kappa, g, l):
 
 
 def backbones():
-    """Return frequencies from quarter periods or, for circles, from the balance of forces."""
+    """Return frequencies of free waves by quarter periods or, for circles, by balance of forces."""
     rows = []
     s, kappa = hy.par[0], hy.par[1]
     lagrangian, _, places, rates = wave(s, kappa, 1.0, 1.0)

@@ -244,7 +244,7 @@ def still_tank(s: float, kappa: float, g: float, place, rate=(0.0, 0.0, 0.0)) ->
 
 
 def backbones() -> np.ndarray:
-    """Return frequencies from quarter periods or, for circles, from the balance of forces."""
+    """Return frequencies of free waves by quarter periods or, for circles, by balance of forces."""
     rows = []
     names = ["tank.p[1,1]", "tank.p_dot[1,1]"]
     for number, (_, degrees, s, kappa) in enumerate(cases.inputs_of_backbones(), 1):

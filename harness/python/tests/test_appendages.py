@@ -84,7 +84,7 @@ def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
         name = f"appendage[{j}]"
         at, part = vector(f"{name}.position"), vector(f"{name}.participation", 6)
         p, w = part[:3], 2 * np.pi * of[f"{name}.frequency"]
-        # displacements under the steady thrust
+        # modal displacements of the appendages under the steady thrust
         eta = -(p @ a) / w**2
         y = p * eta
         both = crossed(at) @ crossed(y) + crossed(y) @ crossed(at)

@@ -236,7 +236,7 @@ def test_the_worst_case_of_wheels_on_a_spinner_is_its_total_momentum(spinner: Cr
     worst = model.worst_case(loop, largest=10)
     assert model.values(worst.delta)["craft.Jzz"] == pytest.approx(-h / s, rel=1e-3)
     assert worst.frequency == pytest.approx(s / (2 * np.pi), rel=1e-3)
-    # with slosh, and the same wheels on a craft of another kind
+    # the same wheels, except for the speed of z, on a spinner with tanks
     full = replace(spinner, wheels=wheels | {"z": replace(wheels["z"], speed=-600 / 0.5)})
     loop = full.loop(k * np.eye(3), 0.1, "50%", measured="omega", command="wheels", delay=0.05)
     names = ("left.frequency[1]", "right.bob[1]", "craft.Jzz")

@@ -124,7 +124,7 @@ for name in ["hubslosh", *names]:
         found = doctest.TestResults(found.failed + more.failed, found.attempted + more.attempted)
 assert not found.failed and found.attempted > 100, found
 """
-"""Program that runs the examples of every docstring, without the names of the module."""
+"""Program that runs the examples of every docstring; they must import all names that they use."""
 
 
 @pytest.mark.long
