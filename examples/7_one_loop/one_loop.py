@@ -276,7 +276,7 @@ def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> 
 
 
 def main() -> None:
-    """Compare the hosts, then the masters."""
+    """Compare hosts with the harness, then the adaptive master with masters of fixed steps."""
     parser = argparse.ArgumentParser(description="One loop in several hosts.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--folder", type=Path, default=Path("dist"), help="Controller.fmu's folder")

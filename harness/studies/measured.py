@@ -190,7 +190,7 @@ def rectangular_tanks() -> tuple[list[Row], str]:
 
 
 def box_decay() -> tuple[list[Row], str]:
-    """Compare frequency and damping of small free waves."""
+    """Compare frequency and damping of small free waves in a narrow box."""
     name = "Bäuerlein and Avila (2021), free decay"
     of, _ = tank(BOX, 0.4)
     omega, zeta = frequency(of), of["zeta[1]"]

@@ -118,7 +118,7 @@ class Compiled:
 
 
 def sundials(right: Compiled, tolerance: float) -> Solution:
-    """Return a solution by CVODE (Adams), which is restarted where the inputs jump."""
+    """Return a function that solves by CVODE (Adams), restarted where the inputs jump."""
 
     def solution(given: list) -> np.ndarray:
         y, found = np.array(right.start), []
@@ -136,7 +136,7 @@ def sundials(right: Compiled, tolerance: float) -> Solution:
 
 
 def dop853(right: Compiled, tolerance: float) -> Solution:
-    """Return a solution by SciPy's DOP853, which is restarted where the inputs jump."""
+    """Return a function that solves by SciPy's DOP853, restarted where the inputs jump."""
 
     def solution(given: list) -> np.ndarray:
         y, found = np.array(right.start), []
@@ -154,7 +154,7 @@ def dop853(right: Compiled, tolerance: float) -> Solution:
 
 
 def fmu(tolerance: float) -> Solution:
-    """Return a solution by Spacecraft.fmu in steps from row to row, including its set-up."""
+    """Return a function that solves by Spacecraft.fmu, from row to row, including its set-up."""
     p = cases.parameters(CASE)
     settings, axes = hubslosh_fmus.with_tanks(p)
     names = hubslosh_fmus.columns_of(len(axes))

@@ -48,7 +48,7 @@ def bob(craft, pendulum) -> np.ndarray:
 
 
 def run(case: str, integrator: str = "RKF78", step: float | None = None) -> np.ndarray:
-    """Return the rows of a case.
+    """Simulate a case by Basilisk, and return the rows of its results.csv.
 
     ``integrator`` is the name of the integrator in Basilisk, and ``step`` its step, s.
     """

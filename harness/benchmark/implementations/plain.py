@@ -162,7 +162,7 @@ class Bench:
 
 
 def craft_rates(p, y, force, torque):
-    """Return the rates of a craft with pendulums: q, omega, velocity, p and p' of each bob."""
+    """Return the derivatives of the states of a craft with pendulums: q, omega, velocity, p, p'."""
     q, w = y[:4], y[4:7]
     s, mass = p["center"], p["mass"]
     origin = cases.inertia(p) - mass * skew(s) @ skew(s)
@@ -198,7 +198,7 @@ def craft_rates(p, y, force, torque):
 
 
 def draining_rates(p, y, force, torque):
-    """Return the rates of a craft with one tank that drains; the last state is the liquid."""
+    """Return the derivatives of the states of a draining craft; the last is the liquid's mass."""
     q, w, d, d_d, liquid = y[:4], y[4:7], y[10:13], y[13:16], y[16]
     f, l, e = p["flow"], p["l"], np.array([0.0, 0.0, 1.0])
     place, out = p["position"], p["position"] + p["outlet"] * e

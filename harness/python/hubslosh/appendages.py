@@ -132,7 +132,7 @@ class Appendage:
         most: int = 6,
         names: tuple[str, str] = ("mxx", "kxx"),
     ) -> "Appendage":
-        """Return an appendage from matrices that are reduced to its interface.
+        """Return an appendage from the mass and stiffness matrix of its Craig–Bampton reduction.
 
         The first six degrees of freedom are the translation and rotation of the interface point,
         the further ones are modes with unit modal mass. If there are more than ``most`` modes, only

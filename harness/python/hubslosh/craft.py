@@ -362,7 +362,7 @@ class Craft:
         return found
 
     def _spin_of(self, name: str) -> float:
-        """Return the rate of the craft about the axis of a tank, rad/s; 0 if it is rounding."""
+        """Return the spin of the craft about a tank's axis, rad/s; a rounding error counts as 0."""
         omega = self._omega
         rate = abs(float(self.tanks[name].rotation[:, 2] @ omega))
         return rate if rate > 1e-9 * np.linalg.norm(omega) else 0.0

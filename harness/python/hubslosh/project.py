@@ -189,7 +189,7 @@ class Project:
         return np.asarray(law, float).tolist()
 
     def _each(self) -> "dict[str, tuple[Craft, dict[str, Any]]]":
-        """Return craft and settings of each case by its name, or of the project if it has no cases."""
+        """Return craft and settings of each case by name, or of a project without cases."""
         if not self.cases:
             return {self.name: (self.craft, dict(self.settings))}
         found = {}
