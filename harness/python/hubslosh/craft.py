@@ -941,8 +941,8 @@ class Craft:
         The FMU stops with an error when the liquid of a tank falls below the lowest fill of the
         fill table, or rises above the highest. The table has damping ratios and third-order
         coefficients at every fill. At some fills no formula gives the third-order coefficients;
-        there the table has values that are interpolated between the nearest fills with known
-        coefficients, and a warning names these fills.
+        there the table has values interpolated between fills with known coefficients, or the
+        nearest known values, and a warning names these fills.
 
         Parameters
         ----------
