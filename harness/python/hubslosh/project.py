@@ -189,7 +189,7 @@ class Project:
         return np.asarray(law, float).tolist()
 
     def _each(self) -> "dict[str, tuple[Craft, dict[str, Any]]]":
-        """Return craft and settings of each case by name, or of a project without cases."""
+        """Return craft and settings of each case by name; a project without cases is one case."""
         if not self.cases:
             return {self.name: (self.craft, dict(self.settings))}
         found = {}

@@ -1169,7 +1169,7 @@ class UncertainModel:
 
     @property
     def _least(self) -> Matrix:
-        """Lower bound of each δ: a damping ratio is 0 there, and other quantities are above 0."""
+        """Lower bound of each δ, at which a damping ratio is 0 and other quantities are above 0."""
         found = np.full(len(self.deltas), -np.inf)
         for k, name in enumerate(self.deltas):
             if name in self.spread.index and (share := _LEAST.get(_kind(name))) is not None:
