@@ -20,8 +20,8 @@ fn motion(x: &[f64; STATES]) -> [V; 2] {
     [axes.inverse() * v(&x[index::VELOCITY..]), v(&x[index::OMEGA..])]
 }
 
-/// Returns the Lagrangian of a dry craft with appendages: the kinetic energy of the dry craft as a rigid body, the energy
-/// from each mode's motion y = p eta relative to its interface point, and the modes' own energies.
+/// Returns the Lagrangian of a dry craft with appendages, that is, the kinetic energy of the undeformed craft, plus the energy
+/// from each mode's motion y = p eta relative to its interface point, plus the modes' own kinetic minus elastic energies.
 fn lagrangian(p: &Parameters, x: &[f64; STATES]) -> f64 {
     let [velocity, w] = motion(x);
     let center = velocity + w.cross(&v(&p.craft.r));
@@ -64,7 +64,7 @@ fn each_appendage_mode_follows_lagranges_equation() {
                 };
                 difference(moved, 1e-2)
             };
-            // This is d/dt of dL/d(eta') along the motion.
+            // The time derivative of the generalised momentum dL/d(eta') along the motion.
             let momentum = |t: f64| {
                 let moved = std::array::from_fn(|i| x[i] + t * rate[i]);
                 along(&moved, index::ETA_DOT + k)
@@ -155,7 +155,8 @@ fn free_free(p: &Parameters) -> Vec<(f64, Vec<f64>)> {
             }
         }
         let w = (low + high) / 2.0;
-        // A root at a clamped frequency is left out: there the craft does not move, and the determinant has no pole.
+        // A root at a clamped frequency is left out, because the craft does not move at this frequency and the
+        // determinant has no pole.
         if modes.iter().all(|(_, w_n)| (w / w_n - 1.0).abs() > 1e-6) {
             let [a, b, c] = matrix(w);
             let moves = if a.abs() > c.abs() { [-b, a] } else { [c, -b] };
@@ -222,8 +223,8 @@ struct Panel {
 }
 
 impl Panel {
-    /// Returns the derivatives of the eight states: rates of x, y and angle of the hub and of the panel's angle, and their
-    /// second derivatives. The equations are those of two rigid bodies at any angle. `force` along the hub's y axis and
+    /// Returns the time derivatives of the eight states. The states are x, y and angle of the hub and the angle of the panel, and
+    /// then the rates of these four. The equations are those of two rigid bodies at any angle. `force` along the hub's y axis and
     /// `torque` act on the hub.
     fn rates(&self, z: &[f64; 8], force: f64, torque: f64) -> [f64; 8] {
         let Panel { hub: [mass, j], m, d, inertia, hinge, k, c } = *self;
@@ -231,8 +232,8 @@ impl Panel {
         let (sin, cos) = angle.sin_cos();
         let (sin_p, cos_p) = (angle + bend).sin_cos();
         let both = turn + swing;
-        // Velocity of the panel's centre per rate of hub and panel, and the part of its
-        // acceleration without second derivatives.
+        // Velocity of the panel's centre per unit rate of the hub (`turned`) and of the panel (`swung`), and the part of its
+        // acceleration that does not depend on second derivatives.
         let swung = [-d * sin_p, d * cos_p];
         let turned = [-hinge * sin + swung[0], hinge * cos + swung[1]];
         let left = [
@@ -313,7 +314,8 @@ fn a_hinged_panel_is_one_mode_at_small_angles() {
     }
 }
 
-/// Appendage modes without participation oscillate by themselves. A craft with such modes moves as a craft without them.
+/// An appendage mode with zero participation vector oscillates without moving the craft, so a craft with such modes moves like
+/// a craft without them.
 #[test]
 fn appendage_modes_without_participation_do_not_change_the_motion_of_the_craft() {
     let mut random = Random::new(3);
@@ -345,7 +347,7 @@ fn errors_stay_within_the_solver_tolerance_with_appendages() {
         let mut p = random.parameters();
         random.flex(&mut p);
         if seed % 2 == 1 {
-            // Two cases are added: a craft at rest, and a mode that is faster than the craft.
+            // The last two cases are a craft at rest, and a mode that is faster than the craft.
             p.appendage.iter_mut().for_each(|mode| (mode.eta, mode.eta_dot) = (0.0, 0.0));
             p.appendage[0].frequency = 20.0;
         }
@@ -382,7 +384,7 @@ fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     bent.appendage[0].eta = 1e3;
     let problems = new(&bent).err().unwrap();
     assert!(problems[0].contains("appendage[].eta_0 = [1000.0]"), "{problems:?}");
-    // A host may set the deflection. The next step is then refused and changes no state.
+    // An importer may set a deflection that is too large. The next step is then refused and changes no state.
     bent.appendage[0].eta = 0.0;
     let mut craft = new(&bent).unwrap();
     let mut x = craft.continuous_states();

@@ -154,7 +154,7 @@ fn residuals(
 fn check(name: &str, relative: [f64; 3], excess: &mut Vec<String>) {
     let [momentum, angular, energy] = relative;
     println!("{name:20} P {momentum:.1e}  H {angular:.1e}  E {energy:.1e}");
-    // Written so that NaN fails.
+    // The condition is negated so that NaN fails, too.
     if !(momentum < 1e-12 && angular < 1e-12 && energy < 1e-10) {
         excess.push(format!("{name}: P {momentum:e}, H {angular:e}, E {energy:e}"));
     }
@@ -185,7 +185,7 @@ fn momentum_angular_momentum_and_energy_balance_over_10_s_of_random_craft() {
     random_craft(END / 100);
 }
 
-/// As the test over 10 s, but over 100 s.
+/// Like the test over 10 s, but over 100 s.
 #[test]
 #[ignore = "20 s: .ci/run --nightly"]
 fn momentum_angular_momentum_and_energy_balance_over_100_s_of_random_craft() {
@@ -233,7 +233,7 @@ fn random_craft(most: usize) {
         if seed >= 26 {
             random.spin_all(&mut p);
         }
-        // Bobs on surfaces other than spheres move too fast for the nodes of one panel, and bobs in spinning
+        // Bobs on surfaces other than spheres move so fast that one step needs several panels of Lobatto's rule. Bobs in spinning
         // liquid move even faster.
         let panels = match seed {
             0..14 => 1,

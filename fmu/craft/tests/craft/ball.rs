@@ -19,15 +19,15 @@ pub(super) fn thrust(force: f64) -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, force]), ..Inputs::default() }
 }
 
-/// Returns the default craft at rest. Its tank, 1.2 m high, is half full. The liquid's centre rests 0.3 m above the bottom,
-/// so that it can move by 0.6 m.
+/// Returns the default craft at rest. Its tank is 1.2 m high and half full. At rest the centre of the liquid is 0.3 m above the
+/// bottom, so that it can rise by 0.6 m.
 fn craft() -> Parameters {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
     p
 }
 
-/// Returns a random craft with two tanks that stand neither on the axis nor along it.
+/// Returns a random craft with two tanks whose positions are off the craft's axis and whose axes are inclined to it.
 pub(super) fn off_axis_craft(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 2, ..random.parameters() };
     p.mount = Mount::Free;
@@ -81,7 +81,7 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!((m * speed - 41.8).abs() < 0.05, "{}", m * speed);
     craft.step(&reversed, 2e-9).unwrap();
     let after = craft.outputs(&reversed);
-    // The impact transfers the momentum (1 + e) mu v to the craft.
+    // The impact transfers the momentum (1 + e) mu v to the craft, where mu is the reduced mass of craft and liquid.
     let mu = m * m_b / (m + m_b);
     let jump = after.velocity[2] - before.velocity[2];
     assert!((jump - (1.0 + e) * mu * speed / m_b).abs() < 1e-9);
@@ -116,7 +116,7 @@ fn an_event_indicator_changes_sign_where_the_mean_cosine_of_the_bobs_passes_45_d
             assert!((seen[2] - expected).abs() < 1e-15, "{tank} {mode} {angle}: {seen:?}");
             assert_eq!([seen[1], seen[3]], [1.0; 2]);
             assert!(seen[0] > 0.0, "{seen:?}");
-            // A host may set directions that do not have unit length.
+            // An importer may set directions of bobs that do not have unit length.
             let mut x = craft.continuous_states();
             x[index::bob(1, 0)..index::bob(2, 0)].iter_mut().for_each(|x| *x *= 1.5);
             craft.set_continuous_states(&x);
@@ -127,9 +127,9 @@ fn an_event_indicator_changes_sign_where_the_mean_cosine_of_the_bobs_passes_45_d
     }
 }
 
-/// In a tank without a model of detached liquid the first event indicator changes its sign exactly where thrust no longer
-/// holds the liquid, so that a host finds the time at which the tank leaves its range of validity. A spring holds the bob
-/// of the second tank.
+/// In a tank without a model of detached liquid the first event indicator changes its sign exactly where thrust no longer holds
+/// the liquid at the bottom. An importer that locates events can thus find the time at which the tank leaves its range of
+/// validity. The bob of the second tank is held by a spring, so that this tank stays within its range.
 #[test]
 fn an_indicator_crosses_zero_where_thrust_no_longer_holds_the_liquid() {
     let mut p = Parameters { tanks: 2, ..Parameters::default() };
@@ -366,8 +366,9 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Compares communication steps of 0.5, 1 and 2 s with steps of 10 ms. Bounces amplify errors: runs that start 1e-9 rad
-/// apart end up to 50,000 times as far apart. The allowed difference is a tenth of the tolerance times this amplification.
+/// Compares runs with communication steps of 0.5, 1 and 2 s with a run with steps of 10 ms. Because bounces amplify errors, two
+/// runs that start 1e-9 rad apart may end up 50,000 times as far apart. The allowed difference is a tenth of the solver's
+/// tolerance times the amplification that is measured for each seed.
 fn move_alike(seeds: impl Iterator<Item = u64>) {
     let mut worst: (f64, u64, f64) = (0.0, 0, 0.0);
     for seed in seeds {
@@ -392,15 +393,14 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
     );
 }
 
-/// In an earlier version impact times came from a product of two power series of which only the terms up to their order
-/// were used, and the distance from the wall at which the liquid starts was left out. Runs with these seeds then had errors
-/// of up to 2e-2 m.
+/// Seeds of runs that had errors of up to 2e-2 m in an earlier version. That version computed impact times from a truncated
+/// product of two power series, and left out the distance from the wall at which the liquid starts.
 #[test]
 fn the_motion_of_detached_liquid_does_not_depend_on_the_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
 }
 
-/// Detached liquid under 200 random histories of thrust moves alike with different communication steps.
+/// Detached liquid under 200 random histories of thrust moves in the same way with every communication step.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_communication_step() {
@@ -424,7 +424,7 @@ fn a_craft_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_de
     );
 }
 
-/// Accelerations and forces that solve Newton's laws in which the wall's force is an unknown.
+/// Accelerations and forces as the solution of Newton's laws, in which the wall's force is an unknown.
 struct Rates {
     a: V,
     w_d: V,
@@ -435,8 +435,8 @@ pub(super) fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 
-/// Returns the wall that the detached liquid of a tank meets: height of the wall's centre on the tank's axis and semi-axes
-/// b, b, a, from the liquid's centre at rest and the pendulums' m l.
+/// Returns the wall that stops the centre of the detached liquid, a spheroid: the height of its centre on the tank's axis, and
+/// its semi-axes b, b, a. Both follow from the liquid's centre at rest and the pendulums' first moments m l.
 pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     let tank = &p.tank[i];
     let modes = || 0..tank.modes;
@@ -448,8 +448,8 @@ pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     ((tank.m_0 * tank.h_0 + bobs) / mass + a, V::new(b, b, a), mass)
 }
 
-/// Returns J_a, the inertia of all parts of the liquid about their common centre, for the directions `p` of
-/// the rods, body axes.
+/// Returns J_a, the inertia of all parts of the liquid about their common centre, body axes. `p` are the directions
+/// of the pendulums' rods.
 pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     let tank = &p.tank[i];
     let axes = *rotation(&tank.q).matrix();
@@ -535,8 +535,8 @@ fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rat
     Rates { a: part(0), w_d: part(3), x_dd }
 }
 
-/// Returns a craft with two detached liquids at random places within their walls. `slides` states which of them
-/// are on the wall.
+/// Returns a craft with two detached liquids at random places within their walls. `slides` states for each of the two whether it
+/// is on the wall.
 fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
     let p = off_axis_craft(random);
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-12).unwrap();
@@ -585,8 +585,8 @@ fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
     }
 }
 
-/// Also directions that point away from the wall have a derivative, because position and rate are projected onto the wall
-/// before rates are computed.
+/// The perturbation of the states may move the liquid off the wall. The derivative exists all the same, because position and rate
+/// are projected onto the wall before the rates are computed.
 #[test]
 fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..12 {
@@ -594,8 +594,8 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
         let (_, mut craft) = loose(&mut random, CASES[seed as usize % 3]);
         let u = random.inputs();
         let x = craft.continuous_states();
-        // The bobs' directions belong to the direction of the derivative, because they determine the inertia of
-        // the detached liquid's shape.
+        // The perturbation dx includes the directions of the bobs, because they determine the inertia of the detached liquid's
+        // shape.
         let dx: [f64; STATES] = random.vector(0.1);
         let du: [f64; INPUTS] = random.vector(1.0);
         let list = |rates: &[f64; STATES], out: &Outputs| {
@@ -626,7 +626,7 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
         let have = list(&rates, &craft.output_derivatives(&u, &dx, &du));
         for i in 0..have.len() {
             let want = (8.0 * (p1[i] - m1[i]) - (p2[i] - m2[i])) / (12.0 * step);
-            // The errors are step^4 and 1e-16/step times the size of the quantity and of its curvature.
+            // The errors of a difference are step^4 times its curvature, plus 1e-16/step times the size of the quantity.
             let size = 1.0 + want.abs() + p1[i].abs();
             assert!((have[i] - want).abs() < 1e-8 * size, "{seed} {i}: {} {want}", have[i]);
         }
@@ -716,8 +716,8 @@ impl Simulator {
     }
 }
 
-/// A second simulator, with its own equations and its own search for impacts, simulates random craft with detached liquid.
-/// It finds the same motions and times of impacts.
+/// A second simulator, with its own equations and its own search for impacts, simulates random craft with detached liquid. It
+/// finds the same motions, and impacts at the same times.
 #[test]
 fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
     for seed in 0..5 {
@@ -830,7 +830,7 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
                 changes[usize::from(is == settled)] += 1;
                 let place =
                     |out: &Outputs| v(&out.position) + rotation(&out.q) * v(&out.center_of_mass);
-                // Change of the momentum by the thrust in 2 ms, with the mean of the momentum for the position.
+                // Change of the momentum by the thrust in 2 ms; the change of the position is computed with the mean momentum.
                 let thrust = v(&u.force.value).norm() * 2e-3;
                 let gained = v(&after.momentum) - v(&before.momentum);
                 let along = rotation(&before.q) * v(&u.force.value) * 2e-3;
@@ -865,7 +865,7 @@ fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
         craft.step(&u, 0.37).unwrap();
         other.step(&u, 0.37).unwrap();
         assert_eq!(craft.state(), other.state(), "{k}");
-        // A craft that has advanced further returns to the saved state.
+        // After a simulation that has advanced further, the saved state is restored.
         let saved = *craft.state();
         other.step(&u, 5.0).unwrap();
         other.set_state(&saved);
@@ -881,8 +881,8 @@ fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
     }
 }
 
-/// A Model Exchange host with Runge-Kutta steps of 1 ms, which locates sign changes of an indicator by bisection, finds the
-/// same impacts and settling times as Co-Simulation.
+/// A Model Exchange importer that integrates by Runge-Kutta steps of 1 ms, and locates sign changes of an indicator by bisection,
+/// finds the same impacts and settling times as Co-Simulation.
 #[test]
 fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation() {
     let mut p = craft();
@@ -958,7 +958,7 @@ fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation()
     let want = own.continuous_states();
     for i in 0..STATES {
         let off = (x[i] - want[i]).abs();
-        // The error comes from the host's steps of 1 ms; events are located to 1e-15 s.
+        // The error comes from the importer's steps of 1 ms; events are located to 1e-15 s.
         assert!(off < 1e-7 * (1.0 + want[i].abs()), "x[{i}] {} {}", x[i], want[i]);
     }
 }

@@ -1,7 +1,8 @@
-//! Tests of liquid that leaves the bottom of a tank on a host, compared with the same tank in a Spacecraft.
+//! Tests of liquid that leaves the bottom of a SloshTank on a rigid body that the test simulates, as a host (importer) of the FMU
+//! does. The motion is compared with the motion of a Spacecraft with the same tank.
 //!
-//! The host is a rigid body that solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 times the impulses of the
-//! tank to its velocity and angular velocity. Momenta and energy are computed by a Spacecraft in the same state.
+//! `Host` is this rigid body. It solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 times the impulses of the tank
+//! to its velocity and angular velocity. Momenta and energy are computed by a Spacecraft in the same state.
 
 use craft::{
     BallState, Coupling, Inputs, Outputs, Parameters, Ramp, SloshTank, SloshTankOutputs,
@@ -93,8 +94,8 @@ impl Craft {
         }
     }
 
-    /// Returns the present inputs of the tank, which are the motion of the host. The slope of the acceleration is 0: the
-    /// drag of the bobs does not depend on the acceleration here.
+    /// Returns the inputs of the tank at this instant, which are the motion of the body that carries it. The slope of the
+    /// acceleration may be 0, because the drag of these bobs does not depend on the acceleration.
     fn inputs(&mut self, u: &Inputs) -> TankInputs {
         let w = self.host.w;
         let still = self.held(w, &Six::zeros());
@@ -142,8 +143,8 @@ impl Craft {
         BallState::ALL[words[TankState::WORDS - 1] as usize - 1]
     }
 
-    // The following methods are those of a host that integrates all states by Runge-Kutta, and locates sign changes of
-    // an indicator by bisection.
+    // With the following methods all states of body and tank are integrated by Runge-Kutta, as in Model Exchange, and sign
+    // changes of an indicator are located by bisection.
 
     pub(super) fn pack(&self) -> Vec<f64> {
         let Host { q, w, r, velocity, work } = self.host;
@@ -232,8 +233,8 @@ impl Craft {
         }
     }
 
-    // The following methods are those of a host that steps first, with bias and added mass extrapolated by their slopes, and
-    // then steps the tank.
+    // With the following methods body and tank exchange values at communication points only. The body steps first, with bias and
+    // added mass extrapolated by their slopes, and then the tank steps.
 
     fn exchange(&mut self, u: &Inputs, h: f64) {
         let given = self.inputs(u);
@@ -320,9 +321,9 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
     (v(&a) - v(&b)).norm()
 }
 
-/// Thrust acts backwards, then not at all, and then forwards. The host uses Runge-Kutta steps of 1 ms, locates
-/// events to 1e-16 s, and integrates the liquid's states as in Model Exchange. Without thrust, momentum and angular
-/// momentum keep their values.
+/// Thrust acts backwards, then not at all, and then forwards. The body that carries the tank is integrated by Runge-Kutta steps
+/// of 1 ms together with the liquid's states, as in Model Exchange, and events are located to 1e-16 s. Without thrust, momentum
+/// and angular momentum are constant.
 #[test]
 fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_energy() {
     let (mut seen, mut impulses) = ([0; 6], 0);
@@ -373,7 +374,7 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
         println!("{seed}: w, V, E, r {errors:?}");
         // Each impact amplifies errors about ten times.
         assert!(errors[..3].iter().all(|error| error.abs() < 1e-8), "{seed} {errors:?}");
-        // When liquid settles, a Spacecraft shifts its position to conserve the centre of mass, which this host does not.
+        // When liquid settles, a Spacecraft shifts its position to conserve the centre of mass. This body does not.
         assert!(errors[3] < if has_settled { 1e-2 } else { 1e-8 }, "{seed} {errors:?}");
         impulses += craft.impulses;
     }
@@ -381,8 +382,9 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
     assert!(seen[1..4].iter().all(|count| *count > 3_000), "{seen:?}");
 }
 
-/// Motion along the axis does not rotate the host, so that the host's delay within a step is known exactly. With two steps a
-/// second the host has the same velocity as a Spacecraft, through a reversal of thrust, bounces and settling at both ends.
+/// Motion along the axis does not rotate the body that carries the tank, so that the effect of its delay by one step is known
+/// exactly. With two steps a second the body has the same velocity as a Spacecraft, through a reversal of thrust, bounces and
+/// settling at both ends.
 #[test]
 fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
@@ -421,9 +423,9 @@ fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     }
 }
 
-/// Six tanks off the craft's axis fly with thrust backwards, then forwards. In each step the host advances first; host and
-/// tank exchange values that are linear over the step. The errors of rates, detached liquid and dissipated energy are of
-/// second order in the communication step. The errors of velocity and of the momentum's direction are of first order,
+/// Six tanks off the craft's axis fly with thrust backwards, then forwards. In each step the body that carries the tank advances
+/// first; body and tank exchange values that are linear over the step. The errors of rates, detached liquid and dissipated energy
+/// are of second order in the communication step. The errors of velocity and of the momentum's direction are of first order,
 /// because they depend on the attitude, which lags behind the impulses within a step.
 #[test]
 fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_motion() {
@@ -464,8 +466,8 @@ fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_m
     assert!(coarse.iter().all(|error| *error < 1e-2), "{coarse:?}");
 }
 
-/// Returns the tank of [`one`] in the state `ball`, and an acceleration of the host that presses the liquid to the
-/// wall if it slides.
+/// Returns the tank of [`one`] with its liquid in the state `ball`, and an acceleration of the tank that presses the liquid
+/// against the wall if the liquid slides.
 fn placed(seed: u64, ball: BallState) -> (SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let p = one(&mut random);

@@ -1,5 +1,5 @@
-//! Steps over rounded corners in the force laws, where power series converge only over short times: the errors must
-//! be within the tolerance.
+//! Steps over rounded corners in the laws of drag, near which power series converge only over short times. The errors of these
+//! steps must be within the tolerance.
 
 use craft::{
     DampingLaw, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, TANKS, Tank,
@@ -72,9 +72,9 @@ fn table_with_flows(r: &mut Random) -> Vec<Row> {
     rows
 }
 
-/// Returns a craft with one or two tanks whose drag follows the specific force by every damping law, half of them with the
-/// default a_f. A third of the modes has drag that grows with the amplitude, and a third has breaking waves. In a sixth of
-/// the tanks the bobs move on surfaces other than spheres.
+/// Returns a craft with one or two tanks. Their drag depends on the specific force by one of the damping laws; in half of the
+/// craft the smoothing a_f has its default. A third of the modes has drag that grows with the amplitude, and a third has breaking
+/// waves. In a sixth of the tanks the bobs move on surfaces other than spheres.
 fn parameters(r: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1 + r.below(2), mount: Mount::Free, ..r.parameters() };
     p.max_steps = 1_000_000;
@@ -206,16 +206,16 @@ fn craft_states(p: &Parameters, rows: &[Row], way: Way) -> Vec<f64> {
     all
 }
 
-/// Returns the largest difference between two states, divided by 1 rad or 1 rad/s, or by the largest rate if it
-/// is above 1 rad/s.
+/// Returns the largest difference between two states, divided by 1 rad or 1 rad/s. If the largest rate is above 1 rad/s, the
+/// difference is divided by this rate.
 fn off(a: &[f64], b: &[f64]) -> f64 {
     let size = b.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
 }
 
-/// Compares runs with communication steps of whole rows with the exact motion, which is computed in steps of 2 ms at a
-/// tolerance of 1e-13. The allowed error is 30 times the tolerance. Since a pendulum that falls over amplifies errors, it is
-/// multiplied by the factor by which a small displacement at the start grows.
+/// Compares runs whose communication steps are whole rows of the table with a reference that is computed in steps of 2 ms at a
+/// tolerance of 1e-13. The allowed error is 30 times the tolerance, multiplied by the factor by which a small initial
+/// displacement grows, because a pendulum that falls over amplifies errors.
 fn keep_the_tolerance(seeds: impl IntoIterator<Item = u64>, run: impl Fn(u64, Way) -> Vec<f64>) {
     let mut worst = (0.0, 0, 0.0);
     for seed in seeds {
@@ -304,8 +304,8 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_craft() {
     keep_the_tolerance(0..10, draining_craft_of);
 }
 
-/// The smoothed acceleration a_+ of the drag has singularities at the complex times +-i a_f/x' from the instant at which the
-/// specific force x crosses zero. Without attention to them, steps had errors of up to 400 tolerances.
+/// The smoothed acceleration a_+ of the drag has singularities at the complex times +-i a_f/x', counted from the instant at which
+/// the specific force x crosses zero. An integrator that ignored them had errors of up to 400 tolerances in a step.
 #[test]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_tank() {
     keep_the_tolerance(0..10, tank_of);
@@ -329,8 +329,8 @@ fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
     keep_the_tolerance(0..200, draining_craft_of);
 }
 
-/// The reference uses Newton's law (independent.rs) and Runge-Kutta steps of 0.2 ms, so that it has neither the power series
-/// nor the formulas of the craft. Its rates are exact to 1e-7, because the slope of a_+ may double within a step.
+/// The reference uses Newton's law (independent.rs) and Runge-Kutta steps of 0.2 ms, and thereby neither the power series nor the
+/// formulas of the craft. Its rates are exact to 1e-7, because the slope of a_+ may change by a factor of two within a step.
 #[test]
 fn thrust_that_crosses_zero_moves_a_craft_as_newtons_law_with_another_integrator() {
     for seed in every_or(&[1, 30], [1, 6, 9, 30]) {

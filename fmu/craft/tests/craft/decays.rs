@@ -20,8 +20,8 @@ fn tank(angle: f64) -> Tank {
     tank
 }
 
-/// Returns p_x and its rate after each `period`, for the single tank and for the tank in a craft of 1e9 kg, under the
-/// acceleration `g` along the tank.
+/// Returns p_x and its rate after each `period`, under the acceleration `g` along the tank: first for the single tank, then for
+/// the tank in a craft of 1e9 kg.
 fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2] {
     let p = TankParameters { tank: *tank, ..TankParameters::default() };
     let motion = TankInputs { a: Ramp::held([0.0, 0.0, g]), ..TankInputs::default() };
@@ -44,8 +44,8 @@ fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2]
     [of_alone, of_craft]
 }
 
-/// The acceleration is 9.81 m/s2 to a millionth of a m/s2, without and with centring stiffness. Depending on the damping
-/// law, the damping ratio zeta is proportional to omega^(-1/2), constant, or proportional to omega^-1.
+/// The test goes down from 9.81 m/s2 to 1e-6 m/s2, without and with centring stiffness. Depending on the damping law, the damping
+/// ratio zeta is proportional to omega^(-1/2), constant, or proportional to omega^-1.
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for law in DampingLaw::ALL {
@@ -67,8 +67,8 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
                 for x in moments(&tank, g, TAU / w, 3) {
                     let a2 = |[angle, rate]: [f64; 2]| angle * angle + (rate / w).powi(2);
                     let zeta = -(a2(x[3]) / a2(x[0])).ln() / (2.0 * TAU * 3.0);
-                    // At g_ref/1000 the smoothing by a_f adds 0.25 % to a_+ and thereby 0.13 % to c. Large damping ratios
-                    // add their squares; the square of the angle adds 2.5e-7.
+                    // At g_ref/1000 the smoothing by a_f adds 0.25 % to a_+ and thereby 0.13 % to c. The formula of the decay
+                    // neglects zeta^2 and the square of the angle, 2.5e-7.
                     let allowed = 1.5e-3 + expected * expected;
                     assert!(
                         (zeta / expected - 1.0).abs() < allowed,
@@ -119,8 +119,8 @@ fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breakin
     }
 }
 
-/// Returns the ranges of validity of a tank in a craft with this thrust, after asserting that the single tank has the same
-/// ranges under the craft's motion.
+/// Returns the ranges of validity of a tank in a craft with this thrust. Asserts that the single tank has the same ranges
+/// under the craft's motion.
 fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     let mut p = Parameters::default();
     p.tank[0] = tank;
@@ -185,8 +185,8 @@ fn the_regime_follows_from_the_waves_of_all_modes_together() {
     assert_eq!(seen, [Linear, Linear, Transitional, Transitional, Nonlinear]);
 }
 
-/// Bobs of every tank are within 45 degrees of the tank's axis or beyond. The check at the end of a step must agree with the
-/// ranges in the outputs.
+/// A pendulum of each tank in turn is within 45 degrees of its tank's axis, or beyond. The check at the end of a step must agree
+/// with the ranges in the outputs.
 #[test]
 fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     let mut found = [0; 2];
@@ -218,8 +218,8 @@ fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     assert_eq!(found, [6, 6]);
 }
 
-/// The thrust is along the axis of the first tank and against the axis of the second tank, where the liquid is held only if
-/// k l/m is above 1.3 m/s2.
+/// The thrust is along the axis of the first tank and opposite to the axis of the second tank, where the liquid stays at the
+/// bottom only if k l/m is above 1.3 m/s2.
 #[test]
 fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
     for (k, holds) in [(500.0, false), (800.0, true)] {
@@ -235,8 +235,8 @@ fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
     }
 }
 
-/// The drag depends on the acceleration at the hinge, whether it comes from a, w' or w. The test compares the contribution
-/// of zeta to p'' at 2 m/s2 along the tank.
+/// The drag depends on the acceleration at the hinge, whether the acceleration a, the angular acceleration w' or the angular
+/// velocity w causes it. The test compares the contribution of zeta to p'' at 2 m/s2 along the tank.
 #[test]
 fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     let position = [0.7, -0.4, 0.2];
@@ -270,9 +270,9 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     }
 }
 
-/// The fill table has the values of the default tank at one point. A tank that could drain but does not must have the same
-/// drag as a tank that cannot drain, although their equations are written separately. This is tested on a pivot and in free
-/// flight, under every damping law, with thrust in both directions.
+/// A tank with a fill table can drain, and its equations are written separately from those of a tank that cannot drain. If
+/// nothing flows out, both must have the same drag; here the fill table has the values of the default tank at one of its points.
+/// This is tested on a pivot and in free flight, under every damping law, with thrust in both directions.
 #[test]
 fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
     for (seed, law) in DampingLaw::ALL.into_iter().cycle().take(12).enumerate() {
@@ -336,7 +336,7 @@ fn amplitude_damping_grows_with_the_slosh_angle_not_with_its_sine() {
 }
 
 /// Waves below the steepness s_b lose almost no energy by breaking. The dissipated power is never negative, at any angle and
-/// rate, in tanks that cannot and that could drain.
+/// rate, in tanks that can drain and in tanks that cannot.
 #[test]
 fn breaking_only_dissipates_and_only_above_its_steepness() {
     for begins in [0.0, 0.3, 0.66, 10.0] {
@@ -359,7 +359,7 @@ fn breaking_only_dissipates_and_only_above_its_steepness() {
                     assert!(power >= 0.0, "{begins} {angle} {rate}: {power:e}");
                     let steepness = STEEPNESS * (angle.powi(2) + (rate / w).powi(2)).sqrt();
                     if steepness < begins - 0.1 {
-                        // Below s_b the rounded corner leaves delta^2/(4 d).
+                        // Below s_b the rounded corner of the breaking law leaves the small damping delta^2/(4 d).
                         assert!(zeta < 0.04 * 1.1e-3, "{begins} {angle} {rate}: {zeta:e}");
                     }
                 }

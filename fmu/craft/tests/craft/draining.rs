@@ -60,8 +60,8 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
     [momentum, v(&out.angular_momentum) + center.cross(&momentum)]
 }
 
-/// The rates of momentum and angular momentum, integrated over two seconds by Lobatto's rule with five points, equal the
-/// changes of both, for draining tanks with and without modes.
+/// For draining tanks with and without modes, the integrals of force and torque over two seconds, by Lobatto's rule with five
+/// points, equal the changes of momentum and angular momentum.
 #[test]
 fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     let modes =
@@ -166,8 +166,8 @@ fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     }
 }
 
-/// Position and velocity are 0 at the start and about 100 m and 30 m/s at the end. The scale of a step's allowed error grows
-/// with them, so that the steps need not stay as short as at the start.
+/// Position and velocity are 0 at the start and about 100 m and 30 m/s at the end. The allowed error of a step grows with the
+/// size of the states, so that the steps become longer than at the start.
 #[test]
 fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     for seed in every_or(&[1, 3], 0..6) {
@@ -192,8 +192,8 @@ fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     }
 }
 
-/// A tank with thrust along its axis drains while its liquid is at rest. In the derivatives large terms cancel and leave
-/// rounding errors, which must not make the steps of the solver short.
+/// A tank with thrust along its axis drains while its liquid is at rest. In the derivatives large terms cancel and leave rounding
+/// errors, which must not make the solver choose short steps.
 #[test]
 fn a_tank_that_drains_at_rest_takes_long_steps() {
     for modes in [0, 3] {
@@ -241,7 +241,7 @@ fn a_fill_table_without_outflow_changes_nothing() {
             if table.points == 0 {
                 continue;
             }
-            // Between two points of the table is 400 kg; the test needs the mass of a point.
+            // The points of the table lie on both sides of 400 kg, but the test needs the mass at a point.
             let i = 3;
             tank.fill.points = 0;
             (tank.h_0, tank.i_0, tank.i_z) = (table.h_0[i], table.i_0[i], table.i_z[i]);
@@ -271,13 +271,13 @@ fn a_fill_table_without_outflow_changes_nothing() {
     }
 }
 
-/// Directional derivatives are compared with differences of the rates, along a direction in which all states and inputs
+/// Directional derivatives are compared with finite differences of the rates, in a direction in which all states and inputs
 /// change at once, including flows and masses of liquid.
 #[test]
 fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     for seed in (0..8).chain(20..24).chain(40..44) {
         let (mut p, u) = draining_craft(seed, 1 + seed as usize % 3);
-        // The inputs have no slopes, as a host that integrates the states itself sets them.
+        // The inputs have no slopes, because an importer of Model Exchange sets only their values.
         let mut u = after(&u, 0.0);
         for ramp in [&mut u.force, &mut u.torque, &mut u.h_wheels] {
             ramp.slope = [0.0; 3];
@@ -399,7 +399,7 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
             let jumped = craft.outputs(&now);
             let [p_0, h_0] = momenta(&before);
             let [p_1, h_1] = momenta(&jumped);
-            // The tolerance is for a few rounding errors of numbers of this size.
+            // The tolerance is some rounding errors of numbers of the size of p_0.
             assert!((p_1 - p_0).norm() < 1e-14 * p_0.norm(), "{seed} {p_0} {p_1}");
             assert!((h_1 - h_0).norm() < 1e-13 * h_0.norm(), "{seed} {h_0} {h_1}");
             assert!(jumped.energy != before.energy, "{seed}");
@@ -411,7 +411,8 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
     }
 }
 
-/// Returns a tank that drains and a motion of the host. From seed 12 on the bobs move on surfaces that depend on the fill.
+/// Returns a draining tank, and the motion of the body that carries it. From seed 12 on the bobs move on surfaces that
+/// depend on the fill.
 fn tank_alone(seed: u64, coupling: Coupling) -> (TankParameters, TankInputs) {
     let mut random = Random::new(seed);
     let mut tank = draining_tank(&mut random, seed as usize % 4);
@@ -433,14 +434,15 @@ fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     TankInputs { a: at(&u.a), omega: turned, omega_dot: at(&u.omega_dot), mass_flow }
 }
 
-/// Newton's law for the liquid in a tank that is rotated and away from the host's O. S is the liquid's first moment about O:
+/// Newton's law for the liquid in a tank that is rotated and has a distance from the origin O of the body that carries it. S is
+/// the liquid's first moment about O:
 ///
 /// ```text
 /// -F = m a + w' x S + w x (w x S) + 2 w x S' + S'' + 2 f w x r_out + f' r_out
 /// ```
 ///
-/// S' and S'' are computed from differences of the mass and centre of mass in the tank's outputs. The outflowing liquid
-/// takes the momentum f (V + w x r_out) with it.
+/// S' and S'' are computed from differences of the mass and centre of mass in the tank's outputs. The outflowing liquid takes the
+/// momentum f (V + w x r_out) with it.
 #[test]
 fn the_force_of_a_draining_tank_follows_newtons_law() {
     for seed in 0..16 {
@@ -477,15 +479,15 @@ fn the_force_of_a_draining_tank_follows_newtons_law() {
     }
 }
 
-/// While all tanks drain, a host that solves with added mass and bias has the accelerations of the whole craft, and the bobs
-/// of the tanks have the accelerations of the bobs in a Spacecraft. Forces and torques match Newton's and Euler's laws.
+/// While all tanks drain, a rigid body that is solved with the tanks' added mass and bias has the accelerations of the whole
+/// craft, and the bobs have the same accelerations as in a Spacecraft. Forces and torques fulfil Newton's and Euler's laws.
 #[test]
 fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
     for seed in (0..12).chain(20..26).chain(40..44) {
         let (p, u) = draining_craft(seed, seed as usize % 4);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
         craft.step(&u, 0.5).unwrap();
-        // The inputs have no slopes, as a host that integrates the states itself sets them.
+        // The inputs have no slopes, because an importer of Model Exchange sets only their values.
         let mut u = after(&u, 0.5);
         for ramp in [&mut u.force, &mut u.torque, &mut u.h_wheels] {
             ramp.slope = [0.0; 3];
@@ -576,8 +578,8 @@ impl Rigid {
     }
 }
 
-/// This is tested in every coupling while the tank drains. With the couplings `Lumped` and `RigidBody` the added mass keeps
-/// its value of the start.
+/// The law force = bias - added mass * acceleration is tested in every coupling while the tank drains. In the couplings `Lumped`
+/// and `RigidBody` the added mass keeps its initial value.
 #[test]
 fn force_and_torque_of_a_draining_tank_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..16 {

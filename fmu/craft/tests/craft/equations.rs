@@ -84,7 +84,7 @@ fn assert_same(exact: &[f64], by_differences: &[f64], now: &[f64], what: &str) {
     }
 }
 
-/// Returns a random craft in motion. Quaternion and directions of its states do not have unit length.
+/// Returns a random craft in motion. The quaternion and the directions of bobs in its states do not have unit length.
 fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -127,7 +127,7 @@ fn directional_derivatives_equal_finite_differences() {
         let (mut random, p, mut craft, u) = somewhere(seed);
         let (mut dx, du): ([f64; STATES], _) = (random.vector(1.0), random.vector(100.0));
         if p.mount == Mount::Pivot {
-            // On a pivot position and velocity of O do not change.
+            // On a pivot position and velocity of O do not change, so that they are not varied.
             dx[index::POSITION..index::POSITION + 6].fill(0.0);
         }
         let x = craft.continuous_states();
@@ -211,8 +211,8 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
         assert_same(&exact, &rates, &now[0], &format!("{seed} rate"));
         let exact = flat_tank(&tank.output_derivatives(&u, &dx, &du));
         assert_same(&exact, &outputs, &now[1], &format!("{seed} output"));
-        // The sum of the waves of all modes is left out where the waves nearly cancel, because it is
-        // too curved for differences.
+        // The sum of the waves of all modes is left out where the waves nearly cancel, because its curvature is too large
+        // there for finite differences.
         let (out, slope) = (tank.outputs(&u).tank, tank.output_derivatives(&u, &dx, &du).tank);
         let wave = |angle: &[f64; MODES]| -> f64 {
             (0..p.tank.modes).map(|n| p.tank.wave[n] * angle[n]).sum()
@@ -233,7 +233,7 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
                 TankInputs { a: ramp(&u.a), omega, omega_dot: ramp(&u.omega_dot), mass_flow: flow };
             flat_tank(&moved.outputs(&u))
         };
-        // In 1 ms the rates of the fastest bobs change by a tenth, and so does drag that depends on their amplitude.
+        // In 1 ms the rates of the fastest bobs change by a tenth, and drag that depends on their amplitude changes as much.
         let slopes: Vec<f64> =
             difference(|s| along(s / 8.0)).into_iter().map(|slope| 8.0 * slope).collect();
         let exact = flat_tank(&output_slopes(&mut tank, &u));

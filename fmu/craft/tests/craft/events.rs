@@ -105,8 +105,8 @@ enum Mode {
     Light,
 }
 
-/// Motion of the liquid's centre in the tank, body axes: position from the wall's centre, rate, gradient D x of the function
-/// f that describes the wall, and f.
+/// Motion of the liquid's centre in the tank, body axes. The function f(x) is 0 on the wall. The fields are the position x from
+/// the wall's centre, its rate, the gradient D x of f, and f itself.
 struct InTank {
     x: V,
     rate: V,
@@ -256,8 +256,9 @@ impl Simulator<'_> {
         y
     }
 
-    /// Returns a number that is positive until the next event: flying liquid hits the wall from inside, sliding liquid is
-    /// released, or light liquid is pressed to the wall strongly enough for drag.
+    /// Returns a number that is positive until the next event. Flying liquid has an event when it hits the wall from inside, and
+    /// sliding liquid when it leaves the wall. Liquid in the mode `Light` slides without drag, and also has an event when it is
+    /// pressed against the wall strongly enough for drag.
     fn distance_to_event(&self, y: &Coordinates) -> f64 {
         let InTank { rate, gradient, f, .. } = self.in_tank(y);
         match self.mode {
@@ -283,7 +284,7 @@ impl Simulator<'_> {
             let mut past = self.state_after(h);
             let (mut low, mut high) = (0.0, h);
             if self.mode == Mode::Flying {
-                // Within the step the liquid may have hit the wall and moved away again: then f has a minimum, where
+                // Within the step the liquid may have hit the wall and moved back inside. Then f has a minimum, at which
                 // its slope is 0.
                 let outwards = |y: &Coordinates| {
                     let InTank { rate, gradient, .. } = self.in_tank(y);
@@ -461,7 +462,7 @@ pub(super) trait Equations {
     fn event(&mut self, x: &[f64]) -> Vec<f64>;
 }
 
-/// Integrator of a host: the method of Dormand and Prince of order 5, and the settings of its steps and events.
+/// Settings of an importer's integrator, the Dormand-Prince method of order 5: its steps and how it handles events.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Method {
     /// Relative and absolute tolerance of a step. If it is 0, all steps have the length `longest`.
@@ -504,8 +505,8 @@ fn sum(stages: &[Vec<f64>], weights: &[f64], i: usize) -> f64 {
     stages.iter().zip(weights).map(|(stage, weight)| stage[i] * weight).sum()
 }
 
-/// Integrates to `end` as CVODE does: the signs of the indicators are compared at the ends of each step, and an event is
-/// located with the continuous extension. Returns the states and the number of events.
+/// Integrates to `end` as CVODE does: compares the signs of the indicators at the ends of each step, and locates an event with
+/// the continuous extension. Returns the states and the number of events.
 pub(super) fn integrate(
     equations: &mut impl Equations,
     x: &[f64],
@@ -612,7 +613,7 @@ impl Equations for Own<'_> {
     }
 }
 
-/// Simulates the case in a Model Exchange host that integrates by `method`. Returns the outputs at the end and
+/// Simulates the case as an importer of Model Exchange that integrates by `method`. Returns the outputs at the end and
 /// the number of impacts.
 fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     let craft = Spacecraft::new(&case.p, &case.u, 0.0, 1e-12).unwrap();
@@ -623,8 +624,8 @@ fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     (compared_quantities(&mut own.craft, &case.u), own.impacts)
 }
 
-/// Returns three hosts that locate events, each with the largest allowed error of its results: two with adaptive
-/// steps, of which the second has steps of at most 5 ms, and one with fixed steps.
+/// Returns three methods that locate events, each with the largest allowed error of its results. Two have adaptive steps, of
+/// which the second limits them to 5 ms, and the third has fixed steps.
 fn locating(case: &Case) -> [(Method, f64); 3] {
     let step = case.step();
     let fixed = (step / 4.0).min(5e-3);
@@ -637,8 +638,8 @@ fn locating(case: &Case) -> [(Method, f64); 3] {
     ]
 }
 
-/// Bounces are often shorter than the steps of these hosts. Before version 0.6.0 the indicator was below zero before and
-/// after such a bounce, so that the host found no event and the liquid passed through the wall.
+/// Bounces are often shorter than the steps of these integrators. Before version 0.6.0 the indicator was negative before and
+/// after such a bounce. The integrator then found no event, and the liquid passed through the wall.
 #[test]
 fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps() {
     let cases = every_or(&[0, 1, 2], 0..9).into_iter().map(|seed| (seed, case(seed)));
@@ -654,8 +655,8 @@ fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps()
     }
 }
 
-/// Simulates a host that does not locate events, and handles an impact when the liquid is already outside the wall. Returns
-/// the error of the energy balance, divided by the energy or by 1 J if the energy is smaller.
+/// Simulates an importer that does not locate events, so that an impact is handled when the liquid is already outside the wall.
+/// Returns the error of the energy balance, divided by the energy or by 1 J if the energy is smaller.
 fn without_location(case: &Case, seed: u64) -> f64 {
     let longest = (case.step() / 10.0).min(2e-3);
     let method = Method { tolerance: 0.0, longest, locates: false };
@@ -674,7 +675,7 @@ fn without_location(case: &Case, seed: u64) -> f64 {
     let at = v(&end.tank[0].ball_position) - V::z() * height;
     let outside = at.component_div(&semi).norm() - 1.0;
     let speed = v(&end.tank[0].ball_velocity).norm();
-    // The liquid may be outside by the distance of a few steps.
+    // The liquid may be outside the wall by the distance that it moves in a few steps.
     let bound = 10.0 * speed * longest / semi.min() + 1e-6;
     assert!(outside < bound, "{seed}: {outside:e} {:?} {speed}", own.ball());
     balance
@@ -696,13 +697,14 @@ struct Figures {
     settled: usize,
     too_sensitive: usize,
     impacts: usize,
-    /// Largest errors of Co-Simulation and of Model Exchange, and of the energy balance in hosts that do not locate events.
+    /// Largest errors of Co-Simulation and of Model Exchange, and the largest error of the energy balance if events are not
+    /// located.
     errors: [f64; 3],
     problems: Vec<String>,
 }
 
-/// Compares Co-Simulation at steps of 1 ms to 10 s, Model Exchange hosts and the independent simulator for `count` craft,
-/// whose seeds start at `first`.
+/// Compares Co-Simulation at steps of 1 ms to 10 s, Model Exchange and the independent simulator for `count` craft, whose
+/// seeds start at `first`.
 fn compare_hosts(first: u64, count: u64) -> Figures {
     let mut figures = Figures::default();
     for seed in first..first + count {
@@ -732,7 +734,7 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
         figures.impacts += impacts;
         for h in [1e-3, 0.01, 0.07, 0.5, 1.0, 10.0] {
             let error = distance(&by_co_simulation(&case, h), &want);
-            // Both simulators add 1e-12 of the motion at each impact.
+            // The independent simulator and the tested model each add an error of 1e-12 of the motion at each impact.
             if error > 1e-8 + sensitivity {
                 figures.problems.push(format!("{seed}, steps of {h} s: error {error:e}"));
             }
@@ -763,7 +765,7 @@ fn co_simulation_and_model_exchange_find_the_same_impacts_of_random_craft() {
     );
 }
 
-/// A seed can be set by the environment variable HUBSLOSH_EVENTS_SEED, so that every nightly run compares other craft.
+/// The environment variable HUBSLOSH_EVENTS_SEED sets the first seed, so that every nightly run compares other craft.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn co_simulation_and_model_exchange_find_the_same_impacts_of_two_hundred_random_craft() {

@@ -1,4 +1,5 @@
-//! Tests of hosts that integrate the states themselves: the equations of a craft, and a tank on the host's own rigid body.
+//! Tests of Model Exchange, in which the importer integrates the states: a craft, and a tank on a rigid body of the importer's
+//! own model.
 
 use craft::{
     Inputs, Mount, Parameters, Ramp, STATES, TANK_STATES, TankInputs, TankParameters, index,
@@ -9,8 +10,7 @@ use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
 use super::seeds::every_or;
 
-/// Returns the inputs at the time t in the form of a host that integrates the states itself: without slopes, and with the
-/// wheels' reaction in the torque.
+/// Returns the inputs at the time t as in Model Exchange: without slopes, and with the wheels' reaction in the torque.
 fn after(u: &Inputs, t: f64) -> Inputs {
     let torque = u.torque.value_at(t);
     Inputs {
@@ -43,10 +43,10 @@ pub fn runge_kutta(
     }
 }
 
-/// Co-Simulation integrates by power series, the host by Runge-Kutta in steps of 0.2 ms, or 0.1 ms for craft whose planar
-/// modes are faster. The rates of planar modes and of bobs that are not pendulums are computed by contents.rs, not by the
-/// series. The fastest bobs move at 30 and 60 1/s, for which the method's error (30 h)^4/120 is 1e-11. They turn one to two
-/// times in a quarter of a second.
+/// Co-Simulation integrates by power series. Its result is compared with Runge-Kutta steps of 0.2 ms, or 0.1 ms for craft whose
+/// planar modes are faster. The rates of planar modes and of bobs that are not pendulums are computed by contents.rs, not by the
+/// series. The fastest bobs move at 30 and 60 1/s, for which the error of the Runge-Kutta method, (30 h)^4/120, is 1e-11. They
+/// turn one to two times in a quarter of a second.
 #[test]
 fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     for seed in every_or(&[0, 1, 3, 12, 16, 18, 21, 24, 28], 0..30) {
@@ -88,8 +88,8 @@ fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     }
 }
 
-/// A rigid body with attached tanks: its states are q, w, r, V and the tanks' states. The host solves (M_body + sum of M_a)
-/// [a; w'] = rest + sum of bias in every stage of its integrator.
+/// A rigid body with attached tanks, as the importer of a SloshTank simulates it: its states are q, w, r, V and the tanks'
+/// states. Every stage of the integrator solves (M_body + sum of M_a) [a; w'] = rest + sum of bias.
 pub struct HostWithTanks {
     p: Parameters,
     tanks: Vec<SloshTank>,
@@ -170,7 +170,8 @@ impl HostWithTanks {
 
 type V3 = nalgebra::Vector3<f64>;
 
-/// Host and Spacecraft are integrated by the same method with the same steps, so that only rounding errors differ.
+/// The rigid body with its tanks and a Spacecraft are integrated by the same method with the same steps, so that they
+/// differ only by rounding.
 #[test]
 fn tanks_on_a_host_that_splits_inertia_in_every_stage_move_as_spacecraft() {
     for seed in 0..30 {

@@ -11,8 +11,8 @@ use super::seeds::every_or;
 
 type V = Vector3<f64>;
 
-/// Returns the length of a bob's rod, the bob's position relative to the host's O, and the tank's axes, for `liquid` kg in
-/// the tank and the direction p.
+/// Returns the length of a bob's rod, the bob's position relative to the body's origin O, and the tank's axes, for `liquid` kg in
+/// the tank and the direction p of the rod.
 fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     let drains = tank.fill.points > 0;
     let [_, l, h] =
@@ -23,8 +23,8 @@ fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     (l, V::from(tank.position) + axes * (V::z() * h + l * p), axes)
 }
 
-/// A rod transmits only a force along itself. Therefore the component across the rod of the bob's velocity V + w x rho + l
-/// p' does not change.
+/// A jump of the velocity of the body that carries the tank acts on a bob only by a force along its rod. Therefore the component
+/// across the rod of the bob's velocity V + w x rho + l p' does not change.
 #[test]
 fn an_impulse_of_the_host_does_not_change_the_bobs_velocities_across_their_rods() {
     for seed in 0..20 {
@@ -61,7 +61,7 @@ fn an_impulse_of_the_host_does_not_change_the_bobs_velocities_across_their_rods(
             let kick = V::from(dv) + V::from(dw).cross(&rho);
             let (rod, mut velocity) = (axes * direction, kick + change);
             if let Some(b) = across {
-                // The tank takes the bob along perpendicular to the plane of the mode.
+                // A planar mode moves with the tank in the direction perpendicular to its plane.
                 velocity -= b * b.dot(&kick);
                 assert!(change.dot(&b).abs() < 1e-14, "p' stays in the plane");
             }
@@ -91,7 +91,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
         let jumped = craft.outputs(&Inputs { h_wheels: Ramp::held(jump), ..now });
         let [p_0, h_0] = draining::momenta(&before);
         let [p_1, h_1] = draining::momenta(&jumped);
-        // The tolerance is for a few rounding errors of numbers of this size.
+        // The tolerance is some rounding errors of numbers of the size of p_0.
         assert!((p_1 - p_0).norm() < 1e-14 * p_0.norm(), "{seed} {p_0} {p_1}");
         assert!((h_1 - h_0).norm() < 1e-13 * h_0.norm(), "{seed} {h_0} {h_1}");
         assert!((V::from(jumped.omega) - V::from(before.omega)).norm() > 1e-3);
@@ -105,7 +105,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
             craft.continuous_states()[craft::index::DRAINED]
         });
         let (limit, gone) = (turned - coasted, jumped.drained - before.drained);
-        // Apart from the effect of the jump, the drained energies of the two runs differ by about 0.1 W times h.
+        // Apart from the effect of the jump, the drained energies of the two runs differ by about 0.1 W times the interval h.
         assert!((gone - limit).abs() < 1e-3 * gone.abs() + h, "{seed}: {gone:e} {limit:e}");
         by_rods = by_rods.max(gone.abs());
     }

@@ -24,8 +24,7 @@ fn rotation(q: &[f64]) -> Rotation3<f64> {
 struct Solution {
     a: V,
     w_d: V,
-    /// p'' of each bob, tank axes, and eta'' of each mode of the appendages; then follow force and torque about
-    /// O of each tank.
+    /// p'' of each bob in tank axes, eta'' of each appendage mode, and the force and torque of each tank about O.
     p_dd: Vec<V>,
     eta_dd: Vec<f64>,
     wrench: Vec<[V; 2]>,
@@ -54,8 +53,8 @@ fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     if direction == V::zeros() {
         return (None, on_axis);
     }
-    // A momentum along the mode's direction must have the moment `arm` about the axis, so that the line of motion is at arm
-    // z x direction, with the sign reversed.
+    // A momentum along `direction` must have the moment `arm` about the tank's axis. Therefore the line of motion is displaced
+    // from the axis by -arm (z x direction).
     let across = V::z().cross(&direction).normalize();
     (Some(across), on_axis - across * tank.arm[n])
 }
@@ -118,7 +117,7 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
         DampingLaw::ConstantRatio => tank.zeta[n],
         DampingLaw::Constant => tank.zeta[n] * w(tank.g_ref) / w(above),
     };
-    // The square of the angle from -z, as a power series of the square of the chord with six terms (`taylor::angle`).
+    // The square of the angle between p and -z, as a power series in the square of the chord with six terms (`taylor::angle`).
     let chord2: f64 = 2.0 + 2.0 * p_z;
     let squared: f64 = [2.0, 6.0, 20.0, 70.0, 252.0, 924.0]
         .iter()
@@ -126,7 +125,7 @@ fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
         .map(|(binomial, n)| 2.0 * chord2.powi(n) / (f64::from(n * n) * binomial))
         .sum();
     let amplitude = (squared + rate2 / w(above).powi(2) + 1e-8).sqrt();
-    // Steepness of each mode in a cylinder, with the zeros xi of J1', k = xi/R and the elevation 2 R/(xi^2 - 1).
+    // Steepness of the wave of each mode in a cylinder, with the zeros xi of J1', k = xi/R and the elevation 2 R/(xi^2 - 1).
     let xi = [1.841183781340659, 5.331442773525033, 8.536316366346286][n];
     let (begins, corner) = (tank.breaking_steepness[n], 0.02);
     let rounded = |x: f64| (x + x.hypot(corner)) / 2.0;
@@ -145,7 +144,7 @@ struct Shape {
     rate: V,
     q: V,
     q_d: V,
-    /// The derivative dz/d|q|^2 of the height z by the square of the displacement, followed by the second derivative.
+    /// The derivative dz/d|q|^2 of the height z with respect to the squared displacement, and then the second derivative.
     slope: f64,
     bend: f64,
     /// Half the gradient of the left side of the surface's equation divided by l, and the terms of the second derivative of
@@ -272,7 +271,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let axes = rotation(&tank.q);
         let at = index::bob(i, n);
         let (across, hinge) = plane(tank, n);
-        // A host may set states that leave the plane of the mode; only their part in the plane counts.
+        // An importer may set states out of the plane of the mode; only their components in the plane count.
         let flat = |x: V| across.map_or(x, |b| x - b * b.dot(&x));
         let dir = (axes * flat(v(&x[at..]))).normalize();
         let rate = axes * flat(v(&x[at + 3..]));
@@ -329,8 +328,8 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         rhs[at + 3] = shape.curving / l;
         force += inner;
         torque += rho.cross(&inner);
-        // Tension of the rod at a = w' = 0. It replaces the tension in an equation without added mass, and is used for the
-        // error of a force that is lost.
+        // The following terms add up to the rod's tension at a = w' = 0. With the mistake `NoAddedMass` their sum replaces the
+        // unknown tension; each of the mistakes that end with `NotInPull` leaves out one of them.
         let velocity = rate + w.cross(&dir);
         let centrifugal = mass * dir.dot(&w.cross(&w.cross(&hinge)));
         let by_rate = mass * l * velocity.norm_squared();
@@ -491,7 +490,7 @@ fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     }
 }
 
-/// Bobs on other surfaces than spheres, some of them in planes, follow Newton's law in which the force of the
+/// Bobs on surfaces other than spheres, some of them confined to a plane, follow Newton's law in which the force of the
 /// surface is an unknown.
 #[test]
 fn bobs_on_surfaces_follow_newtons_law_with_the_surface_as_a_constraint() {
@@ -595,8 +594,8 @@ fn forces_on_the_dry_craft_balance() {
     }
 }
 
-/// Returns a random tank with bobs anywhere on their spheres, and a motion of the host. Every third tank has no axial
-/// symmetry, and in every third tank the bobs move on surfaces other than spheres.
+/// Returns a random tank with bobs anywhere on their spheres, and the motion of the body that carries it. Every third tank has no
+/// axial symmetry, and in every third tank the bobs move on surfaces other than spheres.
 fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let mut p = TankParameters { tank: random.tank(), coupling, ..TankParameters::default() };
@@ -640,8 +639,8 @@ fn acceleration(u: &TankInputs) -> DVector<f64> {
     DVector::from_iterator(6, u.a.value.iter().chain(&u.omega_dot.value).copied())
 }
 
-/// In each coupling, a SloshTank with random liquid returns the force and torque of the liquid on the host, and the bias and
-/// added mass with which the host can solve for its acceleration.
+/// In each coupling, a SloshTank with random liquid returns the force and torque of the liquid on the body that carries it, and
+/// the bias and added mass with which the accelerations of this body can be solved for.
 #[test]
 fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
     for coupling in Coupling::ALL {
@@ -651,7 +650,8 @@ fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
             let m = symmetric(&out.added_mass);
             let mut left = DVector::from_column_slice(&out.bias) - &m * acceleration(&u);
             if coupling == Coupling::RigidBody {
-                // A body that includes the mass has the terms w x (w x S) and w x (I w) in its own equations.
+                // In `RigidBody` the equations of the carrying body include the mass of the liquid, and thereby the terms w x (w
+                // x S) and w x (I w).
                 let (w, s) = (v(&u.omega), v(&[m[(5, 1)], m[(3, 2)], m[(4, 0)]]));
                 let inertia = m.fixed_view::<3, 3>(3, 3);
                 let [force, torque] = [w.cross(&w.cross(&s)), w.cross(&(inertia * w))];
@@ -842,7 +842,7 @@ fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
         let size: f64 = tank.mass.iter().sum::<f64>() + tank.m_0;
         assert_close(&out.force, &[0.0; 3], size, 1e-14, "force");
         assert_close(&out.torque, &[0.0; 3], size, 1e-14, "torque");
-        // An acceleration of the host causes a force, but no torque about the centre.
+        // An acceleration of the tank causes a force, but no torque about the centre.
         let pushed = TankInputs { a: craft::Ramp::held(random.vector(5.0)), ..u };
         let out = alone.outputs(&pushed).tank;
         assert!(v(&out.force).norm() > 1e-3);

@@ -80,8 +80,8 @@ fn assert_same_attitude(got: &[f64], want: &[f64]) {
     assert_same(&turned, &want[..4], "attitude");
 }
 
-/// The body's origin O is shifted by a random vector, and the positions of all parts are changed accordingly. The motion in
-/// space must be the same.
+/// The body's origin O is shifted by a random vector, and the positions of all parts are changed accordingly. The motion relative
+/// to inertial axes must be the same.
 #[test]
 fn a_craft_moves_alike_for_any_reference_point_of_its_positions() {
     for seed in 0..8 {
@@ -116,8 +116,8 @@ fn a_craft_moves_alike_for_any_reference_point_of_its_positions() {
     }
 }
 
-/// The body axes are rotated at random, and all parameters and inputs are changed accordingly. The motion in space
-/// must be the same.
+/// The body axes are rotated at random, and all parameters and inputs are changed accordingly. The motion relative to inertial
+/// axes must be the same.
 #[test]
 fn a_craft_moves_alike_for_any_orientation_of_its_body_axes() {
     for seed in 0..8 {

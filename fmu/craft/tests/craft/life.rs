@@ -1,4 +1,4 @@
-//! Tests of steps, saved states and error messages, on which hosts rely.
+//! Tests of steps, saved states and error messages, on which importers rely.
 
 use craft::{
     Coupling, Inertia, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State,
@@ -63,8 +63,9 @@ fn errors_stay_within_the_solver_tolerance() {
     }
 }
 
-/// In a craft at rest the scale of a step's allowed error is 0 at first and grows with the motion. The craft is accelerated
-/// by 1 rad/s2, so that a bob with high centring stiffness, too light to affect the craft, begins to swing at 10 rad/s.
+/// In a craft at rest the allowed error of a step, which is relative to the size of the motion, starts at 0 and grows. The
+/// craft is accelerated by 1 rad/s2, so that a bob with high centring stiffness, too light to affect the craft, begins to
+/// swing at 10 rad/s.
 #[test]
 fn errors_stay_within_the_solver_tolerance_from_rest() {
     let mut p = Parameters::default();
@@ -230,7 +231,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
                 assert!(off.abs() < 1e-10 * size, "{seed}: E {off:e}");
             }
         }
-        // A jump is the limit of ramps that become ever steeper.
+        // A jump of the wheels' momentum has the effect of a ramp in the limit of zero duration.
         let jumped = wheels(random.vector(30.0));
         let ramp = |h: f64| {
             let (from, to) = (held.h_wheels.value, jumped.h_wheels.value);
@@ -448,7 +449,7 @@ fn random_steps_give_finite_results_or_an_error() {
         let tolerance = random.magnitude(1e-14, 1e-1);
         let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap();
         for _ in 0..30 {
-            // In one of twenty steps the inputs are unreasonably large.
+            // In one of twenty steps the inputs are too large to be physical.
             let nonsense = random.below(20) == 0;
             let size = if nonsense { 1e160 } else { random.magnitude(1e-6, 1e5) };
             let ramp = |random: &mut Random| Ramp {
@@ -584,8 +585,8 @@ fn an_impossible_outflow_is_refused() {
         assert!(matches!(error, StepError::Model(_)), "{message}");
         assert!(message.contains("(allowed: 10 to 20 kg"), "{message}");
     }
-    // Within the step the flow of 6 - 3 t kg/s reverses: after 2 s of 4 s 6 kg have drained, and at the
-    // end all have returned.
+    // Within the step the flow of 6 - 3 t kg/s reverses. After 2 s of the step of 4 s 6 kg have drained, and at the end all
+    // of it has returned.
     for (value, missing) in [(6.0, 6.0), (-6.0, -6.0)] {
         u.mass_flow = flow(value);
         u.mass_flow[0].slope = -value / 2.0;
@@ -610,7 +611,7 @@ fn an_impossible_outflow_is_refused() {
     u.mass_flow = flow(5.0);
     craft.step(&u, 1.0).unwrap();
 
-    // All liquid flows out in several steps, whose sum is exact only to rounding.
+    // All liquid drains in several steps. The drained masses of the steps add up to the whole only up to rounding.
     (p.tank[0].fill.liquid[0], p.tank[0].fill.liquid[1]) = (1000.0, 2000.0);
     p.tank[0].liquid_0 = 1500.0;
     let mut rounded = false;

@@ -29,8 +29,8 @@ pub fn reason(tank: &Tank, motion: Motion) -> LimitedBy {
     seen.limited_by
 }
 
-/// An upright cylinder of random size with limits of the slosh angle, on the host's axis, and a motion that is
-/// well within all limits.
+/// An upright cylinder of random size with limits of the slosh angle, on the axis of the craft that carries it, and a motion that
+/// is well within all limits.
 struct Case {
     tank: Tank,
     motion: Motion,
@@ -93,8 +93,8 @@ impl Case {
     }
 }
 
-/// 1,000 random tanks within all limits are in range. Beyond each limit, 1,000 tanks are out of range for the
-/// reason of this limit.
+/// 1,000 random tanks within all limits are in range. For each limit, 1,000 tanks beyond it are out of range, and the reported
+/// reason is this limit.
 #[test]
 fn a_tank_is_out_of_range_beyond_each_of_its_limits_only() {
     for seed in 0..1000 {

@@ -6,8 +6,8 @@ use craft::{
 
 use super::limit_cases::{Motion, XI, reason};
 
-/// A cylinder of known dimensions has limits without limit parameters. At the default depth they are 4.3 degrees for
-/// pendulums, 9.3 degrees with coefficients of the third order, and 5.9 degrees for rotary motion.
+/// For a cylinder of known dimensions the model computes the largest valid slosh angles itself. At the default depth they are 4.3
+/// degrees for pendulums, 9.3 degrees with coefficients of the third order, and 5.9 degrees for rotary motion.
 #[test]
 fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     let still = Motion { axial: 9.81, spin: 0.0 };
@@ -29,8 +29,8 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     assert_eq!([9.2, 9.4].map(|x| at(third, x, false)), [LimitedBy::None, LimitedBy::ThirdOrder]);
     let rotary = [LimitedBy::None, LimitedBy::SecondaryResonance];
     assert_eq!([5.8, 6.0].map(|x| at(third, x, true)), rotary);
-    // At h/R = 0.5 the limit is 6.5 degrees with the third order, and 11.8 degrees with the coefficients
-    // of the wave's energy.
+    // At h/R = 0.5 the limit is 6.5 degrees with the coefficients of the third order, and 11.8 degrees if the energy coefficients
+    // beyond the third order are set as well.
     for (has_energy, ends) in [(false, 6.5), (true, 11.8)] {
         let limited = [0.99, 1.01].map(|factor| {
             let mut tank = Tank { diameter: 0.2, depth: 0.05, g_ref: 9.81, ..Tank::default() };
@@ -48,7 +48,7 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
         });
         assert_eq!(limited, [LimitedBy::None, LimitedBy::ThirdOrder], "{has_energy}");
     }
-    // Limits that are given as parameters have priority. A tank without known dimensions has no other limits.
+    // Limits that are given as parameters replace computed ones. A tank without known dimensions has no computed limits.
     let mut tank = Tank { diameter: 0.2, depth: 0.1227, g_ref: 9.81, ..Tank::default() };
     tank.p_0[0] = [0.1f64.sin(), 0.0, -0.1f64.cos()];
     tank.angle_limit[0] = 0.11;

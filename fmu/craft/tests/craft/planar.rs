@@ -50,8 +50,8 @@ fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
         for all in [&mut around.mass, &mut around.length, &mut around.hinge] {
             all[0] = all[along];
         }
-        // m_0 and the bob of the mode across the plane are combined into one body, with its inertia about the axis about
-        // which the motion rotates.
+        // m_0 and the bob of the mode across the plane are combined into one body, whose inertia is needed about the axis about
+        // which the craft rotates.
         let (m, z) = (planar.mass[across], planar.hinge[across] - planar.length[across]);
         around.m_0 = planar.m_0 + m;
         around.h_0 = (planar.m_0 * planar.h_0 + m * z) / around.m_0;
@@ -115,8 +115,8 @@ fn a_free_body_with_a_planar_mode_off_its_axis_has_the_closed_form_s_frequency()
     }
 }
 
-/// On a craft that is too heavy to rotate, a box has one frequency along each axis, and a motion that starts along one axis
-/// stays along this axis.
+/// On a craft that is too heavy to rotate, the liquid in a box has one frequency along each horizontal axis, and a motion that
+/// starts along one axis stays along this axis.
 #[test]
 fn a_box_at_rest_under_gravity_has_two_frequencies() {
     let heavy = 1e11;
@@ -134,7 +134,7 @@ fn a_box_at_rest_under_gravity_has_two_frequencies() {
         let rate = craft.directional_derivative(&u, &dx, &Default::default());
         let at = index::bob(0, n) + 3;
         let want = 9.81 / p.tank[0].length[n];
-        // The 1000 kg of liquid rotate the craft's 1e11 kg m2 by 1e-8 of the slosh angle.
+        // The oscillation of 1000 kg of liquid rotates the craft, whose inertia is 1e11 kg m2, by 1e-8 of the slosh angle.
         assert!((-rate[at + n] / want - 1.0).abs() < 1e-7, "{n}: {} {want}", rate[at + n]);
         assert_eq!(rate[at + 1 - n], 0.0);
     }
@@ -194,8 +194,8 @@ fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_posi
     assert!(p.problems()[0].starts_with("tank[1].direction[2] = "), "{:?}", p.problems());
 }
 
-/// A craft of 10 kg has a box whose m_0 is -120 kg. At rest the masses of both modes make the mass matrix regular; if both
-/// modes swing by 90 degrees, it is singular.
+/// A craft of 10 kg has a box whose m_0 is -120 kg. While the bobs hang at rest their masses make the mass matrix regular, but if
+/// both swing by 90 degrees, it is singular.
 #[test]
 fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_allowed() {
     let light = |mass: f64| {
@@ -218,7 +218,7 @@ fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_all
     assert_eq!(host.problems(), [""; 0]);
 }
 
-/// A craft without inertia about its own axis has only the inertia of the liquid in a tank away from the axis. While the
+/// A craft without inertia about its own axis has inertia only because of the liquid in a tank that is off the axis. While the
 /// liquid is in flight, the craft does not even have this inertia.
 #[test]
 fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_may_detach() {
@@ -279,8 +279,9 @@ fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
     [p.x, p.y, p.z, h.x, h.y, h.z, energy + springs]
 }
 
-/// A host without external forces solves (M_body + sum of M_a) [a; w'] = rest + sum of bias. Its body conserves momentum and
-/// angular momentum in every stage of the host's integrator, and loses the energy that the tanks dissipate.
+/// A rigid body that carries the tanks, without external forces, solves (M_body + sum of M_a) [a; w'] = rest + sum of bias.
+/// Body and tanks together conserve momentum and angular momentum in every stage of the integrator, and lose the energy
+/// that the tanks dissipate.
 #[test]
 fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_dissipate() {
     let mut telling = 0;
@@ -290,7 +291,7 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
         let mut p = random.parameters();
         random.make_all_planar(&mut p);
         for tank in &mut p.tank {
-            // The drag is constant, so that bias does not depend on the acceleration that the host computes from it.
+            // The drag is constant, so that the bias does not depend on the acceleration that is computed from it.
             tank.zeta = [0.05; MODES];
         }
         let u = Inputs::default();
@@ -301,7 +302,8 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
         let (before, after) = (sums(&p, &start), sums(&p, &x));
         let size = before.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
         for i in 0..6 {
-            // The error is (h w)^5/120 in each of 4000 steps, for bobs at up to 60 1/s. The lengths |p| drift by as much.
+            // The error is (h w)^5/120 in each of 4000 steps, for bobs at up to 60 1/s. The lengths |p| deviate from
+            // 1 by as much.
             let off = (after[i] - before[i]).abs();
             assert!(off < 1e-10 * size, "{seed} [{i}] {off:e} of {size}");
         }
@@ -320,8 +322,8 @@ fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     TankInputs { a: at(&u.a), omega, omega_dot: at(&u.omega_dot), ..*u }
 }
 
-/// One step of 2 s gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives, for
-/// every damping law. A mass flow has no effect in these tanks.
+/// One step of 2 s gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives, under
+/// every damping law. A mass flow has no effect, because these tanks have no fill table.
 #[test]
 fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
     for seed in every_or(&[0, 1, 2, 3], 0..8) {
@@ -372,8 +374,9 @@ fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
     }
 }
 
-/// In a tank that is held, the squared frequency along each axis is g/l. If the tank is accelerated along x, the host at
-/// first feels only the mass of the liquid minus the masses of the modes that swing along x.
+/// In a tank at rest under the acceleration g, a pendulum has the squared frequency g/l, with another l along each axis of the
+/// box. If the tank is suddenly accelerated along x, its wall at first pushes only the mass of the liquid minus the masses of the
+/// modes that swing along x.
 #[test]
 fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
     let p = TankParameters { tank: a_box(), ..TankParameters::default() };
@@ -397,7 +400,8 @@ fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
     assert!((out.mass - 1000.0).abs() < 1e-10);
 }
 
-/// A tank is refused if the total mass of its liquid is negative, or if it leaves the host without positive inertia.
+/// A tank is refused if the total mass of its liquid is negative, or if the craft that carries it would not have
+/// positive inertia with it.
 #[test]
 fn a_tank_with_negative_total_liquid_mass_is_refused() {
     let mut p = TankParameters { tank: a_box(), ..TankParameters::default() };

@@ -56,8 +56,8 @@ impl Random {
         tank
     }
 
-    /// Makes the drag of a tank's bobs depend on acceleration and amplitude, by every damping law. Half of the bobs have
-    /// drag that grows with the amplitude, and half of these have breaking waves.
+    /// Makes the drag of a tank's bobs depend on acceleration and amplitude; the damping law is chosen at random. Half of the
+    /// bobs have drag that grows with the amplitude, and half of these have breaking waves.
     pub fn follow(&mut self, tank: &mut Tank) {
         tank.damping_law = DampingLaw::ALL[self.below(3)];
         // Under reversed thrust a_+ has a corner, which this g_floor rounds so widely that finite differences resolve it.
@@ -67,8 +67,8 @@ impl Random {
         }
         for (n, growth) in tank.zeta_amplitude.iter_mut().enumerate() {
             if *growth > 0.05 {
-                // The coefficient is 0.025 to 0.05 and the steepness 0 to 0.5. Every second of these modes has no drag that
-                // grows below the steepness.
+                // The coefficient of the damping by breaking waves is 0.025 to 0.05, and the steepness at which they break is 0
+                // to 0.5. Every second of these modes has no amplitude damping below this steepness.
                 (tank.zeta_breaking[n], tank.breaking_steepness[n]) =
                     (0.5 * *growth, 10.0 * (*growth - 0.05));
                 *growth *= f64::from((*growth * 1e6) as u32 % 2);

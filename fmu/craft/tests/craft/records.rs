@@ -167,7 +167,8 @@ pub fn at_end(inputs: &Inputs) -> Inputs {
     }
 }
 
-/// Returns the host's motion between time knot k and the next. `omega` is the angular velocity at knot k.
+/// Returns the motion of the body that carries the tank, between time knot k and the next. `omega` is the angular
+/// velocity at knot k.
 pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
     let terms = &record["motion"];
     TankInputs {

@@ -19,7 +19,7 @@ impl Deviations {
         assert_eq!(want.len(), got.len(), "{signal}");
         let (worst, scale) = self.0.entry(signal.into()).or_insert((0.0, largest));
         for (got, want) in got.iter().zip(want) {
-            // Written so that NaN counts as a deviation.
+            // The condition is negated so that NaN counts as a deviation.
             let deviation = (got - want).abs();
             *worst = if deviation <= *worst { *worst } else { deviation };
         }

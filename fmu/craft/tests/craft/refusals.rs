@@ -132,8 +132,8 @@ fn an_initial_velocity_is_refused_only_on_a_pivot() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// For each pair of axes |J_ij|^2 may be up to J_ii J_jj. A thin rod, J = (0, 1, 1) along x, has exactly this
-/// value in rotated axes.
+/// For each pair of axes |J_ij|^2 may be up to J_ii J_jj. A thin rod, J = (0, 1, 1) in axes of which x lies along it, has exactly
+/// this largest value if the axes are rotated.
 #[test]
 fn products_of_inertia_need_moments_of_inertia_large_enough() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
@@ -249,7 +249,8 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     assert_eq!(with(|t| t.fill.mass[2][0] = 1e9), [""; 0]);
 }
 
-/// A host without inertia about its z axis is refused. If there is a second problem, both messages are returned.
+/// A SloshTank is refused if the craft that carries it has no inertia about its z axis. If there is a second problem,
+/// both messages are returned.
 #[test]
 fn a_host_without_inertia_about_an_axis_is_refused() {
     let mut p =

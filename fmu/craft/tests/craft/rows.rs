@@ -99,7 +99,7 @@ fn every_kind(mut test: impl FnMut((&Parameters, &[Inputs; 4], f64), usize, u64)
     }
 }
 
-/// Tanks of random craft have limits within which half of the waves are.
+/// The tanks of these random craft have limits of the slosh angle that about half of the waves exceed.
 #[test]
 fn after_each_row_the_discrete_outputs_computed_alone_equal_those_computed_with_all_outputs() {
     let (mut compared, mut reasons) = (0, BTreeSet::new());
@@ -144,7 +144,7 @@ fn communication_points_change_no_bit_of_the_motion_while_inputs_are_held() {
     assert!(compared > 50, "{compared}");
 }
 
-/// Between steps a host may read outputs (also for other inputs), derivatives and event indicators, and may save and restore
+/// Between steps an importer may read outputs (also for other inputs), derivatives and event indicators, and may save and restore
 /// the state, without changing the motion.
 #[test]
 fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
@@ -178,8 +178,8 @@ fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
     });
 }
 
-/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. Events are roots of the power
-/// series of a whole internal step, which output rows do not shorten.
+/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. Events are located as roots of the
+/// power series of a whole internal step, and output rows do not shorten this step.
 #[test]
 fn the_spacing_of_output_rows_changes_no_bit_of_the_motion_of_detached_liquid() {
     let mut p = Parameters::default();
@@ -216,8 +216,8 @@ fn setting_the_states_starts_a_new_expansion() {
     assert!((turned - 0.1).abs() < 0.05, "{turned}");
 }
 
-/// Returns the largest error of attitude, angular velocity and bobs after 20 s of inputs that change every `h` seconds, so
-/// that a power series starts at each change.
+/// Returns the largest error of attitude, angular velocity and bobs after 20 s. The inputs change every `h` seconds, and the
+/// integrator starts a new power series at each change.
 fn error_of_restarts(h: f64, tolerance: f64) -> f64 {
     let (p, _) = craft_of(0, 2);
     let run = |tolerance: f64| {

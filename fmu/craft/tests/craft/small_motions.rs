@@ -86,8 +86,8 @@ impl Closed {
     }
 }
 
-/// Returns the derivatives of w_y' and of the first bob's p_x'' with respect to one state, or for a change of
-/// the inputs by `du`.
+/// Returns the derivatives of the pitch acceleration w_y' and of the first bob's p_x'' with respect to one state or, if `state`
+/// is `None`, in the direction `du` of the inputs.
 fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f64; 2] {
     let mut dx = [0.0; STATES];
     if let Some(at) = state {
@@ -97,8 +97,8 @@ fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f
     [rate[PITCH_RATE], rate[SLOSH_RATE]]
 }
 
-/// Returns the squared pole, the damping 2 zeta_p w_p, and the squared zero of theta with respect to the
-/// input that `du` describes.
+/// Returns three numbers: the squared pole, the damping 2 zeta_p w_p, and the squared zero of theta for the input in
+/// whose direction `du` points.
 fn pole_and_zero(p: &Parameters, du: [f64; INPUTS]) -> [f64; 3] {
     let mut craft = Spacecraft::new(p, &inputs(), 0.0, 1e-9).unwrap();
     let [alpha, gamma] = column(&mut craft, Some(SLOSH), [0.0; INPUTS]);
@@ -253,7 +253,7 @@ fn growth(z: f64, c: f64) -> f64 {
     let by = |craft: &mut Spacecraft, at| column(craft, Some(at), [0.0; INPUTS]);
     let [a_wp, a_pp] = by(&mut craft, SLOSH);
     let [a_wd, a_pd] = by(&mut craft, SLOSH_RATE);
-    // Attitude and a slow rotation of the craft have no effect on the derivatives.
+    // Attitude and a slow rotation of the craft do not change the rates, so that their columns need not be computed.
     for at in [index::Q + 2, PITCH_RATE] {
         assert!(by(&mut craft, at).iter().all(|x| x.abs() < 1e-13));
     }
@@ -308,8 +308,8 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     low
 }
 
-/// The loop is unstable if the hinge is above the centre of mass of the rigid part R (h > 0) and the bob is below the centre
-/// of percussion of R (b < I/(M |z_f|)). The ends of this danger zone agree within 1 % of its length.
+/// The loop is unstable if the hinge is above the centre of mass of the rigid part R (h > 0) and the bob is below the centre of
+/// percussion of R (b < I/(M |z_f|)). The computed ends of this danger zone agree with both conditions within 1 % of its length.
 #[test]
 fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
     let at = |z: f64| Closed::new(&craft_with_tank_at(z, 0.0, 0.0));
@@ -345,7 +345,7 @@ fn nutation_of_a_prolate_spinner_grows_at_the_analytic_rate() {
     let u = Inputs::default();
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     let start = craft.continuous_states();
-    // These states change: w, and p and p' of both bobs.
+    // The linear system has these states: w, and p and p' of both bobs.
     let places: Vec<usize> = (index::OMEGA..index::OMEGA + 3)
         .chain([0, 1].iter().flat_map(|&i| index::bob(i, 0)..index::bob(i, 0) + 6))
         .collect();

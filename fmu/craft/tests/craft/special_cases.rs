@@ -50,8 +50,8 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
 }
 
-/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes, and equal those of
-/// liquid under a rigid lid.
+/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes. They equal those of a craft
+/// whose liquid is rigid under a lid.
 #[test]
 fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
     let of = |modes: usize| {
@@ -199,7 +199,7 @@ fn a_rigid_body_without_tanks_precesses_by_eulers_equations() {
     assert!(largest_difference(&craft.continuous_states()[index::OMEGA..][..3], &want) < 1e-13);
 }
 
-/// A craft on a pivot moves as a free craft with a very large mass at O on which the force -g times this mass acts.
+/// A craft on a pivot moves like a free craft with an additional, very large mass M at O, on which the force -M g acts.
 #[test]
 fn a_craft_on_a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
     for seed in 0..5 {

@@ -12,10 +12,10 @@ use super::random::{Random, draining_craft};
 
 type C = Complex<f64>;
 
-/// Each row contains A_r, C_r, m, a, c and the rates lambda of both nutations, seen from the body and divided by the rate
-/// of spin. The body is a rigid body with the moments of inertia A_r across its axis and C_r about it, and a full
-/// spheroid of m kg of liquid with the semi-axes a across and c along the axis, both about the same centre. The rates
-/// follow from Poincare's equations (`fmu/craft/src/spin.rs`).
+/// Each row describes a rigid body with a full spheroidal tank about the same centre. First come the body's moments of
+/// inertia A_r across its axis and C_r about it, the mass m of the liquid, kg, and the semi-axes a across and c along the
+/// axis. Then follow the rates lambda of both nutations, in body axes and divided by the rate of spin. They were computed
+/// from Poincare's equations (`fmu/craft/src/spin.rs`).
 const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([60.0, 40.0, 30.0, 0.3, 0.2], [[-0.326391621079, 0.0], [-1.3901790763, 0.0]]),
     ([60.0, 40.0, 30.0, 0.25, 0.25], [[-1.0 / 3.0, 0.0], [-1.0, 0.0]]),
@@ -249,8 +249,8 @@ fn cylinder(fill: f64, beta: f64, c: f64, stiffness: f64) -> (TankParameters, Ta
     (p, TankInputs { a, omega: [0.0, 0.0, beta.sqrt()], ..TankInputs::default() })
 }
 
-/// Returns the coefficients `at` of the lateral motion z = p_x + i p_y of a slosh mass and of its force on the tank: z'' =
-/// at[0] z + at[1] z' + at[2] a, and force = at[3] z + at[4] z' + at[5] a.
+/// Returns the coefficients k_0 to k_5 of the lateral motion z = p_x + i p_y of a slosh mass under the acceleration a, and of its
+/// force on the tank: z'' = k_0 z + k_1 z' + k_2 a, and force = k_3 z + k_4 z' + k_5 a.
 fn lateral(p: &TankParameters, u: &TankInputs) -> [C; 6] {
     let mut tank = SloshTank::new(p, u, 0.0, 1e-9).unwrap();
     let mut at = [C::from(0.0); 6];
@@ -360,7 +360,8 @@ fn the_spin_of_the_liquid_and_not_of_its_tank_limits_the_range() {
     }
 }
 
-/// Omega/omega_0 and Omega^2 l change by the relative amounts d Omega/Omega - da/(2 a) and 2 d Omega/Omega - da/a.
+/// If spin rate and acceleration change by d Omega and da, Omega/omega_0 changes by the relative amount d Omega/Omega - da/(2 a),
+/// and Omega^2 l/a by 2 d Omega/Omega - da/a.
 #[test]
 fn directional_derivatives_of_spin_ratio_and_spin_number_equal_the_closed_form() {
     let (mut p, u) = cylinder(1.0, 0.1, 0.5, 0.0);

@@ -1,8 +1,7 @@
 //! Tests of the coefficients of the third order and beyond, with which bobs move on other surfaces than spheres.
 //!
-//! `tests/six` compares waves with these coefficients with potential flow. The random tanks of `independent.rs`,
-//! `equations.rs`, `exchange.rs`,
-//! `balances.rs`, `draining.rs` and `impulses.rs` also have bobs on other surfaces than spheres.
+//! `tests/six` compares waves with these coefficients with potential flow. The random tanks of `independent.rs`, `equations.rs`,
+//! `exchange.rs`, `balances.rs`, `draining.rs` and `impulses.rs` also have bobs on other surfaces than spheres.
 
 use craft::{
     Coupling, FillTable, Inertia, Inputs, Line, MODES, Mount, POINTS, Parameters, Ramp, STATES,
@@ -101,8 +100,8 @@ fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// For s = kappa = 1 the power series of a pendulum are used, so that no bit differs from a tank without these coefficients.
-/// For coefficients near 1 the motion is nearly the same.
+/// If s = kappa = 1, the power series of a pendulum are used, so that the results are bit-identical to those of a tank without
+/// these coefficients. If they differ little from 1, the motion is nearly the same.
 #[test]
 fn coefficients_near_one_move_as_a_pendulum() {
     let mut tank = Random::new(3).tank();
@@ -157,7 +156,7 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
         assert!(why.to_string().contains(&bound), "{why}");
         assert!(!why.shorter_may_succeed());
         assert_eq!(tank.continuous_states(), before);
-        // A host that integrates the states itself gets the error at the same angle.
+        // In Model Exchange the error occurs at the same angle.
         let mut x = before;
         (x[0], x[2]) = (1.02 * sin, -f64::sqrt(1.0 - 1.0404 * sin * sin));
         tank.set_continuous_states(&x);
@@ -228,8 +227,8 @@ fn a_craft_too_light_for_its_coefficients_is_refused() {
 /// rho = d + h e + l q + [(kappa - 1) l |q|^4/8 - l sqrt(1 - |q|^2)] e
 /// ```
 ///
-/// q has the x and y components of the unit vector from hinge to bob. The table has two points, between which 1/l, h - l, m
-/// divided by the mass of liquid, s and kappa are straight lines.
+/// q has the x and y components of the unit vector from hinge to bob. The fill table has two points. Between them 1/l, h - l, m
+/// divided by the mass of liquid, s and kappa are linear functions of the mass of liquid.
 struct Lagrangian<'a> {
     tank: &'a Tank,
     n: usize,
@@ -364,8 +363,8 @@ fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
     }
 }
 
-/// A wave with coefficients beyond the third order decays as its energy does: the dissipated power is 2 c/m times the
-/// kinetic energy, which includes the kinetic energy within the liquid.
+/// The amplitude of a wave with coefficients beyond the third order decays as the damping c/m demands: the dissipated power is 2
+/// c/m times the kinetic energy, which includes the kinetic energy within the liquid.
 #[test]
 fn drag_dissipates_2_c_over_m_times_the_whole_kinetic_energy() {
     for seed in 0..20 {
@@ -570,7 +569,8 @@ fn the_large_wave_coefficients_of_a_fill_table_replace_those_of_the_tank_and_are
     p.tank[0].fill.points = 0;
     p.tank[0].fill.nonlinear_inertia[0][0] = f64::NAN;
     assert_eq!(p.problems(), [""; 0]);
-    // This craft is heavy enough for the liquid at the start, but not at the point of the table where s is 0.
+    // This craft is heavy enough for the coefficients at the initial fill, but not for those at the point of the table
+    // where s is 0.
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
     let tank = &mut p.tank[0];
     (tank.fill.points, tank.liquid_0) = (2, 127.0);

@@ -106,8 +106,8 @@ fn rates_per_torque(p: &Parameters, frequency: f64) -> [Complex<f64>; 3] {
     [0, 1, 2].map(|i| x[index::OMEGA + i])
 }
 
-/// With two products of inertia and springs about x and y, w_x (k_x - I_xx s^2) = I_xz s^2 w_z, where s is the angular
-/// frequency, and likewise about y. The leakage (Rubaga's thesis, section 6.3.6) is sqrt(w_x^2 + w_y^2)/w_z.
+/// With products of inertia, and springs about x and y, w_x (k_x - I_xx s^2) = I_xz s^2 w_z holds about x, where s is the angular
+/// frequency, and the analogous equation about y. The leakage (Rubaga's thesis, section 6.3.6) is sqrt(w_x^2 + w_y^2)/w_z.
 #[test]
 fn products_of_inertia_couple_the_rotation_of_a_platform_into_its_tilt() {
     let mut p = platform();
@@ -127,8 +127,8 @@ fn products_of_inertia_couple_the_rotation_of_a_platform_into_its_tilt() {
     }
 }
 
-/// A centre of mass at the distance d from the axis also couples by gravity: at rest the platform is tilted by M g
-/// d/(k - M g h).
+/// If the centre of mass is at a distance d from the axis, gravity couples rotation and tilt as well: at rest the platform is
+/// tilted by M g d/(k - M g h).
 #[test]
 fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     let mut p = platform();
@@ -276,9 +276,10 @@ fn pivot_parameters_do_not_change_a_free_craft() {
     );
 }
 
-/// The bench of book/tilting.md: the root mean square of the leakage from 1.25 to 3.5 Hz. With a damping ratio of 0.03
-/// `hubslosh analyse` finds 0.0419 from the rates of a sweep at 0.0125 N m. With a damping ratio of 0.003 it finds 0.125
-/// instead of 0.135, because a sweep smooths the tip of the antiresonance, which is 0.014 Hz wide.
+/// The platform is the bench of book/tilting.md. The test computes the root mean square of the leakage from 1.25 to 3.5 Hz by
+/// linear equations. With a damping ratio of 0.03 `hubslosh analyse` finds 0.0419 from the rates of a sweep at 0.0125 N m.
+/// With a damping ratio of 0.003 it finds 0.125 instead of 0.135, because a sweep smooths the tip of the antiresonance, which
+/// is 0.014 Hz wide.
 #[test]
 fn the_leakage_of_the_books_platform_equals_that_of_its_linear_equations() {
     let j = Inertia { xx: 0.22, yy: 0.25, zz: 0.304, xy: 0.0, xz: 0.004, yz: -0.006 };

@@ -90,7 +90,7 @@ pub fn planar<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     FRAC_PI_2 / quarter / w
 }
 
-/// Returns the frequency of the mode, divided by the linear frequency, on a circle with A = |q|/l.
+/// Returns the frequency of the mode, divided by the linear frequency, if the bob moves on a circle with A = |q|/l.
 pub fn circular<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     let w = linear_frequency(&tank);
     tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
