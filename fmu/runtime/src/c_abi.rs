@@ -22,8 +22,8 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of an FMI function, by which the host learns if the call has succeeded: [`OK`],
-/// [`DISCARD`], [`ERROR`] or [`FATAL`].
+/// Return value of an FMI function, by which the importer learns if the call has succeeded: [`OK`], [`DISCARD`], [`ERROR`] or
+/// [`FATAL`].
 pub type Status = c_int;
 /// The call succeeded.
 pub const OK: Status = 0;
@@ -31,7 +31,7 @@ pub const OK: Status = 0;
 pub const WARNING: Status = 1;
 /// The FMU cannot compute the result of the call, and the instance is unchanged.
 pub const DISCARD: Status = 2;
-/// The call was refused or has failed.
+/// The call was not allowed in the present state, had invalid arguments, or its execution has failed.
 pub const ERROR: Status = 3;
 /// The instance is unusable.
 pub const FATAL: Status = 4;
@@ -44,7 +44,8 @@ fn status(severity: Severity) -> Status {
     }
 }
 
-/// The host's logger, independent of the FMI version: status, category, message.
+/// The logging callback that the host has passed, in a form that does not depend on the FMI version. Its arguments are
+/// status, category and message.
 pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 
 /// Sends the messages of one instance to the host's logger.
@@ -77,7 +78,7 @@ impl Log {
         }
     }
 
-    /// Writes a warning to the host's log that `call` has had the side effect that `effect` describes.
+    /// Warns in the host's log of a side effect of `call`, which `effect` describes.
     #[cold]
     pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
         self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));
@@ -95,7 +96,8 @@ impl Log {
         }
     }
 
-    /// Writes the last event to the host's log, if events have occurred since `before` was their number.
+    /// Writes the model's last event to the host's log if events have occurred during the call; `before` is the number of
+    /// events before the call.
     #[inline(always)]
     pub fn report_event<M: Model, V: Version>(
         &self,
@@ -131,12 +133,12 @@ impl Log {
 
 // ---- Texts and arrays ----
 
-/// Converts a text for the host; NUL characters become spaces.
+/// Converts a text to a C string for the host; NUL characters become spaces.
 pub fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// Reads a text of the host; `None` for NULL.
+/// Copies a C string that the host passes; `None` for NULL.
 pub unsafe fn text(string: *const c_char) -> Option<String> {
     if string.is_null() {
         return None;
@@ -183,10 +185,10 @@ pub unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// Returns the host's variable into which a function writes one result. The host passes its address as the argument `name`.
+/// Borrows the host's variable into which a function writes one result. The host passes `pointer` to the variable as the argument
+/// `name`.
 ///
-/// # Errors
-/// If the address is NULL.
+/// # Errors If `pointer` is NULL.
 pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
     unsafe { pointer.as_mut() }.ok_or_else(|| null_argument(call, name))
 }
@@ -198,7 +200,7 @@ pub fn null_argument(call: &Call, name: &str) -> Fault {
 
 // ---- Instances ----
 
-/// Constant that is part of the mark of live components. Calls check the mark, so that a wrong handle gives an error
+/// Constant from which the [`mark`] of a live component is computed. Calls check the mark, so that a wrong handle gives an error
 /// instead of a crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
@@ -218,7 +220,7 @@ fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
 /// handles are refused without being read.
 const LOWEST_ADDRESS: usize = 1024;
 
-/// The object to which the handle of a component points.
+/// A live instance with its log; the handle that the host has points to it.
 #[repr(C)]
 #[allow(missing_docs)]
 pub struct Component<M: Model, V: Version> {
@@ -241,8 +243,8 @@ pub fn new_component<M: Model, V: Version>(
     Box::into_raw(component).cast()
 }
 
-/// Returns true if `handle` points to a live component or saved state `T`, whose first field is its
-/// mark (see [`mark`]). `kind` is the constant that the mark contains for this type.
+/// Returns true if `handle` points to a live `T` (a component or a saved state), whose first field is its [`mark`]. `kind` is the
+/// constant from which marks of this type are computed.
 unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bool {
     handle.addr() >= LOWEST_ADDRESS
         && handle.cast::<T>().is_aligned()
@@ -296,8 +298,8 @@ pub unsafe fn perform<M: Model, V: Version>(
     status(fault.severity)
 }
 
-/// Runs `body` as [`perform`] does, but only if the instance state allows the call. It is for calls that must not read their
-/// arguments in other states.
+/// Runs `body` as [`perform`] does, but only if the instance state allows the call. Functions use it that must not read their
+/// arguments if the call is not allowed.
 #[inline]
 pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     handle: *mut c_void,
@@ -347,10 +349,9 @@ pub fn silence_panics() {
 
 // ---- Functions that both versions have ----
 
-/// Returns the filter for the host's log that lets the named log categories pass.
+/// Returns the filter that lets only messages of the log categories `names` pass to the host's log.
 ///
-/// # Errors
-/// If a name is unknown or NULL.
+/// # Errors If a name is unknown or NULL.
 pub unsafe fn filter<M: Model>(
     call: &Call,
     categories: *const *const c_char,
@@ -363,7 +364,7 @@ pub unsafe fn filter<M: Model>(
     Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))
 }
 
-/// Fills an array of the host, which it passes to a getter, with the values that `body` writes.
+/// Fills an array that the host passes to a getter with the values that `body` writes.
 pub unsafe fn fill<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -377,8 +378,8 @@ pub unsafe fn fill<M: Model, V: Version>(
     }
 }
 
-/// Accepts a step of the host's integrator, and sets the host's variable that states if an event must be handled now. `B` is
-/// the Boolean type of the FMI version.
+/// Handles the host's message that it has completed a step of its integrator, and sets the host's variable that states if an
+/// event must be handled now. `B` is the Boolean type of the FMI version.
 pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     handle: *mut c_void,
     enter_event_mode: *mut B,

@@ -25,7 +25,7 @@ impl Interface {
     }
 }
 
-/// Who handles events, such as the start of sticking: the host or the FMU.
+/// Handling of events, such as the start of sticking: by the FMU within its steps, or by the host in event mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Events {
@@ -38,7 +38,7 @@ pub enum Events {
 }
 
 impl Events {
-    /// All values in the order of their numbers.
+    /// All variants in the order of their numbers.
     pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
@@ -141,7 +141,7 @@ pub(crate) mod states {
     pub const F: u16 = InstanceState::Failed.bit();
     /// All states except `Fatal`.
     pub const ANY: u16 = I | M | S | E | C | T | F;
-    /// All states in which the simulation has started.
+    /// All states from the start of the simulation on, except `Fatal`.
     pub const RUN: u16 = S | E | C | T | F;
     pub const FATAL: u16 = InstanceState::Fatal.bit();
     pub const CONFIGURATION: u16 = InstanceState::Configuration.bit();

@@ -1,4 +1,5 @@
-//! The clock of an instance. Times of the host are compared only here, with one tolerance.
+//! The clock of an instance. Only this module compares times of the host, with one tolerance that allows for their rounding
+//! errors.
 //!
 //! A host may multiply (k h), accumulate (t += h) or convert counters, may start at 1e9 s, and its time may have errors of a
 //! few units in the last place. The simulation must not depend on these errors: in Co-Simulation the host's time is only a
@@ -18,7 +19,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// An instant of the simulation, as a model receives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// Time of the host's clock, s, by which messages and outputs state the instant.
+    /// Simulation time as the host states it, s, which messages and outputs contain.
     pub time: f64,
     /// Time since the start of the simulation, s, in Model Exchange. `None` in Co-Simulation, where
     /// the model adds up the step sizes instead.
@@ -33,7 +34,7 @@ pub(crate) struct Clock {
     pub stop: Option<f64>,
     /// The host's time, s.
     pub time: f64,
-    /// True in Model Exchange, where the host sets the time. False in Co-Simulation, where steps advance it.
+    /// True in Model Exchange, where the host sets `time`. False in Co-Simulation, where steps advance it.
     pub is_hosts: bool,
     /// Time of the last event, s, before which a Model Exchange host may not go back.
     pub last_event: f64,
@@ -63,7 +64,7 @@ impl Clock {
         ROUNDING * self.start.abs().max(time.abs())
     }
 
-    /// Returns the difference, s, below which a time near `time` counts as the expected end of a step of size `h`.
+    /// Returns the tolerance, s, within which a time near `time` counts as the end of a step of size `h`.
     fn tolerance(&self, time: f64, h: f64) -> f64 {
         DRIFT * (time - self.start).abs().max(h) + self.resolution(time)
     }
@@ -73,7 +74,7 @@ impl Clock {
         (a - b).abs() <= self.resolution(a)
     }
 
-    /// Returns true if `time` is finite and before `end` by more than rounding.
+    /// Returns true if `time` is finite and before `end` by more than the rounding error.
     pub fn is_before(&self, time: f64, end: f64) -> bool {
         is_finite(time) && time < end - self.resolution(end)
     }
@@ -104,7 +105,8 @@ impl Clock {
         }
     }
 
-    /// Checks a time that the host sets. If `goes_back` is true, a time before the last event is allowed, as in FMI 2.0.
+    /// Checks a time that the host sets. If `goes_back` is true, a time before the last event is allowed, as in FMI 2.0 but
+    /// not in FMI 3.0.
     ///
     /// # Errors
     /// If this time is not allowed; the text is the reason.
@@ -122,7 +124,7 @@ impl Clock {
         Ok(())
     }
 
-    /// Returns the stop time, s, if the present time is later by more than the rounding error of a clock.
+    /// Returns the stop time, s, if the present time exceeds it by more than the rounding error; otherwise `None`.
     pub fn passed_stop(&self) -> Option<f64> {
         self.stop.filter(|stop| self.time > stop + self.tolerance(*stop, 1.0))
     }

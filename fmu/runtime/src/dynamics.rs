@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 pub use crate::clock::Instant;
 
-/// Reason why a model could not compute a step, as a text for the user.
+/// Reason why a model could not compute a step; `text` is a message for the user.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct StepFailure {
@@ -13,7 +13,7 @@ pub struct StepFailure {
     pub shorter_may_succeed: bool,
 }
 
-/// Creates a failure after which a shorter step may succeed, for example because a step takes too much work.
+/// Creates a failure after which a shorter step may succeed, for example because the step needed too many internal steps.
 impl From<&str> for StepFailure {
     fn from(text: &str) -> StepFailure {
         StepFailure { text: text.into(), shorter_may_succeed: true }
@@ -42,10 +42,11 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// All inputs, each with its present value and its slope over the step. The default contains the start values,
     /// and slopes of 0.
     type Inputs: Copy + Debug + Default;
-    /// All values that follow from states and inputs at one instant. The same type contains the directional
+    /// All values that follow from states and inputs at one instant. A value of this type can also contain the directional
     /// derivatives of the outputs.
     type Outputs: Copy + Debug;
-    /// Discrete values that a change of inputs can change immediately; `()` for a model without events.
+    /// Data from which [`Model::revert`] restores the discrete values that [`Model::apply_present_inputs`] has changed; `()` for
+    /// a model without events.
     type Discrete: Default;
 
     /// True if outputs also depend on the inputs' slopes, for example because an output is a time derivative.
@@ -84,8 +85,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         None
     }
 
-    /// Appends the states of the model to `words` for a saved state; parameters and inputs are saved by the caller. The
-    /// number of words is always [`About::saved_words`](crate::table::About::saved_words).
+    /// Appends the states of the model to `words` for a saved state; the runtime saves parameters and inputs. The number of
+    /// words is always [`About::saved_words`](crate::table::About::saved_words).
     fn save(&self, words: &mut Vec<u64>);
 
     /// Restores a saved state of a model with the same parameters. Returns `None` if the words are not a valid state.
@@ -95,8 +96,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// unchanged. It allocates no memory unless it fails.
     fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), StepFailure>;
 
-    /// Advances as [`Model::step`] does, but stops at the first event. A second step from there to the same end with the
-    /// same inputs must give the result of the whole step bit-identically.
+    /// Advances as [`Model::step`] does, but stops at the first event. If a second step follows from this event to the end of the
+    /// first step with the same inputs, both must give bit-identically the result of one whole step.
     fn step_to_event(&mut self, inputs: &Self::Inputs, h: f64) -> Result<StepEnd, StepFailure> {
         self.step(inputs, h).map(|()| StepEnd::End)
     }
@@ -130,7 +131,7 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// Sets the continuous states as the host's integrator has computed them (Model Exchange).
     fn set_continuous_states(&mut self, x: &[f64]);
 
-    /// Sets the present time of the host's clock (Model Exchange).
+    /// Sets the simulation time to the time `now` that the host has passed (Model Exchange).
     fn set_time(&mut self, now: Instant);
 
     /// Computes the derivatives of the continuous states by time.
@@ -147,9 +148,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         dx_dot: &mut [f64],
     ) -> Self::Outputs;
 
-    /// Applies the discrete changes that the present inputs cause, before the model is evaluated. The returned value is
-    /// passed to [`Model::revert`] afterwards. If the host handles events, neither function is called, because discrete
-    /// values then change only in event mode.
+    /// Applies the discrete changes that the present inputs cause, for example the start of sticking, before outputs are read.
+    /// The returned value is passed to [`Model::revert`] afterwards. If the host handles events, neither function is called,
+    /// because discrete values then change only in event mode.
     fn apply_present_inputs(&mut self, inputs: &Self::Inputs) -> Self::Discrete {
         let _ = inputs;
         Self::Discrete::default()
@@ -189,10 +190,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         None
     }
 
-    /// Accepts a step of a Model Exchange host. Returns true if an event must be handled now.
+    /// Checks the states after a step of the host's integrator (Model Exchange). Returns true if an event must be handled now.
     ///
-    /// # Errors
-    /// The reason why the states that the host has set are not valid.
+    /// # Errors The reason why the states that the host has set are not valid.
     fn accept_step(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
         let _ = inputs;
         Ok(false)

@@ -1,5 +1,5 @@
-//! Reduced model descriptions, which contain the variables of only a few tanks and modes. They are for hosts that show every
-//! variable to the user. The binary is the same as for the full model description.
+//! Reduced model descriptions, which contain the variables of only some of the tanks and modes. They are for hosts that show
+//! every variable to the user. The binary of the FMU is the same as with the full model description.
 //!
 //! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals that of the full description except for the
 //! last nine hexadecimal digits. From these digits the binary learns which states and event indicators the host knows:
@@ -32,8 +32,8 @@ const SIZES: usize = 3;
 pub struct Extent {
     token: String,
     sizes: Vec<(&'static str, usize)>,
-    /// Numbers, in the model, of the continuous states that the reduced description contains, in the order in which
-    /// the host reads them.
+    /// Indices of the continuous states that the reduced description contains, in the order in which the host reads them. They
+    /// are indices into the model's own state vector, which also has the states of all other tanks and modes.
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
@@ -42,9 +42,9 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Returns the extent that belongs to a GUID or instantiationToken, with the start values of the table. `token` is the
-    /// one that the host passes, and `whole` that of the full description. Returns `None` if `token` does not belong to a
-    /// reduced description of this table.
+    /// Returns the extent for `token`, the GUID or instantiationToken that the host passes, with the start values of the
+    /// table. `whole` is the token of the full description. Returns `None` if `token` does not belong to a reduced
+    /// description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -147,7 +147,7 @@ impl Extent {
         &self.token
     }
 
-    /// Returns the numbers, in the model, of the continuous states, in the order in which the host reads them.
+    /// Returns the indices, in the model's state vector, of the continuous states, in the order in which the host reads them.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
@@ -168,8 +168,8 @@ impl Extent {
         &self.inputs
     }
 
-    /// Returns an error if `value` of a parameter that determines array sizes is so large that the description has no
-    /// variables for all elements.
+    /// Returns an error if `value`, a number of elements such as tanks or modes, is so large that the reduced description lacks
+    /// the variables of some elements.
     pub fn problem<M: Model>(&self, scalar: &Scalar<M>, value: Value) -> Option<String> {
         let (_, most) = self.sizes.iter().find(|(name, _)| *name == scalar.variable.name)?;
         match value {
@@ -182,8 +182,8 @@ impl Extent {
     }
 }
 
-/// Returns the number of the table's event indicators that belong to elements within `sizes`. `of` is the name of the
-/// parameter that counts the elements with indicators.
+/// Returns how many event indicators of the table belong to elements within `sizes`. `of` is the name of the parameter that
+/// counts the elements with indicators.
 fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
     let all = table.about.event_indicators;
     let size = sizes.iter().find(|(name, _)| Some(*name) == of);
@@ -203,8 +203,8 @@ pub fn checksum(text: &str) -> String {
 }
 
 impl<M: Model> Table<M> {
-    /// Returns the name and the largest value of each parameter that determines the number of elements of arrays, in the
-    /// order of the first array.
+    /// Returns the name and the largest value of each parameter that determines how many elements arrays have. The order is that
+    /// in which the arrays first use the parameters.
     pub fn sizes(&self) -> Vec<(&'static str, usize)> {
         let mut sizes: Vec<(&'static str, usize)> = Vec::new();
         for dimension in self.variables.iter().flat_map(|variable| variable.shape) {
@@ -219,8 +219,8 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if a reduced description with these `sizes` contains this scalar, because the indices of the scalar
-    /// do not exceed them.
+    /// Returns true if a reduced description with these `sizes` contains this scalar, that is, if no index of the
+    /// scalar exceeds its size.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {

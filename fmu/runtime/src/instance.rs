@@ -1,4 +1,4 @@
-//! Effects of the host's calls on an instance, which are the same for every version of FMI.
+//! The FMI calls on an instance, as far as they are the same in every version of FMI.
 //!
 //! A refused call changes nothing. The only exception is a step that the model cannot compute: the model keeps its state,
 //! but the instance enters the state "step failed", in which the host can read, reset or restore the instance.
@@ -22,8 +22,8 @@ use crate::version::Version;
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 /// Range of the relative tolerances of the integration that a host can set.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
-/// Limit of the magnitude of continuous states, which no realistic motion reaches. Powers and products of
-/// larger states could overflow.
+/// Largest allowed magnitude of a continuous state. No realistic motion reaches it; powers and products of larger states could
+/// overflow.
 pub const MAX_STATE: f64 = 1e30;
 
 /// An instance of an FMU, for one version of FMI. A clone is a complete saved state, because an instance has no other data.
@@ -46,13 +46,13 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
     pub(crate) sloped: bool,
-    /// True from the end of a step with linearly changing inputs until an input is set. In this time the inputs keep the
-    /// slopes of the step, so that outputs are limits from the left.
+    /// True from the end of a step with linearly changing inputs until an input is set. While it is true, the inputs keep the
+    /// slopes of this step, so that outputs are limits from the left.
     pub(crate) past_slopes: bool,
     /// The model. It is created when it is first needed in initialization mode, and dropped if a parameter or input is set
     /// before the simulation starts.
     pub(crate) model: Option<M>,
-    /// Outputs as they were last computed; `known` says which of them are valid at the present instant.
+    /// The last computed outputs; `known` says which of them are valid at the present instant.
     pub(crate) outputs: Option<M::Outputs>,
     pub(crate) known: Known,
     /// Values of the discrete outputs, by slot, as the host saw them when it was last in event mode. They are needed if
@@ -62,7 +62,7 @@ pub struct Instance<M: Model, V: Version> {
     scratch: [Vec<f64>; 2],
 }
 
-/// The part of an instance's outputs that is valid at the present instant.
+/// Part of the stored outputs that is valid at the present instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     Nothing,
@@ -71,7 +71,8 @@ pub(crate) enum Known {
     All,
 }
 
-/// Iterator over the numbers, in the model, of the continuous states, in the order in which the host reads them.
+/// Iterator over the indices of the continuous states in the model's state vector, in the order in which the host reads the
+/// states.
 struct Places<M: Model> {
     extent: Option<Arc<Extent>>,
     next: usize,
@@ -236,7 +237,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state = InstanceState::Fatal;
     }
 
-    /// Changes the instance state after a failed call, if this version of FMI requires that.
+    /// Changes the instance state after a failed call in versions of FMI that require this.
     pub(crate) fn after_error(&mut self) {
         if let Some(state) = V::AFTER_ERROR.filter(|_| self.state != InstanceState::Fatal) {
             self.state = state;
@@ -472,8 +473,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets all elements of the variables for which `meant` returns true to their start values. Returns the variables that
-    /// have changed because at least one of their elements had another value, in the order of the table.
+    /// Sets all elements of the variables for which `meant` returns true to their start values. Returns those variables of which
+    /// at least one element had another value, in the order of the table.
     pub(crate) fn restart(
         &mut self,
         meant: impl Fn(&Variable<M>) -> bool,
@@ -503,7 +504,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns true if a discrete value in the model differs from the value that the host can read; the latter changes
+    /// Returns true if a discrete value in the model differs from the value that the host reads, because the host's value changes
     /// only in event mode.
     fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
         let outputs = *self.discrete_outputs(call)?;
@@ -817,8 +818,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(found.map(|(known, _)| V::reference(known)).collect())
     }
 
-    /// Displaces states and inputs by up to `share` of their nominal values, for each `point` in another direction.
-    /// Derivatives at such nearby points show which dependencies vanish only at the present point.
+    /// Changes states and inputs by up to `share` of their nominal values; each `point` gives other changes. Derivatives at such
+    /// nearby points show which dependencies vanish only at the present point.
     fn move_aside(&mut self, share: f64, point: u64) {
         // Multiples of the golden ratio fill the interval uniformly.
         let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;
@@ -998,7 +999,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(ended)
     }
 
-    /// Drops the slopes of the last step, so that inputs are constant unless new slopes are set.
+    /// Drops the slopes of the last step, so that the inputs are constant until new slopes are set.
     #[inline]
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
@@ -1052,8 +1053,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets inputs exactly to their given values at the end of the step. Values that are computed from the
-    /// slopes differ by rounding.
+    /// Sets the inputs at the end of a step to exactly the values that the host gave for this instant, because values that are
+    /// computed from the slopes differ by rounding.
     pub(crate) fn end_ramps(&mut self, references: &[u32], ends: &M::Inputs) {
         let mut ends = *ends;
         for reference in references {
@@ -1103,8 +1104,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
-    /// Handles events whose effects were already computed within the step: applies the changes that the present inputs
-    /// cause, and makes all discrete values visible to the host.
+    /// Handles events whose effects were already computed within the step: applies the changes that the present inputs cause, and
+    /// lets the host read the new values of all discrete outputs.
     fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
         let inputs = self.inputs;
         let now = self.clock.now();
@@ -1149,7 +1150,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Accepts a step of the host's integrator. Returns true if an event must be handled now.
+    /// Checks the states after a step of the host's integrator. Returns true if an event must be handled now.
     pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
         let call = self.check(V::COMPLETED_STEP)?;
         let time = self.clock.time;
@@ -1373,7 +1374,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 
-    /// Returns the parameters that the host has set in the form of the model, even if their values are not allowed.
+    /// Returns the parameters that the host has set, in the model's type. Their values are not checked.
     fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
@@ -1434,8 +1435,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.model.as_ref().and_then(M::step_warning)
     }
 
-    /// Returns the number of events since the start, from which callers notice that a step had events. It
-    /// may overflow and restart.
+    /// Returns the number of events since the start, so that callers can notice new events. The number may overflow and start
+    /// again.
     #[inline]
     pub fn event_count(&self) -> i32 {
         self.model.as_ref().map_or(0, M::event_count)

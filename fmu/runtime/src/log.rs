@@ -1,9 +1,9 @@
 //! Selection of the messages that are passed to the host's logger.
 //!
-//! There are messages about calls that fail, warnings when the simulation starts or an array size changes, and the events of
-//! the model. `loggingOn` of a new instance has no effect: failures are always logged, because a status without a reason is
-//! useless, and events are logged only if a category is switched on. fmi2SetDebugLogging and fmi3SetDebugLogging do have an
-//! effect: off means no messages, and on without categories means all messages.
+//! There are messages about calls that fail, warnings at the start of the simulation and when an array size changes, and messages
+//! about events of the model. `loggingOn` of a new instance has no effect: failures are always logged, because a status without a
+//! reason is useless, and events are logged only if the host switches a log category on. fmi2SetDebugLogging and
+//! fmi3SetDebugLogging do have an effect: off means no messages, and on without categories means all messages.
 
 use crate::call::Severity;
 use crate::model::Model;
@@ -43,7 +43,7 @@ fn category_names<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option
     if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
 }
 
-/// Returns the log categories of a model, with the descriptions for a version of FMI.
+/// Returns the log categories of a model, with the descriptions that a version of FMI needs.
 pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     let description = |topic| match topic {
         Some(Topic::Event) => table.about.events.into(),
@@ -88,7 +88,7 @@ impl Filter {
     /// Only the reasons of failed calls.
     pub const ERRORS: Filter = Filter { warning: false, ..Filter::FAILURES };
 
-    /// Adds the reasons of failed calls to a selection.
+    /// Returns the selection with failures added.
     pub fn with_errors(self) -> Filter {
         Filter { discard: true, error: true, fatal: true, ..self }
     }

@@ -1,4 +1,5 @@
-//! Functions for numbers that may be NaN or infinite, in hosts that trap invalid floating-point operations.
+//! Functions for numbers that may be NaN or infinite. Some importers make invalid floating-point operations trap, so these
+//! functions must not cause any.
 
 /// Returns true if x is finite. The function tests the bits, because a comparison with NaN would end the process of a host
 /// that traps invalid operations.

@@ -19,7 +19,7 @@
 //! | the model's words | 8 each |
 //! | checksum of all before | 16 |
 //!
-//! Everything else in a model follows from its parameters.
+//! All other data of a model follow from its parameters.
 
 use std::sync::Arc;
 
@@ -235,7 +235,7 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(format!("the saved state is damaged: {what}")) }
     }
 
-    /// Reads the value of a parameter from a saved state. Its type must be that of `like`. It may be outside the parameter's
+    /// Reads the value of a parameter from a saved state. Its type must be the type of `like`. It may be outside the parameter's
     /// range, because a state can be saved before the end of initialization mode.
     fn value<M: Model>(&mut self, scalar: &Scalar<M>, like: Value) -> Result<Value, String> {
         let bytes = self.take()?;

@@ -43,7 +43,7 @@ pub struct Table<M: Dynamics> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// How the entries of the table become variables of FMI.
+/// Layout of the variables in the model description: one variable for each element of an array, or one for each array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Layout {
@@ -114,12 +114,12 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
     pub variable: &'static Variable<M>,
-    /// Access of the entry in the table. It is copied to each scalar, because every call needs it.
+    /// Access of the entry in the table, copied to each of its scalars because every call needs it.
     pub access: Access<M>,
-    /// C type in which the scalar is read and set. It is copied from the table's entry, because every call needs it.
+    /// C type in which the scalar is read and set, copied from the entry in the table because every call needs it.
     pub c_type: CType,
-    /// If this scalar is a continuous state, the function that returns the number of the state. It is copied from the entry
-    /// in the table, because every call needs it.
+    /// For a continuous state, the function that returns its number in the model. It is copied from the entry in the table,
+    /// because every call needs it.
     pub state: Option<Place>,
     /// Index among all scalars, from which the value reference follows (see [`Version`](crate::version::Version)).
     pub index: u32,
@@ -297,7 +297,7 @@ impl<M: Dynamics> Table<M> {
         self.variables.iter().any(|v| v.shape.iter().any(sizes))
     }
 
-    /// Returns the discrete outputs in the order of their slots, which is that of the table.
+    /// Returns the discrete outputs in the order of the table, which is also the order of their slots.
     pub fn discrete(&self) -> impl Iterator<Item = &'static Scalar<M>> + use<M> {
         self.scalars.iter().filter(|scalar| is_discrete(scalar.variable))
     }
@@ -323,15 +323,14 @@ impl<M: Dynamics> Table<M> {
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the derivatives of the continuous states. In Model Exchange their order is also that of states,
-    /// derivatives and nominal values.
+    /// Returns the derivatives of the continuous states. Model Exchange uses their order also for states and nominal values.
     #[inline]
     pub const fn derivatives(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.derivatives;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the numbers, in the model, of the continuous states, in the order in which the host reads them.
+    /// Returns the indices, in the model's state vector, of the continuous states, in the order in which the host reads them.
     pub fn places(&self) -> impl ExactSizeIterator<Item = usize> + use<M> {
         self.derivatives().iter().map(|s| match s.access {
             Access::Derivative(place) => place(s.element),
@@ -339,7 +338,7 @@ impl<M: Dynamics> Table<M> {
         })
     }
 
-    /// Returns the scalar that is continuous state number `place` of the model.
+    /// Returns the scalar that is continuous state `place` of the model's state vector.
     pub fn state_at(&self, place: usize) -> Option<&'static Scalar<M>> {
         self.scalars.iter().find(|s| s.state() == Some(place))
     }

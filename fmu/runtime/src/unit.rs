@@ -68,7 +68,7 @@ pub static UNITS: &[Unit] = &[
     Unit { name: "rad/s/sqrt(s)", base: None, display_units: &[] },
 ];
 
-/// Finds a unit by its name; `None` if no variable can have it.
+/// Finds a unit by its name; `None` for a name that is not in [`UNITS`].
 pub fn find(name: &str) -> Option<&'static Unit> {
     UNITS.iter().find(|unit| unit.name == name)
 }

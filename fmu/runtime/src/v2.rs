@@ -199,7 +199,8 @@ fn wrong_reference<M: Model>(reference: u32, found: Option<&Scalar<M>>) -> Strin
     }
 }
 
-/// Result of fmi2NewDiscreteStates, which describes the handled events and the next time event for the host.
+/// Result of fmi2NewDiscreteStates, by which the host learns what the handled events have changed, and when the next time event
+/// is.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
@@ -253,10 +254,10 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
     }))
 }
 
-/// Returns the interface of the requested instance, and the part of the variables that the host's model description contains.
+/// Returns the interface of the requested instance, and the part of the variables that the model description with this GUID
+/// contains.
 ///
-/// # Errors
-/// If the instance cannot be created; the text is the reason.
+/// # Errors If the instance cannot be created; the text is the reason.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,
@@ -324,8 +325,8 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Writes a property of the last step to the host's variable. `known` returns the value for a kind of status; if it has no
-/// value for this kind, the call is discarded.
+/// Writes a property of the last step, such as the time of its end, to the host's variable. `known` returns the value for a kind
+/// of status; if it returns `None`, the call is discarded.
 unsafe fn write_step_status<M: Model, T>(
     c: fmi2Component,
     call: &'static Call,
@@ -466,8 +467,8 @@ fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi
 fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
 
-/// Accepts a step of the host's integrator. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU
-/// stores no past states.
+/// Handles the host's message that it has completed a step of its integrator. `noSetFMUStatePriorToCurrentPoint` has no effect,
+/// because the FMU stores no past states.
 fn fmi2CompletedIntegratorStep(c: fmi2Component, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean, enterEventMode: *mut fmi2Boolean, terminateSimulation: *mut fmi2Boolean) -> fmi2Status =
     completed_step::<M, Fmi2, _>(c, enterEventMode, terminateSimulation);
 

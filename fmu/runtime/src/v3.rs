@@ -8,8 +8,8 @@
 //! follow the independent variable and the event indicators, which are not variables in FMI 2.0. There are no clocks and no
 //! binary variables; the functions for them return what the standard requires of an FMU without them.
 //!
-//! A host that has read the description with arrays is recognised by its token. Its value references count the entries of
-//! the table instead, and each stands for all scalars of an array ([`arrays`]).
+//! If the token shows that the host has read the description with arrays, value references count the entries of the table
+//! instead. Each value reference then stands for all scalars of an array ([`arrays`]).
 
 // The names are the standard's.
 #![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
@@ -263,8 +263,8 @@ fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *m
 };
 fn fmi3EnterContinuousTimeMode(instance: fmi3Instance) -> fmi3Status =
     perform::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
-/// Accepts a step of the host's integrator. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU
-/// stores no past states.
+/// Handles the host's message that it has completed a step of its integrator. `noSetFMUStatePriorToCurrentPoint` has no effect,
+/// because the FMU stores no past states.
 fn fmi3CompletedIntegratorStep(instance: fmi3Instance, _noSetFMUStatePriorToCurrentPoint: fmi3Boolean, enterEventMode: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean) -> fmi3Status =
     completed_step::<M, Fmi3, _>(instance, enterEventMode, terminateSimulation);
 fn fmi3SetTime(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status =

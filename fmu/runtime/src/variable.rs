@@ -15,7 +15,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// Returns the number of a Real, otherwise `None`.
+    /// Returns the value of a real number, otherwise `None`.
     #[inline]
     pub fn real(self) -> Option<f64> {
         match self {
@@ -24,7 +24,7 @@ impl Value {
         }
     }
 
-    /// Returns the number of an Integer or an enumeration, otherwise `None`.
+    /// Returns the value of an integer or the number of an enumeration's item, otherwise `None`.
     #[inline]
     pub fn integer(self) -> Option<i32> {
         match self {
@@ -113,8 +113,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
-/// Function from the number of an array's element, 0 for the first, to the number of the continuous state
-/// that the element is.
+/// Function that returns the index in the model's state vector of a continuous state, from the number of the element in its array
+/// (0 for the first element and for a scalar).
 pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
@@ -193,7 +193,7 @@ pub struct Variable<M: Dynamics> {
     /// True if other inputs determine the slope of this input over a step ([`Dynamics::set_dependent_slopes`]), whatever
     /// slope the host sets.
     pub follows_inputs: bool,
-    /// True if this parameter can be set during the simulation.
+    /// True if the host can set this parameter during the simulation, too.
     pub tunable: bool,
     /// Inputs and continuous states on which the variable depends without delay. The name of an array stands for all its
     /// elements. The name with "[]" stands for the element that has the index of the variable.

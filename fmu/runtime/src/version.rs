@@ -1,13 +1,13 @@
-//! Properties of a version of FMI: the names of its functions, the instance states in which they are allowed, who handles
-//! events, and the numbers of value references.
+//! Properties in which versions of FMI differ: the names of the functions, the instance states in which each is allowed, the
+//! possible ways to handle events, and the assignment of value references.
 
 use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
 use crate::table::{Layout, Scalar};
 
-/// A version of FMI. Each constant of the type [`Call`] is the function that performs an operation of
-/// [`Instance`](crate::instance::Instance). Functions that read and set values are not among them, because
-/// a version has several.
+/// A version of FMI. Each constant of the type [`Call`] names the function that performs an operation of
+/// [`Instance`](crate::instance::Instance) in this version. Functions that read and set values are not among the constants,
+/// because a version has several of them.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
     const PREFIX: &'static str;
@@ -51,7 +51,7 @@ pub trait Version: std::fmt::Debug + 'static {
     /// the instantiationToken (FMI 3.0).
     fn token<M: Model>(layout: Layout) -> &'static str;
 
-    /// Returns who handles the events of an instance with this interface if the host does not choose.
+    /// Returns how events are handled in an instance with this interface if the host does not choose.
     fn events(interface: Interface) -> Events;
 
     /// Returns true if a host may choose this handling of events for an interface.

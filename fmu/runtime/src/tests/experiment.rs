@@ -65,7 +65,7 @@ fn instance_goes_through_the_states_of_its_interface() {
     assert_eq!(instance.state(), Event);
     instance.reset().unwrap();
     assert_eq!(to_bytes(&instance), to_bytes(&fresh(ME)));
-    // After any call that continues the simulation, parameters can no longer be set.
+    // After a call that continues the simulation, parameters can no longer be set.
     type GoesOn = fn(&mut Subject) -> Result<(), Fault>;
     let goes_on: [GoesOn; 6] = [
         |i| i.enter_event_mode(),

@@ -1,4 +1,4 @@
-//! Tests with a host that integrates the states and handles events.
+//! Tests of Model Exchange, in which the host integrates the states and handles events.
 
 use super::*;
 use crate::call::InstanceState;

@@ -176,7 +176,7 @@ fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     assert!(
         refused(host.set(&SET_FLOAT64, &[start], |_| Value::Real(2.0))).contains("start.level[1]")
     );
-    // A host that integrates the states itself can set a state, too, after the simulation has started.
+    // A Model Exchange host can also set a state after the simulation has started.
     let level = |host: &mut Host| {
         refused(host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(1.0)))
     };

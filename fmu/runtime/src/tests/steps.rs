@@ -192,7 +192,8 @@ fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     held.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut held, "trend"), 0.0);
     assert!(!held.past_slopes);
-    // Derivatives belong to the next step, so that they do not use the old slopes and do not drop them.
+    // Derivatives that the host reads belong to the next step, so that they do not use the old slopes, and reading them does
+    // not drop the slopes.
     let mut asked = ramped();
     let net = real(&mut asked, "net[1]");
     assert_eq!(rate(&mut asked, "net[1]"), Ok(-0.5 * net));
@@ -253,8 +254,8 @@ fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
     assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
 }
 
-/// Between steps the outputs show the valve in the position that the present inputs cause, but the model
-/// itself is not changed.
+/// Between steps the outputs show the valve in the position that the present inputs cause, but the valve in the model moves only
+/// in the next step.
 #[test]
 fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     let mut instance = started(CS, &[]);

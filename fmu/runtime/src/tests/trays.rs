@@ -1,5 +1,5 @@
-//! Test model with trays that fill, x_i' = q_i. The lengths of its arrays are given by a parameter, and one output has
-//! derivatives that vanish where all levels and inflows are 0.
+//! Test model with trays that fill, x_i' = q_i. A parameter gives the lengths of its arrays. The derivatives of one output vanish
+//! where all levels and inflows are 0.
 
 use crate::clock::Instant;
 use crate::model::StepFailure;

@@ -48,7 +48,7 @@ fn computed_variables_have_a_value_from_initialization_mode_on() {
         assert!(why.contains(&format!("{name} {says}")), "{why}");
     }
     instance.enter_initialization_mode().unwrap();
-    // Whenever an input is set, the variables that depend on it change.
+    // Each time an input is set, the variables that depend on it change.
     for (z, room) in [(0.5, 1.5), (1.0, 1.0)] {
         set(&mut instance, "z", z).unwrap();
         assert_eq!(real(&mut instance, "room"), room);

@@ -67,7 +67,7 @@ pub struct Outputs {
     valve: i32,
 }
 
-/// The vessels. Their levels are stored in the opposite order of the host's.
+/// The vessels. The model stores their levels in the opposite order of that in which the host reads them.
 #[derive(Clone, Debug)]
 pub struct Vessels {
     k: f64,

@@ -1,7 +1,8 @@
-//! The layout of variables in which each entry of the table is one variable: the scalars of each value reference.
+//! Translation between array variables and scalars, for hosts that have read the model description in which each entry of the
+//! table is one variable.
 //!
-//! An instance only has scalars. This module translates a host's arrays to scalars: an array is the list of its
-//! elements in row-major order, with the present sizes of its structural parameters. An element outside these sizes
+//! An instance only has scalars. In this layout a value reference stands for an array, which is the list of its scalars in
+//! row-major order, with the lengths that the structural parameters have at present. An element outside these lengths
 //! keeps its start value.
 
 use super::references::{scalar_reference, time_reference, type_of};
@@ -13,15 +14,15 @@ use crate::variable::{Access, Dimension, Value, Variable};
 /// The scalars of each array variable, for the present array sizes, which the structural parameters determine.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
-    /// Value references that the scalars have in the layout of scalars, variable by variable.
+    /// For each variable, the value references that its scalars have in the layout of scalars.
     scalars: Vec<u32>,
     ends: Vec<usize>,
     types: Vec<CType>,
-    /// For each scalar the number of its array and its position in the array, counted from 1. Position 0 means that the
-    /// scalar is outside the array's present size.
+    /// For each scalar the value reference of its array and its position in the array, counted from 1. Position 0 means that the
+    /// scalar is outside the array's present length.
     places: Vec<(u32, usize)>,
-    /// Numbers of the continuous states that exist with the present array sizes, in the order in which the host reads them.
-    /// They count the states of the largest arrays.
+    /// Positions of the continuous states that exist with the present array sizes, in the order in which the host reads them.
+    /// They are positions in the list of all states that exist with the largest sizes, in the order of the table.
     states: Vec<usize>,
 }
 
@@ -88,15 +89,15 @@ impl Arrays {
         self.ends.is_empty()
     }
 
-    /// Returns the number of a scalar's array and the scalar's position in the array, counted from 1; `None` if it is
-    /// outside the present size.
+    /// Returns the value reference of a scalar's array and the scalar's position in the array, counted from 1; `None` if the
+    /// position is outside the array's present length.
     pub fn place(&self, scalar: u32) -> Option<(u32, usize)> {
         let place = *self.places.get((scalar as usize).checked_sub(1)?)?;
         (place.1 > 0).then_some(place)
     }
 
-    /// Returns the numbers of the continuous states that exist with the present array sizes, in the order in which the host
-    /// reads them. They count the states of the largest arrays.
+    /// Returns the positions of the continuous states that exist with the present array sizes, in the order in which the host
+    /// reads them. They are positions in the list of all states that exist with the largest sizes, in the order of the table.
     pub fn states(&self) -> &[usize] {
         &self.states
     }
@@ -140,8 +141,8 @@ pub fn reference<M: Model>(variable: &Variable<M>) -> u32 {
     place.map_or(0, |place| place as u32 + 1)
 }
 
-/// Returns the value reference of the independent variable, which follows those of the table. The next reference is that of
-/// the array of event indicators.
+/// Returns the value reference of the independent variable (time), which follows the variables of the table. The value reference
+/// after it is that of the array of event indicators.
 pub fn time<M: Model>() -> u32 {
     M::table().variables.len() as u32 + 1
 }
@@ -174,7 +175,7 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
 }
 
-/// Returns the arrays, if they are the variables in this layout; `None` if scalars are the variables.
+/// Returns the arrays if each array is one variable in this layout; `None` if each scalar is one.
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }

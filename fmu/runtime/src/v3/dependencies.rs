@@ -56,8 +56,8 @@ pub(super) fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// Writes the dependencies of a variable to the host's arrays: until the end of initialization mode
-/// the dependencies of its initial value, afterwards the present ones.
+/// Writes the dependencies of a variable to the host's arrays. Until the end of initialization mode they are the dependencies of
+/// the variable's initial value, afterwards the dependencies in the present state.
 pub(super) unsafe fn write_dependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,

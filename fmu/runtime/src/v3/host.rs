@@ -12,7 +12,8 @@ pub struct Host<M: Model> {
     pub(super) early_return_allowed: bool,
     pub(super) required: Vec<fmi3ValueReference>,
     pub(super) phase: Phase,
-    /// Values of inputs that the host has set in an intermediate update, for the end of the following part of the step.
+    /// Values of inputs that the host has set in an intermediate update. The inputs reach these values at the end of the
+    /// following part of the step.
     pub(super) ends: M::Inputs,
     pub(super) set: Vec<fmi3ValueReference>,
     pub(super) indicators: Vec<f64>,

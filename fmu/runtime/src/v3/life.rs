@@ -64,11 +64,10 @@ pub(super) unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Returns the layout of the variables (scalars or arrays) in the model description with this instantiationToken, and the
-/// part of the variables that the description contains.
+/// Returns two properties of the model description to which the host's instantiationToken belongs: the layout of its variables
+/// (scalars or arrays), and which part of the variables it contains.
 ///
-/// # Errors
-/// If the token or the instance's name is not accepted.
+/// # Errors If the token or the instance's name is not accepted.
 fn check_token<M: Model>(
     name: Option<String>,
     token: Option<String>,
@@ -99,11 +98,10 @@ pub(super) struct Stepping {
     pub(super) update: fmi3IntermediateUpdateCallback,
 }
 
-/// Creates an instance for Co-Simulation. `variables` are the value references of the variables that the host requires
-/// within steps, and their number.
+/// Creates an instance for Co-Simulation. `variables` is the host's list requiredIntermediateVariables: a pointer to the value
+/// references of the variables that it reads or sets within steps, and their number.
 ///
-/// # Errors
-/// If one of the variables cannot be read or set within a step.
+/// # Errors If one of these variables cannot be read or set within a step.
 pub(super) unsafe fn co_simulation<M: Model>(
     arrays: Option<&Arrays>,
     with: Stepping,

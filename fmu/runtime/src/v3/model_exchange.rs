@@ -30,8 +30,8 @@ pub(super) unsafe fn set_states<M: Model>(
     }
 }
 
-/// Fills an array of the host with one value per continuous state. `body` writes the values for the largest
-/// possible number of states.
+/// Fills an array of the host with one value per continuous state that exists with the present array sizes. `body` writes the
+/// values of all states that exist with the largest sizes.
 pub(super) unsafe fn fill_states<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
