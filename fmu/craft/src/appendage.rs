@@ -76,8 +76,7 @@ impl Default for Appendage {
 }
 
 impl Appendage {
-    /// Returns true if the mode can have an effect: it participates in the motion of the craft, or is deflected or
-    /// moving at the start.
+    /// Returns true if the mode can have an effect: its participation is not 0, or it is deflected or moving at the start.
     pub(crate) fn acts(&self) -> bool {
         self.participation != [0.0; 6] || self.eta != 0.0 || self.eta_dot != 0.0
     }
@@ -129,17 +128,16 @@ impl Mode {
         ww[0] * xx + ww[1] * yy + ww[2] * zz + (ww[3] * xy + ww[4] * xz + ww[5] * yz) * 2.0
     }
 
-    /// Returns the part of -eta'' that does not depend on the craft's accelerations a and w'. `turning` is w.(D w);
-    /// see the module's head.
+    /// Returns the part of -eta'' that does not depend on the craft's accelerations a and w'. `turning` is w.(D w), with the
+    /// symbols of the module's head.
     fn pull<T: Number>(&self, eta: T, rate: T, turning: T) -> T {
         rate * self.damping + eta * self.stiffness - turning * 0.5
     }
 }
 
-/// The modes of all appendages. `effective` is the sum of u u^T. `dry` is the dry craft with its appendages
-/// undeformed. `shares` has for each mode an upper bound of the fraction of the dry craft's inertia by which a
-/// displacement eta = 1 changes the inertia. `is_too_heavy` is true if the participations leave the craft no inertia,
-/// even if nothing is deflected.
+/// The modes of all appendages. `effective` is the sum of u u^T. `dry` is the dry craft with its appendages undeformed. `shares`
+/// has for each mode an upper bound of the relative change of the dry craft's inertia by a displacement eta = 1. `is_too_heavy`
+/// is true if the participations are so large that the mass matrix is not positive even without deflection.
 #[derive(Clone, Debug)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,
@@ -293,8 +291,8 @@ impl Structure {
         modes.fold(T::constant(0.0), |sum, (mode, rate)| sum + *rate * *rate * mode.damping)
     }
 
-    /// Returns the scale to which the allowed error of the modes' rates is relative: the largest |eta'| + omega |eta| +
-    /// |eta''| t of all modes.
+    /// Returns the largest |eta'| + omega |eta| + |eta''| t of all modes, to which the allowed error of the modes' rates is
+    /// relative.
     pub fn speed_scale(&self, eta: &[f64], rate: &[f64], second: &[f64], t: f64) -> f64 {
         let states = eta.iter().zip(rate.iter().zip(second));
         self.modes.iter().zip(states).fold(0.0, |most, (mode, (eta, (rate, second)))| {
@@ -303,8 +301,8 @@ impl Structure {
         })
     }
 
-    /// Returns true if the appendages leave the craft no positive inertia. This holds at any deflection if the
-    /// participations are too large for the mass of the craft, and otherwise only at deflections far beyond the range
+    /// Returns true if deflections or participations make the craft's mass matrix not positive definite. If the participations
+    /// are too large for the mass of the craft, this is so at any deflection, otherwise only at deflections far beyond the range
     /// of a linear model.
     pub fn is_beyond(&self, eta: &[f64]) -> bool {
         if self.is_too_heavy {
@@ -437,7 +435,7 @@ impl Flexing {
         (self.momentum[n], self.moment[n]) = (momentum, moment);
     }
 
-    /// Adds the deformed appendages to the craft's mass matrix.
+    /// Adds the inertia of the deformed appendages to the craft's mass matrix.
     pub fn add_inertia(&self, matrix: &mut Mat6) {
         let body = Rigid { mass: 0.0, moment: self.y[0], inertia: symmetric(self.growth[0]) };
         for (row, added) in matrix.iter_mut().zip(body.mass_matrix()) {
@@ -520,8 +518,8 @@ impl Flexing {
         self.grown[n + 1] = add(self.grown[n + 1], times(&symmetric(self.growth[0]), w));
     }
 
-    /// Returns coefficient n of eta' and eta'' of all modes; in a directional derivative, coefficient 1 is
-    /// the derivative of both.
+    /// Returns coefficient n of eta' and eta'' of all modes. If the expansion is along a direction, coefficient 1
+    /// contains the directional derivatives.
     pub fn rates(&self, n: usize) -> [[f64; APPENDAGES]; 2] {
         [self.coefficients(&self.rate, n), self.second]
     }

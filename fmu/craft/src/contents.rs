@@ -101,10 +101,10 @@ fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
 
-/// A bob with the terms of its equation of motion that do not contain [a; w']: `u` is [p; P x p], `phi` is the force phi of
-/// the module's head, `known` is G without a + w' x rho, and `centring` is the energy of the centring stiffness. Three
-/// fields are 0 unless the tank drains: `m_d` is m', `end_rate` is the velocity h' e + l' p of the rod's end if the rod does
-/// not swing, and `centring_d` is k l l' |p_perp|^2.
+/// A bob with the terms of its equation of motion that do not contain [a; w']: `u` is [p; P x p], `phi` is the force phi of the
+/// module's head, `known` is G without a + w' x rho, and `centring` is the energy of the centring stiffness. Three fields are 0
+/// unless the tank drains: `m_d` is m', `end_rate` is h' e + l' p, the velocity of the bob if the direction p is constant, and
+/// `centring_d` is k l l' |p_perp|^2.
 pub struct Swing<T> {
     m: T,
     l: T,
@@ -381,9 +381,9 @@ impl MountedTank {
         surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
-    /// Returns an error if a bob is at an angle at which its inertia along the meridian is too small for the model. `tank`
-    /// is the tank's number for the message; it counts from 1, and is 0 if the system has only one tank. The limit has a
-    /// tolerance of 1e-6, because a step that cannot pass the limit ends just before it.
+    /// Returns an error if a bob is at an angle at which its inertia along the meridian is too small for the model. `tank` is the
+    /// tank's number for the message; it counts from 1, and is 0 if the system has only one tank. The check has a tolerance of
+    /// 1e-6, because a step that would pass the limit is ended just before it.
     pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
         let is_near = |n: &usize| self.least_inertia(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
@@ -411,8 +411,8 @@ impl<T: Number> Swing<T> {
         add(add(a, cross(w_d, self.rho)), self.known)
     }
 
-    /// Returns the force of the bob on the craft and its torque about O for the accelerations [a; w']. The force that guides
-    /// a pendulum in a plane is not included.
+    /// Returns the force of the bob on the craft and its torque about O for the accelerations [a; w'], without the force that
+    /// guides a planar mode in its plane.
     fn wrench(&self, a: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         match &self.surface {
             Some(surface) => {
@@ -459,7 +459,8 @@ impl<T: Number> OnSurface<T> {
         self.meridian.free(force)
     }
 
-    /// Returns the couple on the craft per mass of the bob; `slid` is the vector -l y (`surface.rs`).
+    /// Returns the torque of rotary motion on the craft about the tank's axis, divided by the mass of the bob; `slid` is the
+    /// vector -l y (`surface.rs`).
     fn couple(&self, slid: Vec3<T>, w_d: Vec3<T>) -> Option<Vec3<T>> {
         let (rotary, n) = (self.rotary.as_ref()?, self.meridian.around()?);
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
@@ -719,8 +720,8 @@ impl<T: Number> Contents<'_, T> {
         self.spin.as_ref().map(|now| (now.rate, [now.energy, now.turning[0]]))
     }
 
-    /// Returns the force of the liquid on the craft and its torque about O if a = w' = 0, without those of
-    /// the rigid liquid's inertia.
+    /// Returns the force of the liquid on the craft and its torque about O if a = w' = 0, without the inertial forces
+    /// of the rigid liquid.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(Swing::load);
         let sum =
@@ -742,8 +743,8 @@ impl<T: Number> Contents<'_, T> {
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 
-    /// Returns the power drained', W, that the outflow takes from the system if O has the velocity `v`. For a craft on a
-    /// pivot `v` is 0, and the energy includes the potential energy a.S of gravity.
+    /// Returns the power drained', W, that the outflow takes from the energy of the system if O has the velocity `v`. For a craft
+    /// on a pivot `v` is 0, and the energy includes the potential energy a.S of gravity.
     pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
         let half = 0.5;
         let (m_0_d, [s_d, turning]) = self.shrinking;
@@ -844,8 +845,8 @@ pub trait Drains<const D: usize>: System<D> + Sized {
     /// Returns an error if a bob is beyond the largest slosh angle of its surface.
     fn check_surfaces(&self, x: &[f64; D]) -> Result<(), StepError>;
 
-    /// Advances the states by `h`. `begin` is the simulation time at the start, s, for messages. The solver ends a stretch
-    /// where the mass of liquid passes a point of a fill table, because the derivatives jump there.
+    /// Advances the states by `h`. `begin` is the simulation time at the start, s, for messages. Where the mass of liquid passes
+    /// a point of a fill table the derivatives jump; therefore an internal step of the solver ends there.
     fn advance(
         &self,
         x: &mut [f64; D],
@@ -861,7 +862,7 @@ pub trait Drains<const D: usize>: System<D> + Sized {
         while t < h {
             let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
             let done = runge_kutta::advance(self, x, (t, end), limits.tolerance, &mut pace);
-            // A step that cannot pass the largest angle of a surface ends just before this angle.
+            // A step that would pass the largest angle of a surface is ended just before this angle.
             self.check_surfaces(x)?;
             done.map_err(|why| why.delayed(begin))?;
             self.normalise(x, end);

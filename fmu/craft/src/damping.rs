@@ -9,12 +9,12 @@
 //! f(x) = (d + sqrt(d^2 + delta^2))/2 - (-s_b + sqrt(s_b^2 + delta^2))/2,   d = x - s_b
 //! ```
 //!
-//! q depends on the `DampingLaw`: 1/2 for a laminar layer at the wall, 1 for a constant damping ratio, 0 for a constant c. x
-//! is the specific force along the tank's axis at the hinge. SloshTank computes x from the given motion of the host,
-//! Spacecraft from the motion of craft and liquids as one rigid body (`motion.rs`). The drag of the bobs would change x by
-//! about 1e-4, but x would then be the solution of an equation. a_+ equals x if thrust presses the liquid to the tank's
-//! bottom, falls smoothly to 0 if thrust pulls the tank away, and is a_f/2 without thrust. With zeta_A the damping ratio
-//! grows with the amplitude A, as zeta + zeta_A A. A_0 is far below any motion of interest and keeps the root analytic.
+//! q depends on the `DampingLaw`: 1/2 for a laminar layer at the wall, 1 for a constant damping ratio, 0 for a constant c. x is
+//! the specific force along the tank's axis at the hinge. SloshTank computes x from the given motion of its tank, Spacecraft from
+//! the motion of craft and liquids as one rigid body (`motion.rs`). The drag of the bobs would change x by about 1e-4, but x
+//! would then be the solution of an equation. a_+ equals x if thrust presses the liquid to the tank's bottom, falls smoothly to 0
+//! if thrust pulls the tank away, and is a_f/2 without thrust. With zeta_A the damping ratio grows with the amplitude A, as zeta
+//! + zeta_A A. A_0 is far below any motion of interest and keeps the root analytic.
 //!
 //! Breaking waves dissipate in proportion to max(0, k a - s_b). k a is the steepness: wave number times elevation at the
 //! wall. In an upright cylinder k = xi_n/R, and the elevation per slosh angle is 2 R/(xi_n^2 - 1), at any depth
@@ -118,9 +118,9 @@ impl Excess {
     }
 }
 
-/// Drag of one mode in a tank that does not drain, with the power series of c. `growth` is 2 m zeta_A, kg/rad; `c_ref` is c
-/// at g_ref without the terms that depend on the amplitude, N s/m; `w2_ref` is w_ref^2 and `floor2` is a_f^2. `instant`
-/// computes c directly from values at one instant, to which the series is compared.
+/// Drag of one mode in a tank that does not drain, with the power series of c. `growth` is 2 m zeta_A, kg/rad; `c_ref` is c at
+/// g_ref without the terms that depend on the amplitude, N s/m; `w2_ref` is w_ref^2 and `floor2` is a_f^2. `instant` computes c
+/// directly from values at one instant, so that the error of the series can be found by comparison.
 #[derive(Clone, Debug)]
 pub struct Drag {
     law: DampingLaw,

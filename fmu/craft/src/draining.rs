@@ -8,8 +8,8 @@
 //! ```
 //!
 //! The symbols are as in `motion.rs`; force and torque include those of the flow within the tanks. If a mass flow jumps, the
-//! momenta K and L of the flow within the tank change by an impulse. The equations above give this impulse if the slope of
-//! the flow is their only load.
+//! momenta K and L of the flow within the tank jump as well, which gives the craft an impulse. The equations above return this
+//! impulse if their only load is the slope of the flow.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -94,8 +94,8 @@ pub struct Draining {
     moving: Vec<Range<usize>>,
 }
 
-/// Motion of the craft at an instant, with the accelerations that solve its equations. `velocity` is the velocity of O, body
-/// axes; `by_pivot` is the power, W, that stiffness, damping and friction of a pivot dissipate.
+/// Motion of the craft at an instant, with the solution [a; w'] of its equations. `velocity` is the velocity of O, body axes;
+/// `by_pivot` is the power, W, that stiffness, damping and friction of a pivot take from the craft.
 struct Instant<T> {
     q: Quaternion<T>,
     axes: Mat3<T>,
@@ -122,8 +122,8 @@ fn scales(
     swing: impl Fn(usize) -> f64,
     flexing: [f64; 2],
 ) -> [f64; STATES] {
-    // States with an infinite scale have no error of their own: work, energies and masses of liquid follow
-    // from the other states.
+    // States whose scale is infinite have no allowed error, so that they do not limit the steps: work, energies and masses of
+    // liquid follow from the other states.
     let mut scale = [f64::INFINITY; STATES];
     scale[..index::OMEGA].fill(1.0);
     scale[index::OMEGA..index::POSITION].fill(turn);
@@ -207,8 +207,8 @@ impl Drains<STATES> for Run<'_> {
 }
 
 impl Draining {
-    /// Creates the equations. Returns `None` if no tank needs them: no tank drains or has spinning liquid, and all modes are
-    /// pendulums that swing in every direction.
+    /// Creates the equations of a draining craft. Returns `None` if no tank needs them, because no tank drains or has spinning
+    /// liquid and all modes are pendulums that swing in every direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         if !tanks.iter().any(Tank::has_contents) {
@@ -317,9 +317,9 @@ impl Draining {
         true
     }
 
-    /// Completes the energy balance after an impulse of the wheels has changed the state from `before` to `state`: if liquid
-    /// flows, this impulse also does work on the moving ends of the rods, as the tension T does in drained' (`contents.rs`).
-    /// This work is added to the drained energy.
+    /// Completes the energy balance after an impulse of the wheels has changed the state from `before` to `state`. If liquid
+    /// flows, the ends of the rods move and the impulse also does work on them, as the tension T does in drained'
+    /// (`contents.rs`). This work is added to the drained energy.
     pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
         if state.flow != [0.0; TANKS] {
             let work = state.x[index::WORK] - before.x[index::WORK];
@@ -332,8 +332,7 @@ impl Draining {
         self.evaluate(&state.x, &acting).outputs(&state.x, |_| None).energy
     }
 
-    /// Returns the specific force a at the pivot, which is minus gravity in body axes, because the
-    /// pivot does not accelerate.
+    /// Returns the specific force a at the pivot: minus gravity, in body axes, because the pivot does not accelerate.
     fn held_acceleration<T: Number>(&self, axes: &Mat3<T>) -> Vec3<T> {
         transposed_times(axes, constant(self.gravity)).map(|x| -x)
     }
@@ -370,8 +369,8 @@ impl Draining {
         })
     }
 
-    /// Returns the accelerations [a; w'] of craft and liquids at rest as one rigid body. If no drag depends on
-    /// them (`damping.rs`), returns 0.
+    /// Returns the accelerations [a; w'] that craft and liquids at rest would have as one rigid body. If no drag depends on the
+    /// acceleration (`damping.rs`), returns 0.
     fn rigid_motion<T: Number>(
         &self,
         x: &[T; STATES],

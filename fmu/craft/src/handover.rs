@@ -1,5 +1,5 @@
-//! Transitions of a liquid between slosh (pendulums) and detached liquid (`lump.rs`), and impacts of the detached liquid on
-//! the wall. They are impulses on the carrier of the tank, which is a spacecraft or the host of a SloshTank.
+//! Transitions of a tank's liquid between settled liquid (pendulums) and detached liquid (`lump.rs`), and impacts of the detached
+//! liquid on the wall. They are impulses on the craft that carries the tank.
 //!
 //! Each transition conserves momentum and angular momentum about the common centre of mass, and loses energy; see `lump.rs`.
 
@@ -13,8 +13,9 @@ use crate::rigid::{Factors, Rigid};
 use crate::sizes::MODES;
 use crate::state::BallState;
 
-/// Carrier of tanks whose liquid can detach: the spacecraft, or the host of a SloshTank. In all methods `lump` is the index
-/// of the detached liquid and `t` is the time since the start of the call, s. Vectors are in body axes.
+/// The craft that carries tanks whose liquid can detach: a Spacecraft, or the craft to which a SloshTank is attached. In
+/// all methods `lump` is the index of the detached liquid and `t` is the time since the start of the call, s. Vectors
+/// are in body axes.
 pub(crate) trait Carrier {
     /// Copy of all data that [`Carrier::change`] may alter, from which they can be restored.
     type Memory;
@@ -56,7 +57,7 @@ pub(crate) trait Carrier {
     /// Returns the power series of the carrier's acceleration a, angular velocity w and angular acceleration w'.
     fn motion(&self) -> [&Vector; 3];
 
-    /// Returns the factorised mass matrix of the carrier with everything attached to it.
+    /// Returns the factors of the mass matrix of the carrier with everything that moves with it.
     fn factors(&self) -> &Factors;
 
     fn dissipated(&mut self) -> &mut f64;
@@ -126,7 +127,7 @@ pub(crate) trait Carrier {
         energy
     }
 
-    /// Returns the mass of carrier and liquids and the velocity of their common centre of mass relative to O, body axes.
+    /// Returns the mass of carrier and liquids, and the velocity of their common centre of mass relative to O, body axes.
     fn drift_of_center(&self) -> (f64, Vec3) {
         let (w, rigid) = (self.motion()[1][0], self.rigid());
         let mut momentum = cross(w, rigid.moment);
@@ -179,8 +180,8 @@ pub(crate) trait Carrier {
         self.strike(lump, e, t);
     }
 
-    /// Moves detached liquid back onto the wall if a step of the host's integrator has carried it through the wall. The
-    /// velocity of the liquid, the common centre of mass and the angular momentum do not change.
+    /// Moves detached liquid back onto the wall if a step of an external integrator (Model Exchange) has carried it through the
+    /// wall. The velocity of the liquid, the common centre of mass and the angular momentum do not change.
     fn bring_to_wall(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();

@@ -1,6 +1,6 @@
 //! The physics of a spacecraft in six degrees of freedom with sloshing tanks. The crate models a rigid body with up to four tanks
-//! of up to three pendulums each and up to six modes of flexible appendages, and also a single tank for a spacecraft that a host
-//! simulates. It contains no FMI, no I/O and no unsafe code, and allocates nothing while stepping.
+//! of up to three pendulums each and up to six modes of flexible appendages, and also a single tank for a spacecraft that another
+//! program simulates. It contains no FMI, no I/O and no unsafe code, and allocates nothing while stepping.
 //!
 //! Frames and signs: the inertial frame falls freely with the craft. The body frame is fixed
 //! in the dry craft, its origin is O. The attitude q (scalar first) maps body to inertial
@@ -21,11 +21,11 @@
 //! assert!((shown.momentum[2] - 2400.0).abs() < 1e-3);
 //! ```
 //!
-//! `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees them. `motion.rs` has the craft's equations,
+//! `spacecraft.rs` and `slosh_tank.rs` are the two components for which there are FMUs. `motion.rs` has the craft's equations,
 //! `bob.rs` and `constrained.rs` have the equations of one slosh mode, and `rigid.rs` has the mass matrix. `appendage.rs` has
-//! flexible appendages, `lump.rs` describes detached liquid, `handover.rs` its impulses on the carrier. `outputs.rs` has energy
-//! and momentum. `contents.rs` describes a tank that drains by a table (`table.rs`), `draining.rs` a craft with such tanks, and
-//! `spin.rs` liquid that spins. The crate `taylor` integrates.
+//! flexible appendages, `lump.rs` describes detached liquid, `handover.rs` its impulses on the craft that carries the tank.
+//! `outputs.rs` has energy and momentum. `contents.rs` describes a tank that drains by a table (`table.rs`), `draining.rs` a
+//! craft with such tanks, and `spin.rs` liquid that spins. The crate `taylor` integrates.
 
 #![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]

@@ -83,8 +83,8 @@ const RESTING: f64 = 1e-9;
 /// Smallest value of f'' (f is the function that describes the wall), relative to the terms of its sum, at which detached
 /// liquid on the wall counts as pressed to it. Smaller values may be rounding errors.
 const PRESSING: f64 = 1e-9;
-/// Distance in time from an event, relative to the event's time, between the two points from which the slope of the
-/// event's function is computed.
+/// Distance in time, relative to the time of an event, between the two points from which the slope of the event's function is
+/// computed.
 const NEAR: f64 = 1e-6;
 /// Largest change of an event's time in one iteration of [`Lump::polish`], relative to this time.
 const FAR: f64 = 0.1;
@@ -105,7 +105,7 @@ pub(crate) enum Due {
     Look,
 }
 
-/// Function that crosses zero at an event. `Exact` are the wall force and the bobs' mean cosine, whose series are as exact
+/// Function that crosses zero at an event. `Exact` stands for the wall force and the bobs' mean cosine, whose series are as exact
 /// as the series of the motion. `Axial` is the specific force along the axis minus its lower limit, `Passage` is half of the
 /// derivative of the squared distance from the axis, and `Excess` is the wall force minus the force above which drag acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,8 +169,7 @@ pub(crate) struct Lump {
     sum: Vector,
     turned: Vector,
     u_turned: Vec3,
-    /// Derivative of the shape's inertia J_a for a directional derivative, kg m2, body axes; 0 if the
-    /// expansion is over time.
+    /// Derivative of the shape's inertia J_a in a directional derivative, kg m2, body axes; 0 if the expansion is in time.
     pub shape_slope: Mat3,
     known_pull: f64,
     known_force: Vec3,
@@ -343,8 +342,8 @@ impl Lump {
         [at[0], at[1], at[2], rate[0], rate[1], rate[2]]
     }
 
-    /// Returns the six states of the detached liquid (position and rate, tank axes) with the position moved onto the wall
-    /// and the rate projected onto the wall's tangent plane.
+    /// Returns the six states of the detached liquid (position and rate, tank axes) with the position moved onto the wall and the
+    /// rate made parallel to the wall.
     fn on_wall(&self, x: &[f64; 6]) -> [f64; 6] {
         let [across, along] = [self.radius, self.half].map(|r| 1.0 / (r * r));
         let at = [x[0], x[1], x[2] - self.height];
@@ -509,8 +508,8 @@ impl Lump {
         (g, dot(g, g))
     }
 
-    /// Returns the force of the detached liquid on the craft and its torque about O if the accelerations a and w' are 0. The
-    /// wall force N is the one for these accelerations.
+    /// Returns the force of the detached liquid on the craft and its torque about O if the accelerations a and w' are 0. The wall
+    /// force N is computed for these accelerations, too.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
@@ -623,7 +622,7 @@ impl Lump {
         })
     }
 
-    /// Returns the coefficients below n of the specific force along the tank's axis at the hinge of mode 1.
+    /// Returns the coefficients of orders below n of the specific force along the tank's axis at the hinge of mode 1.
     fn axial(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> Series {
         let turned = cross(self.hinge, self.e);
         let height = dot(self.e, self.hinge);
@@ -639,9 +638,9 @@ impl Lump {
         axial
     }
 
-    /// Returns the coefficients below n of the three functions that must be positive before the pendulums may take over the
-    /// liquid: largest allowed minus expected swing, thrust along the tank, and depth below the centre of the wall's
-    /// surface. With each, returns the magnitude of its rounding errors.
+    /// Returns the coefficients of orders below n of the three functions that must be positive before the pendulums may take over
+    /// the liquid: largest allowed minus expected swing, thrust along the tank, and depth below the centre of the wall's surface.
+    /// The second part of each pair is the magnitude of the function's rounding errors.
     fn settling(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> [(Series, f64); 3] {
         let mut thrust = self.axial(n, a, w, w_d);
         thrust[0] -= self.floor;
@@ -729,10 +728,10 @@ impl Lump {
         }
     }
 
-    /// Returns an improved time of an event, of which `t` is the root of the series of its function. Coefficient k of a
-    /// product of series is up to 2^k times as large as the coefficients of its factors, so that the product's series up to
-    /// order n is less exact than the motion. Therefore the time is corrected with values of the function that are computed
-    /// from the motion near the event.
+    /// Returns an improved time of an event; `t` is the root of the power series of the event's function. Coefficient k of a
+    /// product of series is up to 2^k times as large as the coefficients of its factors, so that the product's series up to order
+    /// n is less exact than the motion. Therefore the time is corrected with values of the function that are computed from the
+    /// motion near the event.
     fn polish(
         &self,
         mut t: f64,
@@ -751,7 +750,7 @@ impl Lump {
         let root = t;
         for _ in 0..ITERATIONS {
             let (now, before) = (value(t), value(t * (1.0 - NEAR)));
-            // Where the function only touches zero, its slope gives no estimate of the time.
+            // Where the function touches zero without crossing it, its slope is 0 and gives no estimate of the time.
             let change = t * NEAR * now;
             if change.abs() > FAR * t * (before - now).abs() || before == now {
                 return root;
@@ -811,7 +810,7 @@ impl Lump {
 
     fn next_contact(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
-        // A host whose integration diverges may set states so large that their squares overflow.
+        // States from an external integrator that diverges may be so large that their squares overflow.
         if !(0..=n).all(|k| largest(x(k)) < LARGEST_COEFFICIENT) {
             return None;
         }
@@ -826,7 +825,7 @@ impl Lump {
             return first_root(&f[..=2 * n], h);
         }
         if f[1] > RESTING {
-            // The root near 0 is in the past.
+            // The root near 0 lies in the past, where the liquid left the wall, so that it is divided out.
             return first_root(&f[1..=2 * n], h);
         }
         if self.meets_wall([f[0], f[1], f[2]], self.rho[2]) {
@@ -849,10 +848,10 @@ impl Lump {
         f[1] < -RESTING || f[2] < -PRESSING * size
     }
 
-    /// Returns the value of f, the function that describes the wall, as an event indicator for hosts that integrate the
-    /// states themselves. Order 0 of the expansion must be computed. The value is below zero only if an impact is due. It is
-    /// above zero if after an impact the liquid is outside the wall by rounding but moves inwards, or is on the wall without
-    /// being pressed to it. A host that compares signs therefore does not miss a bounce shorter than its step.
+    /// Returns the value of f, the function that describes the wall, as an event indicator for Model Exchange. Order 0 of the
+    /// expansion must be computed. The value is below zero only if an impact is due. It is above zero if after an impact the
+    /// liquid is outside the wall by rounding but moves inwards, or is on the wall without being pressed to it. An integrator
+    /// that compares signs therefore does not miss a bounce shorter than its step.
     fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
         let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
         let f = 1.0 - dot(x, g);
@@ -865,7 +864,7 @@ impl Lump {
         if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
     }
 
-    /// Returns true if the present event indicators show that a host that integrates the states itself has passed an event.
+    /// Returns true if the present event indicators show that an external integrator (Model Exchange) has passed an event.
     pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
         // If the state is `Held`, this indicator stays below zero after the liquid has passed the point nearest to the axis.
         leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
@@ -881,8 +880,8 @@ impl Lump {
         add(self.center, scale(1.0 / size, self.x_0))
     }
 
-    /// Returns the coefficients below n of the squared wall force minus the square of twice the drag force. This difference
-    /// rises through zero where drag begins to act.
+    /// Returns the coefficients of orders below n of the squared wall force minus the square of twice the drag force. This
+    /// difference rises through zero where drag begins to act.
     fn excess(&self, n: usize) -> Series {
         let (mut pull, mut excess) = (ZERO, ZERO);
         for (k, x) in pull.iter_mut().enumerate().take(n) {
@@ -936,9 +935,9 @@ impl Lump {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
 
-    /// Returns event indicators for hosts that integrate the states themselves; `bobs` are the bobs of the tank. They cross
-    /// zero where [`Lump::next`] finds an event. They are computed from directions of unit length, although the directions
-    /// that a host integrates may have another length.
+    /// Returns the event indicators for Model Exchange; `bobs` are the bobs of the tank. The indicators cross zero where
+    /// [`Lump::next`] finds an event. They are computed from directions of unit length, although the directions that an external
+    /// integrator sets may have another length.
     pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],
@@ -968,8 +967,8 @@ impl Lump {
     }
 }
 
-/// Returns the time within `h`, s, at which the function with the power series `a`, up to order n, rises through zero;
-/// `None` if it does not rise through zero. For h = 0, when a host has found the event itself, returns 0 if a is positive.
+/// Returns the time within `h`, s, at which the function with the power series `a`, up to order n, rises through zero; `None` if
+/// it does not rise through zero. For h = 0, when an external integrator has located the event, returns 0 if a is positive.
 fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     let size = a[..n].iter().rev().fold(0.0, |sum, x| sum * h.min(1.0) + x.abs());
     let below = a.map(|x| -x);
@@ -997,12 +996,12 @@ mod tests {
         close(rise(&series(&[-0.25, 0.0, 1.0]), 3, 1.0), 0.5);
         close(rise(&series(&[-2.5e9, 1e10]), 2, 1.0), 0.25);
         assert_eq!(rise(&series(&[-0.25, 1.0]), 2, 0.2), None);
-        // coefficients from n on do not belong to the series
+        // The coefficients from order n on are not used.
         assert_eq!(rise(&series(&[-0.25, 0.0, 1.0]), 2, 1.0), None);
         for falling in [[0.25, -1.0], [0.25, 1.0], [-0.25, -1.0], [-1e-12, 1.0]] {
             assert_eq!(rise(&series(&falling), 2, 1.0), None, "{falling:?}");
         }
-        // A host that stops at an event: the event is due if the value is above zero.
+        // With h = 0, when an external integrator has stopped at an event, the event is due if the value is above zero.
         assert_eq!([1e-9, -1e-9].map(|a| rise(&series(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
     }
 

@@ -66,8 +66,8 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::spin::SpinSeries;
 use crate::state::{BallState, Inputs, Kept, STATES, State, index};
 
-/// Longest time, s, over which the change of rates is included in the scale of allowed errors. Only steps much longer than
-/// this could change the rates by more.
+/// Longest time, s, over which the change of rates is included in the scales of allowed errors. The rates could change by more
+/// only in steps that are much longer.
 pub const SCALE_TIME: f64 = 0.1;
 
 /// Returns coefficient n of the matrix w w^T - |w|^2 1, which maps a vector y to w x (w x y). The argument is coefficient n
@@ -86,8 +86,8 @@ fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
 }
 
-/// Replaces the upper three rows of the mass matrix so that the upper half of the solution equals the upper half of the
-/// right-hand side, which on a pivot is the given acceleration a.
+/// Replaces the upper three equations of M [a; w'] = b by [a; w'] = b, so that the solution contains the upper three elements of
+/// the right-hand side unchanged. On a pivot they are the given acceleration a.
 #[inline(always)]
 fn hold_upper_rows(matrix: &mut Mat6) {
     for i in 0..3 {
@@ -98,7 +98,7 @@ fn hold_upper_rows(matrix: &mut Mat6) {
     }
 }
 
-/// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
+/// Where the states at the start of the expansion are stored. A step copies them only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
     /// The states are in `state.kept`, because the step continues the expansion of an earlier step.
@@ -109,12 +109,11 @@ enum Start {
     Within,
 }
 
-/// State of the craft and the power series of its motion. `craft` is the dry craft. `parked` are the bobs of tanks
-/// whose liquid has detached. `whole` is one rigid body of craft and liquids at rest, whose acceleration along the
-/// tanks determines the drag of the bobs. `matrix` is M, `w_both` is the pair (w, w), and `torque` is tau - h_w'.
-/// `couple` is the torque of pivot and spinning liquids, and `loss_of_couple` its dissipated power. The fields with
-/// `allowed` are the inverses of the allowed errors of attitude, angular velocity, bobs' v, velocity, lumps' u,
-/// appendages' rates, and spins' I^-1 L.
+/// State of the craft and the power series of its motion. `craft` is the dry craft. `parked` are the bobs of tanks whose liquid
+/// has detached. `whole` is one rigid body of craft and liquids at rest, whose acceleration along the tanks determines the drag
+/// of the bobs. `matrix` is M, `w_both` is the pair (w, w), and `torque` is tau - h_w'. `couple` is the torque of pivot and
+/// spinning liquids, and `loss_of_couple` the power that it dissipates. The fields with `allowed` are the inverses of the allowed
+/// errors of attitude, angular velocity, bobs' v, velocity, lumps' u, appendages' rates, and spins' I^-1 L.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
     pub state: State,
@@ -443,8 +442,9 @@ impl CraftMotion {
     }
 
     /// Returns an interval, m/s2, that contains the specific force along the axis of tank number `tank` at the hinge of its first
-    /// mode at the end of the last step; `None` if the power series of this step is not known. In random craft the series
-    /// err by at most a thousandth of the interval, which is nevertheless so narrow that the ranges of validity seldom depend on it.
+    /// mode at the end of the last step. Returns `None` if the power series of this step is not known. In tests with random craft
+    /// the series erred by at most a thousandth of the interval. The interval is still so narrow that the ranges of validity
+    /// seldom depend on it.
     pub fn axial_interval(&self, tank: usize, inputs: &Inputs) -> Option<[f64; 2]> {
         let Kept { clock, start, .. } = self.state.kept;
         let orders = self.expansion.orders();
@@ -479,8 +479,7 @@ impl CraftMotion {
     /// Advances the states by `h` > 0, s. If the inputs have jumped (`has_jumped`), the step starts from the present
     /// states, otherwise from the states in `before`. If an error is returned, the states are invalid, and the expansion
     /// in `state.kept` is unchanged.
-    // This is a function apart from the preparation of a step, because both take more instructions if
-    // they are compiled together.
+    // The preparation of a step is a function of its own, because both take more instructions if they are compiled together.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
         let (begin, mut steps) = (self.state.time, limits.steps());
@@ -744,8 +743,8 @@ impl Motion for CraftMotion {
         let rate = RATE_FLOOR + largest(self.w[0]) + largest(self.w[1]) * time;
         let swing = rate
             + self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
-        // A velocity that is scaled only by the present force would have no scale while the force crosses zero; RATE_FLOOR
-        // and the bobs' speed avoid this.
+        // The speed that the force alone gives would vanish while the force crosses zero. RATE_FLOOR and the bobs' speed keep the
+        // scale of the velocity above 0.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
         if !self.spins.is_empty() {
@@ -887,8 +886,8 @@ impl KeptMotion for CraftMotion {
     }
 }
 
-// Functions for constrained bobs, detached liquid (lump.rs) and appendages (appendage.rs). They are apart from the equations
-// of a plain craft, which then take fewer instructions.
+// Functions for constrained bobs, detached liquid (lump.rs) and appendages (appendage.rs). They are separate from the equations
+// of a craft without these parts, which then take fewer instructions.
 impl CraftMotion {
     #[inline(never)]
     fn add_inertia_apart(&mut self) {
@@ -957,7 +956,7 @@ impl CraftMotion {
             force = add(force, f);
             torque = add(torque, tau);
             if n == 1 {
-                // Adds the force and torque of the derivative dJ of the inertia: dJ w' + w x (dJ w).
+                // Adds force and torque of dJ, the derivative of the inertia: dJ w' + w x (dJ w).
                 let (w, slope) = (self.w[0], &lump.shape_slope);
                 let turned = vector::cross(w, times(slope, w));
                 torque = sub(torque, add(times(slope, self.w_d[0]), turned));
@@ -1019,8 +1018,8 @@ impl CraftMotion {
             .fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
-    /// Updates the craft for the present state of its liquids, without allocating: the rigid liquids and bobs of tanks with
-    /// settled liquid belong to the craft, those of tanks with detached liquid do not.
+    /// Updates the craft after the liquid of a tank has detached or settled, without allocating: rigid liquids and bobs of tanks
+    /// with settled liquid belong to the craft, those of tanks with detached liquid do not.
     fn arrange(&mut self) {
         let mut changed = false;
         for lump in &mut self.lumps {
@@ -1134,8 +1133,8 @@ impl CraftMotion {
         first
     }
 
-    /// Performs all events of detached liquid that are due now, for hosts that integrate the states themselves. Returns true
-    /// if there were events, and `None` if states are so large that products of their series could overflow.
+    /// Performs all events of detached liquid that are due now (Model Exchange). Returns true if there were events, and `None` if
+    /// states are so large that products of their series could overflow.
     pub fn take_due(&mut self, inputs: &Inputs) -> Option<bool> {
         self.inputs = *inputs;
         let mut any = false;

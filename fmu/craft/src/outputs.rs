@@ -160,7 +160,8 @@ impl<T: Number> MassProperties<T> {
 
     pub fn center(&self) -> Vec3<T> {
         let is_something = self.mass.value() > 0.0;
-        // `black_box` keeps the compiler from dividing before the check for mass, because hosts can trap divisions by 0.
+        // `black_box` keeps the compiler from dividing before the check for mass, because an importer may make
+        // divisions by 0 trap.
         let divisor = core::hint::black_box(if is_something { self.mass.value() } else { 1.0 });
         let share = T::with_slope(divisor, self.mass.result()).recip();
         if is_something { scale(share, self.moment) } else { constant([0.0; 3]) }
@@ -187,9 +188,9 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
-/// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, and `wrench` the force of the liquid
-/// on the craft and its torque about O. `flow_momentum` are momentum and moment of momentum about O of the flow within
-/// the tank (`draining.rs`) and of the liquid's spin, `spin` are energy and rate of the spin, and `lump` is the
+/// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, and `wrench` the force of the liquid on the
+/// craft and its torque about O. `flow_momentum` has the momentum, and the moment of momentum about O, of the flow within
+/// the tank (`draining.rs`) and of the liquid's spin. `spin` has the energy and the rate of the spin, and `lump` is the
 /// detached liquid, if any.
 pub(crate) struct TankNow<T> {
     pub rigid: Rigid<T>,
@@ -269,9 +270,9 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// Returns the outputs. `scale_of_spin` returns the quantities with which the spin of the liquid is compared, by
-    /// the number of the tank, which counts from 0. If it returns `None`, the outputs `spin_ratio` and `spin_number` of
-    /// the tank are 0.
+    /// Returns the outputs. `scale_of_spin` returns the quantities of a tank with which the spin of its liquid is compared;
+    /// its argument is the number of the tank, which counts from 0. If it returns `None`, the tank's outputs `spin_ratio`
+    /// and `spin_number` are 0.
     pub fn outputs(
         &self,
         x: &[f64; STATES],

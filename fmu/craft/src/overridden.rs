@@ -71,8 +71,8 @@ impl Tank {
 }
 
 impl Parameters {
-    /// Returns [`Tank::overridden`] for any parameter of a craft. `name` is its name in the FMU, such as `tank[].mass`, and
-    /// the first of the `indices` is the tank.
+    /// Returns [`Tank::overridden`] for any parameter of a craft. `name` is its name in the FMU, such as `tank[].mass`, and the
+    /// first of the `indices` is the number of the tank, from 0.
     pub fn overridden(&self, name: &str, indices: &[usize]) -> Option<String> {
         let (field, (i, rest)) = (name.strip_prefix("tank[].")?, indices.split_first()?);
         let tank = self.tank[..self.tanks].get(*i)?;

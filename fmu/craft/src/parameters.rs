@@ -200,8 +200,8 @@ pub struct Tank {
 }
 
 impl Tank {
-    /// Returns the tank with all parameters computed that other parameters determine: modes and rigid liquid from the
-    /// diameter, and pendulum lengths from frequencies, if these are given.
+    /// Returns the tank with all parameters that follow from other parameters: modes and rigid liquid if the diameter is given,
+    /// and pendulum lengths if frequencies are given.
     pub(crate) fn resolve(&self) -> Tank {
         let mut tank = *self;
         let modes = self.modes.min(MODES);
@@ -398,8 +398,8 @@ impl Tank {
         [self.hinge_and_across(n).0, e]
     }
 
-    /// Returns the rigid body that represents the bob of mode `n`, which counts from 0, in the constant added mass for hosts
-    /// that solve with a constant matrix (`slosh_tank.rs`).
+    /// Returns the rigid body that represents the bob of mode `n`, which counts from 0, in the constant added mass of
+    /// [`Coupling::Lumped`](crate::Coupling).
     pub(crate) fn lumped(&self, n: usize) -> Rigid {
         let (m, l) = (self.mass[n], self.length[n]);
         let (hinge, across) = self.hinge_and_across(n);
@@ -416,8 +416,8 @@ impl Tank {
         Rigid::new(2.0 * m, hinge, &own)
     }
 
-    /// Adds the bobs of planar modes to the craft's mass matrix, if the rods are at `angles`, rad, from their positions at
-    /// rest. Such a bob has inertia perpendicular to its plane and along its rod.
+    /// Adds the bobs of planar modes to the craft's mass matrix. The rods are at `angles`, rad, from their positions at rest. A
+    /// planar bob has inertia along its rod and perpendicular to its plane.
     fn add_planar_bobs(&self, matrix: &mut Mat6, angles: &[f64; MODES]) {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         for n in 0..self.modes {
@@ -449,9 +449,9 @@ impl Tank {
         }
     }
 
-    /// Returns a body of negative mass: the inertia by which bobs with s < 1 reduce the inertia of the craft within
-    /// 45 degrees of the tank's axis (`surface.rs`). Craft and rigid liquid together must have more inertia than
-    /// this body takes away.
+    /// Returns the inertia by which bobs with s < 1 reduce the inertia of the craft within 45 degrees of the tank's axis
+    /// (`surface.rs`), as a body of negative mass. The sum of this body, the craft and the rigid liquid must have positive
+    /// inertia.
     fn inertia_reduction(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {
@@ -682,15 +682,15 @@ impl Default for Parameters {
 const HEAVIEST: f64 = 1e12;
 const FARTHEST: f64 = 1e9;
 
-/// Smallest accepted moment of inertia of spinning liquid, kg m2, by which the equations divide.
+/// Smallest accepted moment of inertia of spinning liquid, kg m2; the equations divide by it.
 const LEAST_SPIN: f64 = 1e-9;
 
 /// Largest allowed ratio of a principal moment of inertia to the sum of the other two moments. The ratio of a flat plate is
 /// 1; the margin allows for moments that are rounded to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
-/// Accepted relative tolerances of the integration. Below them is the rounding error, and above them error
-/// control has no meaning.
+/// Accepted relative tolerances of the integration. With smaller ones the allowed error would be below the rounding error, with
+/// larger ones the error would not be limited in effect.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
 pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
@@ -1164,10 +1164,10 @@ impl Craft {
     }
 }
 
-/// Returns where the mass matrix of `body` with the liquid of `tanks` is singular, as the end of a sentence that ends
-/// with "is singular". Returns `None` if the matrix is regular at rest, also with detached liquid. Other angles of planar
-/// modes are not checked, because the mass matrices of realistic craft become singular only at angles far beyond the
-/// range of the modes.
+/// Returns the conditions under which the mass matrix of `body` with the liquid of `tanks` is singular, as a text that continues
+/// a sentence after "is singular". Returns `None` if the matrix is regular at rest, also with detached liquid. Other angles of
+/// planar modes are not checked, because the mass matrices of realistic craft become singular only at angles far beyond the range
+/// of the modes.
 pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let matrix = |rigid: fn(&Tank) -> Rigid| {
         tanks.iter().fold(body, |sum, tank| sum.combined_with(&rigid(tank))).mass_matrix()

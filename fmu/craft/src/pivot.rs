@@ -85,8 +85,8 @@ impl Pivot {
         (torque, c[0] * ww[0] + c[1] * ww[1] + c[2] * ww[2])
     }
 
-    /// Returns the pivot's torque (N m), dissipated power (W) and stored energy (J) at one instant. `axes` is the
-    /// matrix from body to inertial axes.
+    /// Returns the pivot's torque (N m), dissipated power (W) and stored energy (J) at one instant. `axes` is the matrix that
+    /// rotates from body axes to inertial axes.
     pub(crate) fn present<T: Number>(&self, axes: &Mat3<T>, w: Vec3<T>) -> (Vec3<T>, T, T) {
         let [x, y, z] = axes[2];
         let Pivot { k: [k_x, k_y], c, friction } = *self;
@@ -197,9 +197,8 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// The expected values of the pivot's torque, dissipated power and energy were computed by
-    /// hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2
-    /// U = 3/4 + 5/16.
+    /// The expected values of the pivot's torque, dissipated power and energy were computed by hand: Z x (5/4, -3/2, 0) = (9/8,
+    /// 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 + 5/16.
     #[test]
     fn pivot_torque_energy_and_dissipation_equal_those_of_a_spring_and_a_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
@@ -210,7 +209,7 @@ mod tests {
         let turning = cross(Z, W);
         let change = 3.0 * Z[1] * turning[1] + 5.0 * Z[0] * turning[0];
         assert_eq!(change, -dot(torque, W) - dissipation);
-        // as series, and the effect of each part
+        // Power series of constant Z and w give the same torque and power. Any single parameter makes the pivot act.
         let series = |x: Vec3| {
             let mut all: Vector = [[0.0; 3]; taylor::series::ORDER + 1];
             all[0] = x;

@@ -42,13 +42,13 @@ use formulas::third_order;
 /// number counts as rotary.
 const ROTARY: f64 = 0.8;
 
-/// Mass of liquid at which a tank counts as empty, divided by the mass at the first point of its fill table. It exceeds 1
-/// because a host integrates the mass with rounding errors.
+/// Mass of liquid at which a tank counts as empty, divided by the mass at the first point of its fill table. It exceeds 1 because
+/// an external integrator (Model Exchange) reaches the mass only up to its errors.
 const EMPTY: f64 = 1.0 + 1e-9;
 
-/// Limits within which the pendulums of a tank represent its liquid. If the tank drains, they are the limits of its initial
-/// contents, except for `over_fill`. `radius` is R, m, and 0 if the tank has no `wave`. `lowest` is for each mode the value
-/// of x below which the liquid leaves the bottom. `g_floor` is the smallest x in w^2, m/s2.
+/// Limits within which the pendulums of a tank represent its liquid. If the tank drains, they are the limits at its initial fill,
+/// except for `over_fill`, which has the limits at every fill. `radius` is R, m, and 0 if the tank has no `wave`. `lowest` is for
+/// each mode the value of x below which the liquid leaves the bottom. `g_floor` is the smallest x in w^2, m/s2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
@@ -132,8 +132,7 @@ impl Bounds {
         }
     }
 
-    /// Returns in which ranges of validity the motion of a tank is, from the tank's outputs and its
-    /// mass of liquid, kg.
+    /// Returns the ranges of validity of a tank, from the tank's outputs and its mass of liquid, kg.
     pub fn classify(&self, out: &TankOutputs, liquid: f64) -> Ranges {
         if out.ball_state != BallState::Settled {
             let limited_by = LimitedBy::Contact;
@@ -150,8 +149,9 @@ impl Bounds {
         Ranges { regime, limited_by, is_physical: upright && self.is_held(out.axial) }
     }
 
-    /// Returns the same as [`Bounds::classify`] for every specific force along the tank in the interval `axial`, m/s2, and slosh
-    /// angles that differ from the angles in `out` by rounding; `None` if the result depends on them.
+    /// Returns the ranges that [`Bounds::classify`] gives for every specific force along the tank in the interval `axial`,
+    /// m/s2, and for slosh angles that differ by rounding from those in `out`. Returns `None` if the ranges are not the same
+    /// for all of them.
     pub fn classify_within(
         &self,
         mut out: TankOutputs,
@@ -240,8 +240,8 @@ impl Bounds {
         self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest)
     }
 
-    /// Returns the event indicator of a tank without a model of detached liquid, m/s2: it is negative where the specific
-    /// force `axial` along the tank no longer holds the liquid of every mode at the bottom, and never 0.
+    /// Returns the event indicator of a tank without a model of detached liquid, m/s2. It is negative if the specific force
+    /// `axial` along the tank does not hold the liquid of every mode at the bottom, otherwise positive, and never 0.
     pub fn held_indicator(&self, axial: f64) -> f64 {
         /// Smallest value of the indicator while the liquid is held. Without thrust the margin of the condition is 0, but
         /// the indicator of an FMU must not be 0 between events.

@@ -55,9 +55,9 @@ impl Rigid {
 }
 
 impl<T: Number> Rigid<T> {
-    /// Creates an axially symmetric body on the axis e through the point d. Its mass distribution along the axis has the
-    /// moments m, m z and m z^2, where z is the distance from d. `i_z` is the moment of inertia about e, and `i_0` the
-    /// moment of inertia about a perpendicular axis without the part m z^2.
+    /// Creates an axially symmetric body. Its axis has the direction e and goes through the point d. The mass distribution along
+    /// the axis has the moments m, m z and m z^2, where z is the distance from d. `i_z` is the moment of inertia about e, and
+    /// `i_0` the moment of inertia about a perpendicular axis without the part m z^2.
     pub fn on_axis([d, e]: [Vec3; 2], [m, first, second]: [T; 3], [i_0, i_z]: [T; 2]) -> Rigid<T> {
         let across = i_0 + second + m * dot(d, d) + first * (2.0 * dot(d, e));
         let along = i_z - i_0 - second;
@@ -174,9 +174,8 @@ impl<T: Number, const N: usize> Factors<T, N> {
         factors
     }
 
-    /// Factorises a matrix that may not be positive definite, because a host whose integration diverges sets any
-    /// states. For such a matrix all factors are 0 and [`Factors::solve`] returns 0, because products of the
-    /// true factors could overflow.
+    /// Factorises a matrix that may not be positive definite, because an external integrator that diverges may set any states.
+    /// For such a matrix all factors are 0 and [`Factors::solve`] returns 0, because products of the true factors could overflow.
     pub fn definite_or_zero(matrix: &[[T; N]; N]) -> Factors<T, N> {
         let zero = T::constant(0.0);
         let mut factors = Factors { l: [[zero; N]; N], inverse: [zero; N] };
@@ -190,8 +189,7 @@ impl<T: Number, const N: usize> Factors<T, N> {
         factors
     }
 
-    /// Replaces the factors by those of another matrix in place, because a copy would take a fortieth
-    /// of a step's instructions.
+    /// Replaces the factors by those of another matrix in place, because a copy would take 1/40 of the instructions of a step.
     #[inline(always)]
     pub fn set(&mut self, matrix: &[[T; N]; N]) {
         for j in 0..N {
@@ -224,8 +222,8 @@ impl<T: Number, const N: usize> Factors<T, N> {
 }
 
 impl<M: Copy> Factors<M> {
-    /// Solves the linear system of the factorised matrix for the right-hand side `b`, which may be dual numbers although
-    /// the matrix is constant.
+    /// Solves the linear system with the factorised matrix for the right-hand side `b`, which may consist of dual numbers
+    /// although the matrix is constant.
     #[inline(always)]
     pub fn solve<T: Number + Mul<M, Output = T>>(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];

@@ -1,29 +1,30 @@
-//! One tank on a spacecraft that a host simulates.
+//! One tank on a spacecraft that another program simulates, for example the tool that imports the FMU. This spacecraft carries
+//! the tank and is called the carrying craft here. In formulas and names of parameters it is called `host`.
 //!
-//! The host gives its motion: specific force a at O, angular velocity w and its derivative w'. The tank returns the force
-//! and torque (wrench) of the liquid on the host in two parts, because the part that depends on [a; w'] belongs on the
-//! left-hand side of the host's equations:
+//! The inputs are the motion of the carrying craft: specific force a at O, angular velocity w and its derivative w'. The tank
+//! returns the force and torque (wrench) of the liquid on the craft in two parts, because the part that depends on [a; w']
+//! belongs on the left-hand side of the craft's equations:
 //!
 //! ```text
 //! [F; torque] = bias - M_a [a; w']
-//! M_a  = M_0 + sum of m u u^T,  u = [p; P x p]                 symmetric, of p alone
+//! M_a  = M_0 + sum of m u u^T,  u = [p; P x p]                 symmetric, a function of p only
 //! bias = sum of (T_0 u + [phi; rho x phi]) - [m_0 w x (w x s); w x (I_s w)]
 //! ```
 //!
-//! M_0 and I_s are the mass matrix and the inertia of the rigid liquid about O (`rigid.rs`), and T_0 is the tension at a =
-//! w' = 0 (`bob.rs`). A host that solves (M_host + M_a) [a; w'] = rest + bias, with all its other forces and torques in
-//! `rest`, has no algebraic loop, at any mass ratio.
+//! M_0 and I_s are the mass matrix and the inertia of the rigid liquid about O (`rigid.rs`), and T_0 is the tension at a = w' = 0
+//! (`bob.rs`). A program that solves (M_host + M_a) [a; w'] = rest + bias, with all other forces and torques on the carrying
+//! craft in `rest`, has no algebraic loop, at any mass ratio.
 //!
-//! [`Coupling::Lumped`] is for hosts that solve with a constant matrix M_a^. In it each whole bob counts as a point
-//! mass at its hinge:
+//! [`Coupling::Lumped`] is for programs that can only solve with a constant matrix, which is called M_a^ here. In it each whole
+//! bob counts as a point mass at its hinge:
 //!
 //! ```text
 //! M_a^ = M_0 + sum of m [1; [P]x] [1; [P]x]^T = const,  bias^ = [F; torque] + M_a^ [a; w']
 //! ```
 //!
-//! Here [a; w'] are the accelerations that the host has given to the tank. M_a^ - M_a is positive semidefinite for every p.
-//! The remaining algebraic loop therefore converges at any mass ratio. A draining tank keeps the M_a^ of the start of the
-//! run; the loop converges faster as the mass of liquid falls.
+//! Here [a; w'] are the accelerations of the carrying craft that the tank has received. M_a^ - M_a is positive semidefinite for
+//! every p. The remaining algebraic loop therefore converges at any mass ratio. A draining tank keeps the M_a^ of the start of
+//! the run; the loop converges faster as the mass of liquid falls.
 //!
 //! The bob of a planar mode (`contents.rs`) moves with the tank perpendicular to its plane. It does so at the place of the
 //! bob, not of the hinge. This adds m u u^T, u = [b; rho x b], to M_a. With the acceleration a_P of the hinge
@@ -35,49 +36,49 @@
 //! because p x b is a unit vector in the plane. The mode therefore counts with 2 m at its hinge and the inertia 2 m l^2
 //! (1 - b b^T) about it.
 //!
-//! [`Coupling::RigidBody`] is for hosts that are plain rigid bodies with the mass matrix M_host + M_a^. Their equations
-//! include the centrifugal and gyroscopic terms of M_a^ (mass m^, first moment S^, inertia I^), so that `bias` contains
-//! these terms with the opposite sign:
+//! [`Coupling::RigidBody`] is for programs whose carrying craft is a plain rigid body with the mass matrix M_host + M_a^. The
+//! equations of this body include the centrifugal and gyroscopic terms of M_a^ (mass m^, first moment S^, inertia I^), so that
+//! `bias` contains these terms with the opposite sign:
 //!
 //! ```text
 //! bias^ = [F; torque] + M_a^ [a; w'] + [w x (w x S^); w x (I^ w)]
 //! ```
 //!
-//! Within a step a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2 from the start of the step, n.
+//! Within step n a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2 from the start of the step.
 //!
 //! A bob on another surface than a sphere (`surface.rs`) adds m J^T N J to M_a, where J [a; w'] = a + w' x rho and no
 //! eigenvalue of N is above 1. In M_a^ the bob counts with 2 m at its hinge and the inertia 2 m r^2 about it, where r is the
 //! bob's distance from the hinge within 45 degrees, because |a_P + w' x (rho - P)|^2 <= 2 |a_P|^2 + 2 r^2 |w'|^2.
 //!
-//! Outputs and derivatives of a tank that drains, has planar modes or has bobs on other surfaces than spheres are computed
-//! by `contents.rs`. A tank that drains is integrated by Runge-Kutta methods instead of power series, as in a craft. A jump
-//! of its mass flow would be an impulse on the host, which a force cannot represent. The model therefore leaves this impulse
-//! out, both for the host and for the bobs.
+//! Outputs and derivatives of a tank that drains, has planar modes or has bobs on other surfaces than spheres are computed by
+//! `contents.rs`. A tank that drains is integrated by Runge-Kutta methods instead of power series, as in a craft. A jump of its
+//! mass flow would be an impulse on the carrying craft, which the output force cannot represent. The model therefore leaves this
+//! impulse out, both for the craft and for the bobs.
 //!
-//! **Detached liquid** (`lump.rs`, `handover.rs`) acts on its host by impulses. M_a and bias depend on the state of the
-//! liquid: in flight M_a is 0 except for the inertia that rotates with the tank; on the wall it also has m u u^T, u = [n;
-//! rho x n]. The host's mass properties give its mass matrix M_h. An impulse J along the normal n changes the velocities
-//! of the host by
+//! **Detached liquid** (`lump.rs`, `handover.rs`) acts on the carrying craft by impulses. M_a and bias depend on the state of the
+//! liquid: in flight M_a is 0 except for the inertia that rotates with the tank; on the wall it also has m u u^T, u = [n; rho x
+//! n]. M_h is the mass matrix of the carrying craft without the tank, from the parameters `host`. An impulse J along the normal n
+//! changes the velocities of the craft by
 //! ```text
 //! [dV; dw] = (M_h + M_attached)^-1 [J n; rho x J n],   P = M_h [dV; dw]
 //! ```
 //!
-//! M_attached is the mass matrix of the liquid that moves with the host. P is the change of the host's own momentum and
-//! angular momentum about O, and -P is the change of the liquid's momentum. The host adds M_h^-1 P to V and w. The tank
-//! continues as if the host had done so: within a step it uses w + dw. V is not in the equations of the tank.
+//! M_attached is the mass matrix of the liquid that moves with the craft. P is the change of the craft's own momentum and angular
+//! momentum about O, and -P is the change of the liquid's momentum. The program that simulates the craft adds M_h^-1 P to V and
+//! w. The tank continues as if this had happened: within a step it uses w + dw. V is not in the equations of the tank.
 //!
-//! If the liquid changes its state within a step, for example hits the wall, the given a and w' belong to a host that
+//! If the liquid changes its state within a step, for example hits the wall, the given a and w' belong to a craft that
 //! responds to the previous state of the liquid. From the first change to the end of the step the tank therefore uses the
-//! accelerations a^ and w'^ that the host would have. It assumes that the other forces on the host (`rest`) stay as they
-//! were at the change:
+//! accelerations a^ and w'^ that the carrying craft would have. It assumes that the other forces on the craft (`rest`) stay as
+//! they were at the change:
 //!
 //! ```text
 //! rest = M_h [a; w'] + [w x (w x S_h); w x (I_h w)] - [F; torque]
 //! (M_h + M_a) [a^; w'^] = rest - [w x (w x S_h); w x (I_h w)] + bias
 //! ```
 //!
-//! The host does not know a^ and w'^. Therefore M_h times the integral of [a^ - a; w'^ - w'] is added to P, so that momentum
-//! is conserved between two communication points.
+//! The program that simulates the craft does not know a^ and w'^. Therefore M_h times the integral of [a^ - a; w'^ - w'] is added
+//! to P, so that momentum is conserved between two communication points.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -125,18 +126,18 @@ const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
 const SPIN: usize = BALL + 6;
 
-/// How the outputs `bias` and `added_mass` of a tank divide the liquid's load on the host.
+/// Division of the liquid's load on the carrying craft between the outputs `bias` and `added_mass`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Coupling {
-    /// `added_mass` is the current added mass M, and `bias` is force and torque at a = w' = 0. For hosts that solve
-    /// (M_host + M) [a; w'] = forces + bias.
+    /// `added_mass` is the current added mass M, and `bias` is force and torque at a = w' = 0. For simulators of the carrying
+    /// craft that solve (M_host + M) [a; w'] = forces + bias.
     Split = 1,
-    /// `added_mass` is a constant matrix M, in which each bob is a point mass at its hinge, and `bias` is the total force
-    /// and torque plus M [a; w'] with the given a and w'. For hosts that solve with a constant matrix.
+    /// `added_mass` is a constant matrix M, in which each bob is a point mass at its hinge, and `bias` is the total force and
+    /// torque plus M [a; w'] with the given a and w'. For simulators of the carrying craft that solve with a constant matrix.
     Lumped = 2,
-    /// As `Lumped`, for hosts that are plain rigid bodies and include M in their mass, centre of mass and inertia. `bias`
-    /// therefore also contains the centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
+    /// As `Lumped`, for a carrying craft that is simulated as a plain rigid body with M included in its mass, centre of mass and
+    /// inertia. `bias` therefore also contains the centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
     RigidBody = 3,
 }
 
@@ -145,10 +146,10 @@ impl Coupling {
     pub const ALL: [Coupling; 3] = [Coupling::Split, Coupling::Lumped, Coupling::RigidBody];
 }
 
-/// All parameters and initial conditions of a [`SloshTank`]. Position and attitude of `tank` are relative to the host's O
-/// and axes. `host` are the mass properties of the host without this tank, which the impulses of detached liquid and
-/// [`SloshTank::coupling_ratio`] depend on; `None` if they are unknown. `max_steps` is the largest number of internal steps
-/// in one step, at least 1.
+/// All parameters and initial conditions of a [`SloshTank`]. Position and attitude of `tank` are relative to O and the axes of
+/// the craft that carries it. `host` are the mass properties of this craft without the tank, which the impulses of detached
+/// liquid and [`SloshTank::coupling_ratio`] depend on; `None` if they are unknown. `max_steps` is the largest number of internal
+/// steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct TankParameters {
@@ -208,8 +209,8 @@ impl TankParameters {
         all.into_iter().filter(|(is_so, _)| *is_so).map(|(_, said)| said).collect()
     }
 
-    /// Returns a message if the rigid liquid of a tank without axial symmetry makes the whole mass of liquid negative or
-    /// leaves craft and rigid liquid without positive inertia.
+    /// Returns a message if the rigid liquid of a tank without axial symmetry makes the total mass of liquid negative, or if
+    /// carrying craft and rigid liquid together do not have positive inertia.
     fn uneven_problem(&self) -> Option<String> {
         let tank = self.tank.resolve();
         let mass = tank.whole_mass();
@@ -231,9 +232,9 @@ impl TankParameters {
     }
 }
 
-/// Motion of the host over one step, host axes: specific force `a` at O, m/s2, angular velocity `omega` at the start of the
-/// step, rad/s, and angular acceleration `omega_dot`, rad/s2. `mass_flow` is the flow out of the tank, kg/s; it is negative
-/// for inflow and has no effect in a tank without a fill table.
+/// Motion of the craft that carries the tank over one step, in the craft's axes: specific force `a` at O, m/s2, angular velocity
+/// `omega` at the start of the step, rad/s, and angular acceleration `omega_dot`, rad/s2. `mass_flow` is the flow out of the
+/// tank, kg/s; it is negative for inflow and has no effect in a tank without a fill table.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct TankInputs {
@@ -244,21 +245,21 @@ pub struct TankInputs {
 }
 
 impl TankInputs {
-    /// Returns the host's angular velocity `t` seconds after the start of the step, rad/s: the integral of
-    /// the ramp of `omega_dot`.
+    /// Returns the angular velocity of the carrying craft `t` seconds after the start of the step, rad/s: `omega` plus the
+    /// integral of the ramp `omega_dot`.
     fn omega_at(&self, t: f64) -> Vec3 {
         let TankInputs { omega, omega_dot, .. } = self;
         [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t)
     }
 }
 
-/// Outputs of the tank at one instant. Force and torque on the host are about O. `bias` (N, N m) and the upper triangle of
-/// `added_mass` by rows (kg, kg m, kg m2) are explained at [`Coupling`]. `impulse` is the sum of all impulses of detached
-/// liquid on the host since the start, N s, and of their moments about O, N m s, each in the host's axes at its time. If
-/// it changes by P, the host adds M_host^-1 P to its velocity and angular velocity. Derivatives of the outputs contain 0
-/// for `impulse`. `liquid` is the mass of liquid, kg, which is a state if the tank drains. Mass, centre of mass relative
-/// to O and inertia about the centre of mass include the whole liquid, with the bobs as point masses at their current
-/// positions, in host axes.
+/// Outputs of the tank at one instant. Force and torque on the carrying craft are about O. `bias` (N, N m) and the upper triangle
+/// of `added_mass` by rows (kg, kg m, kg m2) are explained at [`Coupling`]. `impulse` is the sum of all impulses of detached
+/// liquid on the craft since the start, N s, and of their moments about O, N m s, each in the axes that the craft had at that
+/// time. If `impulse` changes by P, the simulator of the craft adds M_host^-1 P to the velocity and the angular velocity.
+/// Derivatives of the outputs contain 0 for `impulse`. `liquid` is the mass of liquid, kg, which is a state if the tank drains.
+/// Mass, centre of mass relative to O and inertia about the centre of mass include the whole liquid, with the bobs as point
+/// masses at their current positions, in the craft's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct SloshTankOutputs {
@@ -339,9 +340,9 @@ struct TankMotion {
 }
 
 /// Additional data of a tank that models detached liquid. `parked` are the bobs while the liquid is detached. `host` is the
-/// host without the tank. `factors` are the factors of the mass matrix of the host with all liquid that moves with it.
-/// `turned` is the change of w by impulses that the host has not applied yet. `rest` are the host's other forces and
-/// torques, computed before the first change of the liquid's state within a step.
+/// carrying craft without the tank. `factors` are the factors of the mass matrix of this craft with all liquid that moves with
+/// it. `turned` is the change of w by impulses that the given w does not contain yet. `rest` are the other forces and torques on
+/// the craft, computed before the first change of the liquid's state within a step.
 #[derive(Clone, Debug)]
 struct Loose {
     lump: Lump,
@@ -354,7 +355,7 @@ struct Loose {
     inv_allowed: f64,
 }
 
-/// One tank on a spacecraft that a host simulates.
+/// One tank on a spacecraft that another program simulates.
 #[derive(Clone, Debug)]
 pub struct SloshTank {
     motion: Box<TankMotion>,
@@ -375,8 +376,8 @@ struct Run<'a> {
 type Acting<T> = ([Vec3<T>; 3], T);
 
 fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
-    // States with an infinite scale have no error of their own: dissipated energy and mass of liquid follow
-    // from the other states, and a tank that drains has no detached liquid.
+    // States whose scale is infinite have no allowed error, so that they do not limit the steps: dissipated energy and mass of
+    // liquid follow from the other states, and a tank that drains has no detached liquid.
     let mut scale = [f64::INFINITY; TANK_STATES];
     for at in (0..DISSIPATED).step_by(6) {
         scale[at..at + 3].fill(1.0);
@@ -589,8 +590,7 @@ impl TankMotion {
         self.expand_rates::<1>();
     }
 
-    // This is a function apart from the preparation of a step, because both take more instructions if
-    // they are compiled together.
+    // The preparation of a step is a function of its own, because both take more instructions if they are compiled together.
     #[inline(never)]
     fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
         let begin = self.state.time;
@@ -674,8 +674,8 @@ impl TankMotion {
 // Functions for constrained bobs, spin and detached liquid (lump.rs, handover.rs), which a tank with plain
 // pendulums does not need.
 impl TankMotion {
-    /// Sets up rigid liquid and bobs for the present state of the liquid, which may be detached, without allocating. Returns
-    /// the change of w by impulses that the host has not applied yet.
+    /// Sets up rigid liquid and bobs for the present state of the liquid, which may be detached, without allocating. Returns the
+    /// change of w by impulses that the given w does not contain yet.
     #[inline(never)]
     fn start_ball(&mut self) -> Vec3 {
         let Some(ball) = &mut self.ball else { return [0.0; 3] };
@@ -776,8 +776,8 @@ impl TankMotion {
         Ok(finite)
     }
 
-    /// Returns the time, within `h` seconds, of the first event of detached liquid, or at which a constrained bob reaches
-    /// the largest angle of its surface if that is earlier. `None` if nothing happens.
+    /// Returns the time, within `h` seconds, of the first event: an event of detached liquid, or the instant at which a
+    /// constrained bob reaches the largest angle of its surface. Returns `None` if there is no event.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_ball(n, h);
@@ -811,7 +811,7 @@ impl TankMotion {
     }
 
     /// Sets up constrained bobs, spin and detached liquid at the start of an expansion. If the liquid has changed its state
-    /// within the step, a and w' are replaced by the accelerations with which the host would respond, and are constant.
+    /// within the step, a and w' are replaced by constant accelerations: those with which the carrying craft would respond.
     #[inline(never)]
     fn start_apart(&mut self) {
         let w = self.w[0];
@@ -836,8 +836,8 @@ impl TankMotion {
         (self.w[1], self.w[2]) = (self.w_d[0], [0.0; 3]);
     }
 
-    /// Adds to the impulse on the host the momentum that the host would have gained from the response a^, w'^ (see the
-    /// module's head) over the `h` seconds before `t`, and does not gain from the given a, w'.
+    /// Adds to the impulse the momentum that the carrying craft would have gained over the `h` seconds before `t` by the
+    /// accelerations a^, w'^ (see the module's head) in addition to the momentum that the given a, w' contain.
     #[inline(never)]
     fn lag(&mut self, h: f64, t: f64) {
         if self.loose().rest.is_none() {
@@ -871,8 +871,8 @@ impl TankMotion {
         ball.factors.set(&matrix);
     }
 
-    /// Performs all events that are due now, for hosts that integrate the states themselves. Returns true if there were
-    /// events, and `None` if states are so large that products of their series could overflow.
+    /// Performs all events that are due now (Model Exchange). Returns true if there were events, and `None` if states are so
+    /// large that products of their series could overflow.
     fn take_due(&mut self, inputs: &TankInputs) -> Option<bool> {
         self.inputs = *inputs;
         self.forget();
@@ -1008,7 +1008,7 @@ impl Carrier for TankMotion {
 
 impl TankMotion {
     /// Updates the rates of bobs and detached liquid after an impulse has changed the velocity of O by `dv` and the
-    /// angular velocity of the host by `dw`, because they keep a part of their own velocities. [`Motion::start`]
+    /// angular velocity of the carrying craft by `dw`; the liquid keeps a part of its own velocity. [`Motion::start`]
     /// must have been called.
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         for bob in &self.bobs {
@@ -1025,9 +1025,9 @@ impl TankMotion {
     }
 }
 
-/// Quantities from which the outputs are computed: `wrench` are force and torque of the liquid on the host about O, `loads`
-/// are force and torque at a = w' = 0 without the rigid liquid's terms, `matrix` is the added mass M_a, and `turning` is the
-/// rate of the liquid's spin.
+/// Quantities from which the outputs are computed: `wrench` are force and torque of the liquid on the carrying craft about O,
+/// `loads` are force and torque at a = w' = 0 without the rigid liquid's terms, `matrix` is the added mass M_a, and `turning` is
+/// the rate of the liquid's spin.
 struct Parts<T> {
     motion: [Vec3<T>; 3],
     rigid: Rigid<T>,
@@ -1160,7 +1160,7 @@ impl SloshTank {
         self.motion.state.time
     }
 
-    /// Sets the simulation time, s, in a host that integrates the states itself.
+    /// Sets the simulation time, s (Model Exchange).
     pub fn set_time(&mut self, time: f64) {
         self.motion.state.time = time;
     }
@@ -1252,15 +1252,15 @@ impl SloshTank {
         self.motion.loose().lump.indicators([a, w, w_d], bobs.iter())
     }
 
-    /// Returns true if a host that integrates the states itself has passed an event of the liquid, even if the indicators of
-    /// its last steps did not show the event.
+    /// Returns true if an external integrator (Model Exchange) has passed an event of the liquid, even if the indicators of its
+    /// last steps did not show the event.
     pub fn is_event_overdue(&mut self, inputs: &TankInputs) -> bool {
         let now = self.event_indicators(inputs);
         self.has_ball() && self.motion.loose().lump.is_overdue(now)
     }
 
-    /// Performs all events that are due: liquid leaves the bottom of the tank, hits the wall or settles, and the outputs
-    /// on the ranges of validity are updated. Returns true if continuous states have changed. If an error is returned,
+    /// Performs all events that are due: liquid leaves the bottom of the tank, hits the wall or settles, and the ranges
+    /// of validity in the outputs are updated. Returns true if continuous states have changed. If an error is returned,
     /// the tank is unchanged.
     pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {
         let before = self.motion.state;
@@ -1273,7 +1273,7 @@ impl SloshTank {
         Ok(changed)
     }
 
-    /// Returns an error if a slosh angle, as a host has integrated it, is beyond the largest angle of a mode's surface.
+    /// Returns an error if a slosh angle that an external integrator has set is beyond the largest angle of a mode's surface.
     pub fn check_surfaces(&self) -> Result<(), StepError> {
         match &self.draining {
             Some(mounted) if mounted.is_curved() => {
@@ -1435,8 +1435,8 @@ impl SloshTank {
         SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
-    /// Updates the rates of the bobs after an impulse of the host, which changes the velocity of O by `dv` (m/s) and the
-    /// host's angular velocity by `dw` (rad/s), both in host axes. The bobs keep their velocities across their rods.
+    /// Updates the rates of the bobs after an impulse on the carrying craft, which changes the velocity of O by `dv` (m/s) and
+    /// the craft's angular velocity by `dw` (rad/s), both in the craft's axes. The bobs keep their velocities across their rods.
     pub fn apply_host_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, constrained, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
@@ -1453,12 +1453,13 @@ impl SloshTank {
         self.motion.follow_impulse(dv, dw);
     }
 
-    /// Returns the coupling ratio, which is the largest eigenvalue lambda of M_host^-1 M_a: the added mass of
-    /// the liquid over the mass of the host, at the current directions of the pendulums. `None` if the host's
-    /// mass properties are unknown.
+    /// Returns the coupling ratio, which is the largest eigenvalue lambda of M_host^-1 M_a: the added mass of the liquid
+    /// divided by the mass of the carrying craft, at the current directions of the pendulums. `None` if the mass properties of
+    /// this craft are unknown.
     ///
-    /// A host that applies the total force and torque one step late diverges, at any step size, if the ratio is above 1
-    /// (values held over the step), 1/3 (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear extrapolation).
+    /// A simulator of the carrying craft that applies the total force and torque one step late diverges, at any step size, if the
+    /// ratio is above 1 (values held over the step), 1/3 (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear
+    /// extrapolation).
     pub fn coupling_ratio(&mut self) -> Option<f64> {
         let host = self.host?;
         self.motion.start(0.0);

@@ -1,5 +1,5 @@
-//! A spacecraft with sloshing tanks, in free flight or on a pivot: its steps, and its equations for hosts that
-//! integrate the states themselves.
+//! A spacecraft with sloshing tanks, in free flight or on a pivot: its steps for Co-Simulation, and its derivatives for Model
+//! Exchange.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -103,7 +103,7 @@ impl Spacecraft {
         self.motion.state.time
     }
 
-    /// Sets the simulation time, s, in a host that integrates the states itself.
+    /// Sets the simulation time, s (Model Exchange).
     pub fn set_time(&mut self, time: f64) {
         self.motion.state.time = time;
     }
@@ -166,8 +166,8 @@ impl Spacecraft {
         outputs
     }
 
-    /// Returns for each tank the ranges of validity and the state of its liquid that [`Spacecraft::outputs`] returns. It takes a
-    /// fifth of the instructions or less; `None` if it would take as many.
+    /// Returns for each tank the ranges of validity and the state of its liquid that [`Spacecraft::outputs`] returns, with at
+    /// most a fifth of the instructions. Returns `None` if it would need as many instructions.
     pub fn discrete_outputs(&mut self, inputs: &Inputs) -> Option<[(Ranges, BallState); TANKS]> {
         if self.may_jump(inputs) {
             return None;
@@ -189,8 +189,8 @@ impl Spacecraft {
         Some(all)
     }
 
-    /// Returns the ranges of validity of settled liquids after a step, from the power series of the step and without an evaluation
-    /// of the equations; `None` if a range depends on the difference between the two.
+    /// Returns the ranges of validity of settled liquids after a step, from the power series of the step and without an
+    /// evaluation of the equations. Returns `None` if a range depends on the small difference between series and equations.
     fn ranges_from_series(&self, inputs: &Inputs) -> Option<[Ranges; TANKS]> {
         if self.has_lump() {
             return None;
@@ -235,8 +235,8 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Returns true if the pendulums represent the liquid after a step, in every tank without a model of detached liquid.
-    /// This depends on the bobs' directions at the end of the step and on the accelerations during the step.
+    /// Returns true if after a step the pendulums represent the liquid in every tank without a model of detached liquid. This
+    /// depends on the bobs' directions at the end of the step and on the accelerations during the step.
     pub fn is_physical(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
@@ -293,11 +293,11 @@ impl Spacecraft {
         self.motion.state.kept.end();
     }
 
-    /// Returns the derivatives x' of the continuous states x by time. They are computed from copies of quaternion,
-    /// directions and rates that are normalised; x itself does not change.
+    /// Returns the derivatives x' of the continuous states x by time. They are computed from copies of quaternion, directions and
+    /// rates that are normalised; x itself does not change.
     ///
-    /// The angular momentum h_w of the wheels (`h_wheels`) and its slope h_w' act on the craft by the torque -w x h_w -
-    /// h_w'. A host that does not set the slope must add -h_w' to `torque`.
+    /// The angular momentum h_w of the wheels (`h_wheels`) and its slope h_w' act on the craft by the torque -w x h_w - h_w'. A
+    /// caller that does not set the slope must add -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
             return draining.rates(&self.motion.state.x, &Acting::from_inputs(inputs, 0.0));
@@ -392,8 +392,8 @@ impl Spacecraft {
         }
     }
 
-    /// Returns true if a host that integrates the states itself has passed an event of a liquid, even if the indicators of
-    /// its last steps did not show the event. The liquid is then outside its wall and moves outwards, has to leave bottom or
+    /// Returns true if an external integrator (Model Exchange) has passed an event of a liquid, even if the indicators of its
+    /// last steps did not show the event. The liquid is then outside its wall and moves outwards, has to leave bottom or
     /// wall, or may settle.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let mut now = [1.0; 2 * TANKS];
@@ -425,16 +425,16 @@ impl Spacecraft {
         Ok(changed)
     }
 
-    /// Returns an error if states that a host has integrated are beyond the model: masses of liquid outside the tanks' fill
-    /// tables, bobs beyond the largest angle of their surfaces, or excessive deflections of the appendages.
+    /// Returns an error if states that an external integrator has set are beyond the model: masses of liquid outside the tanks'
+    /// fill tables, bobs beyond the largest angle of their surfaces, or excessive deflections of the appendages.
     pub fn check_states(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
         self.motion.check_appendages()?;
         self.draining.as_ref().map_or(Ok(()), |it| it.check(x))
     }
 
-    /// Takes the present values of `h_wheels` and `mass_flow` as a continuous change, which gives no impulse. A host that
-    /// integrates the states itself calls this method after each of its steps.
+    /// Takes the present values of `h_wheels` and `mass_flow` as a continuous change, which gives no impulse. In Model Exchange
+    /// this method is called after each step of the integrator.
     pub fn follow_inputs(&mut self, inputs: &Inputs) {
         self.motion.state.h_wheels = inputs.h_wheels.value;
         self.motion.state.flow = inputs.mass_flow.map(|flow| flow.value);

@@ -183,8 +183,8 @@ impl SpinSeries {
         space::value(&self.l, n, t)
     }
 
-    /// Returns the scale, rad/s, to which the allowed error of the spin is relative: the magnitude
-    /// of the liquid's angular momentum L divided by the inertia.
+    /// Returns the magnitude of the liquid's angular momentum L divided by the inertia, rad/s, to which the allowed error of
+    /// the spin is relative.
     pub fn rate_scale(&self) -> f64 {
         self.coefficient_norm(0)
     }

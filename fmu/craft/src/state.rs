@@ -131,8 +131,8 @@ pub enum BallState {
     /// Detached liquid that slides on the wall without drag, because the wall force is so small that the reaction of the
     /// drag would push the wall away from the liquid.
     Light = 4,
-    /// As `Light`, after the pendulums could not take over the liquid because the energy would have increased. They try
-    /// again when the liquid is nearest to the tank's axis.
+    /// As `Light`, after the pendulums could not take over the liquid because the energy would have increased. The next attempt
+    /// is made when the liquid is nearest to the tank's axis.
     Held = 5,
 }
 
@@ -160,10 +160,10 @@ pub struct State {
     pub(crate) kept: Kept,
 }
 
-/// Start of the expansion (power series) that the next step continues if the inputs have not changed: the states `x` and the
-/// inputs (force, torque, h_wheels, mass flows) at this start. `clock` is the time at the end of the last step and `start`
-/// the time at the start of the expansion; both count from the last change of the inputs, and the second number of each is
-/// its rounding error. If `clock` is 0, the next step starts a new expansion, and the other fields have no meaning.
+/// Start of the power series (expansion) that the next step continues if the inputs have not changed: the states `x` and the
+/// inputs (force, torque, h_wheels, mass flows) at this start. `clock` is the time at the end of the last step and `start` the
+/// time at the start of the expansion; both count from the last change of the inputs, and the second number of each is its
+/// rounding error. If `clock` is 0, the next step starts a new expansion, and the other fields have no meaning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Kept {
     pub x: [f64; STATES],

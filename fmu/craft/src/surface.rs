@@ -196,8 +196,7 @@ impl Surface {
         self.stiffness == 0.0 && self.higher.is_none()
     }
 
-    /// Returns (kappa - 1)/8, the part of z/(l u^2) that comes from the coefficient kappa; z is the lift of the bob
-    /// along the tank's axis.
+    /// Returns (kappa - 1)/8, the contribution of kappa to z/(l u^2), where z is the lift of the bob along the tank's axis.
     pub fn lift_of_square(&self) -> f64 {
         0.125 * self.stiffness
     }
@@ -210,7 +209,7 @@ impl Surface {
         }
     }
 
-    /// Returns (kappa - 1)/2, the part of beta/u that comes from the coefficient kappa.
+    /// Returns (kappa - 1)/2, the contribution of kappa to beta/u.
     pub fn bend(&self) -> f64 {
         0.5 * self.stiffness
     }
@@ -572,7 +571,7 @@ impl<T: Number> Rotary<T> {
         self.lever * rate_d
     }
 
-    /// Returns the torque of rotary motion on the craft, divided by the bob's mass, in addition to the moment of the bob's
+    /// Returns the torque of rotary motion on the craft, divided by the bob's mass, that is added to the moment of the bob's
     /// force. `slid` is n.(-l y), and `rate_d` is the angular acceleration e.w' about the tank's axis.
     pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
         let tau_d = self.l * self.u * rate_d + self.turning - slid;

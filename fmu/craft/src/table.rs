@@ -76,8 +76,8 @@ impl FillTable {
         let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
         let of_mode = |n: usize| {
             let (mass, l, h) = (&self.mass[n], &self.length[n], &self.hinge[n]);
-            // Values of points and modes that are not in use may be anything within their ranges. Since the compiler may
-            // divide for all points before it selects one, divisors get a lower bound, which is below any value in use.
+            // Values of points and modes that are not in use may be anything within their ranges. The compiler may divide for all
+            // points before it selects one. Therefore divisors get a lower bound, which is below any value in use.
             let used = |f: &dyn Fn(usize) -> f64| {
                 core::array::from_fn(|i| if i < self.points && n < modes { f(i) } else { 0.0 })
             };
@@ -150,8 +150,8 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Place of a mass of liquid in a fill table: the interval, the position in it from 0 to 1, and the inverse of
-/// the interval's width, 1/kg.
+/// Position of a mass of liquid in a fill table: the interval between two points, the position in the interval from 0 to 1, and
+/// the inverse of its width, 1/kg.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,
