@@ -133,8 +133,8 @@ fn entry<M: Model>(name: &str) -> Option<&'static Variable<M>> {
     M::table().variables.iter().find(|v| v.name == name)
 }
 
-/// Returns the elements that an entry has with the start values of structural parameters, as row-major indices
-/// in the largest array.
+/// Returns the elements that an array of the table has with the start values of the structural parameters, as row-major indices
+/// in the largest possible array.
 fn elements<M: Model>(v: &Variable<M>) -> Vec<usize> {
     let all = Arrays::new::<M>(&M::table().starts());
     let scalars = all.scalars(arrays::reference(v)).unwrap_or_default().iter();
@@ -150,7 +150,7 @@ fn entry_element<M: Model>(
 ) -> Element {
     let is_structural = layout == Layout::Arrays && M::table().is_structural(v);
     let (causality, initial) = match v.causality {
-        // `initial="exact"` is the default of an input, and CasADi does not accept it.
+        // `initial="exact"` is the default of an input and is left out, because CasADi does not accept it there.
         Causality::Input => ("input", None),
         Causality::Output => ("output", Some("calculated")),
         Causality::Local => ("local", Some("calculated")),

@@ -31,7 +31,7 @@ pub fn path<M: Model>() -> PathBuf {
     folder::<M>().join("modelDescription.xml")
 }
 
-/// Date of the release, and not of the build, because builds of the same commit must give the same bytes.
+/// Date of the release. It is not the date of the build, because builds of the same commit must give the same bytes.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
 /// Default stop time, s. A simulation of 20 s has 1000 samples of the gyro at 50 Hz.
@@ -263,17 +263,18 @@ const LONGEST: usize = 100;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Long {
-    /// The list is left out, so that a host assumes that the value depends on everything. The list of an output is
-    /// nevertheless written if the output does not depend on all inputs, because otherwise a host would find an algebraic
+    /// No dependencies are written, so that an importer assumes that the value depends on everything. The list of an output is
+    /// nevertheless written if the output does not depend on all inputs, because otherwise an importer would find an algebraic
     /// loop that does not exist.
     Nothing,
-    /// The dependencies without their kinds, so that a host assumes `dependent`, which is correct.
+    /// The dependencies without their kinds, so that an importer assumes the kind `dependent`, which is correct.
     Dependencies,
 }
 
-/// Returns the elements of a list of ModelStructure in the order of their numbers, each with the numbers of the scalars on
-/// which it depends. An array depends on everything on which one of its elements depends. `element` and `attribute` are the
-/// names in this version of FMI, and `long` determines if long lists of dependencies of initial values are written.
+/// Returns the elements of one list of ModelStructure, such as Output or InitialUnknown, in the order of their numbers, each
+/// with the numbers of the scalars on which it depends. An array depends on everything on which one of its elements depends.
+/// `element` and `attribute` are the XML names in this version of FMI, and `long` determines if long lists of dependencies of
+/// initial values are written.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,

@@ -61,9 +61,9 @@ pub enum Shape {
     Other,
 }
 
-/// Damping ratio `zeta` of a first mode by a correlation. `weight` is the weight of the correlation relative to
-/// [`UNMEASURED`] laminar layers: 1 within the range of the measurements, falling smoothly to 0 where a similarity number is
-/// outside this range by the factor [`BEYOND`].
+/// Damping ratio `zeta` of a first mode by a published correlation. `weight` says how far the correlation replaces the estimate
+/// for unmeasured shapes, [`UNMEASURED`] laminar layers: it is 1 within the range of the measurements, and falls smoothly to 0
+/// where a similarity number is outside this range by the factor [`BEYOND`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correlation {
     pub zeta: f64,
@@ -72,8 +72,7 @@ pub struct Correlation {
 
 pub const BEYOND: f64 = 2.0;
 
-/// Half angle of a cone, degrees, from which on the correlation is not used, because cones were measured only
-/// up to 45 degrees.
+/// Half angle of a cone, degrees, from which on its correlation is not used. Cones were measured only up to 45 degrees.
 const WIDEST: f64 = 50.0;
 
 const SHALLOW: f64 = 0.4;
@@ -141,9 +140,9 @@ impl Shape {
     }
 }
 
-/// A measured shape that the whole wetted wall of a tank or a part of it has. `share` is the fraction of the wetted area, 0
-/// to 1. `factor` is the damping ratio of the shape's first mode by its correlation, divided by the damping ratio of the
-/// laminar layer at its wall. `weight` is [`Correlation::weight`].
+/// A measured shape of a wetted wall, or of a part of the wall. `share` is the fraction of the wetted area that has this shape, 0
+/// to 1. `factor` is the damping ratio of the shape's first mode by its correlation, divided by the damping ratio of the laminar
+/// layer at its wall. `weight` is [`Correlation::weight`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     pub share: f64,
@@ -151,12 +150,11 @@ pub struct Part {
     pub weight: f64,
 }
 
-/// Fraction of the wetted wall from which on a measured shape affects the interval of an estimate. The interval then
-/// includes the shape's correlation. If other shapes have at least this fraction, the estimate has the interval of a
-/// wall of several shapes.
+/// Fraction of the wetted wall from which on the correlation of a measured shape affects the interval of an estimate. If other
+/// shapes have at least this fraction, the estimate has the interval of a wall of several shapes.
 const COUNTS: f64 = 0.05;
 
-/// Damping by a correlation divided by the damping of the laminar layer, below which the correlation is not used, because no
+/// Damping by a correlation divided by the damping of the laminar layer. Below this ratio the correlation is not used, because no
 /// wall can have less damping than its laminar layer.
 const BELOW: f64 = 0.8;
 
@@ -313,8 +311,8 @@ pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Returns the viscosity number Re = nu/sqrt(g R^3) of a torus, divided by that of the only torus whose damping was
-/// measured. `tube_radius` is the radius of the torus's cross-section, m.
+/// Returns the viscosity number Re = nu/sqrt(g R^3) of a torus, divided by the viscosity number of the only torus whose damping
+/// was measured. `tube_radius` is the radius of the torus's cross-section, m.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
@@ -422,8 +420,8 @@ mod tests {
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
-    /// The damping ratio of a torus is a polynomial of fourth order in the depth, multiplied by the root of its viscosity
-    /// number divided by that of the measured torus.
+    /// The damping ratio of a torus is a polynomial of fourth order in the depth, multiplied by the root of its viscosity number
+    /// divided by the viscosity number of the measured torus.
     #[test]
     fn the_damping_of_a_torus_equals_the_fit_and_grows_with_the_root_of_the_viscosity_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
@@ -519,9 +517,9 @@ mod tests {
             1.0
         );
         assert_eq!(Shape::Other.correlation(1e-6, g), None);
-        // No measurement was made without viscosity.
+        // A viscosity of 0 is outside the range of the measurements.
         assert_eq!(sphere(1.0).correlation(0.0, g), Some(Correlation { zeta: 0.0, weight: 0.0 }));
-        // The value is that of the shape's formula.
+        // Within the range of the measurements the value is that of the shape's formula, with the weight 1.
         let nu = unit;
         let zeta = |shape: Shape| shape.correlation(nu, g).unwrap().zeta;
         assert_eq!(zeta(sphere(0.7)), super::sphere(r, 0.7 * r, nu, g));

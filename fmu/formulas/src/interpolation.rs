@@ -1,4 +1,4 @@
-//! Interpolation with two continuous derivatives that is monotone wherever the data are.
+//! Interpolation with two continuous derivatives. The curve is monotone wherever the data are.
 //!
 //! In each interval the curve is a quintic, which has given values, slopes and second derivatives at both points. Slopes and
 //! second derivatives come from the polynomial through the five nearest points, which is exact to fifth order for smooth

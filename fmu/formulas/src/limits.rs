@@ -82,8 +82,8 @@ impl LimitedBy {
     }
 }
 
-/// Largest relative error of a slosh model's natural frequency within its range, compared with
-/// fully nonlinear potential flow.
+/// Largest relative error of a slosh model's natural frequency within the model's range, compared with fully nonlinear potential
+/// flow.
 pub const FREQUENCY: f64 = 3e-3;
 /// Relative error of the model's natural frequency at which the error of a forced response is 3 %, if the response is wrong
 /// only because the model's frequency changes with the slosh angle in another way than the liquid's frequency.
@@ -161,7 +161,7 @@ const FORCED_ENERGY: [[f64; 2]; 7] =
 const ROTARY: [[f64; 2]; 6] =
     [[0.65, 9.3], [0.8, 7.7], [1.0, 4.8], [1.227, 5.9], [2.0, 7.2], [2.5, 7.2]];
 
-/// As [`ROTARY`], for the model with [`energy_terms`].
+/// Like [`ROTARY`], for the model with [`energy_terms`].
 const ROTARY_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.8], [0.35, 4.0], [0.4, 5.0], [0.5, 7.5], [0.6, 9.6], [0.7, 10.2]];
 
@@ -194,8 +194,8 @@ pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]
 }
 
 /// Returns a column of the table [`THIRD_ORDER`] at h/R = `fill`, interpolated and converted from degrees to rad. In
-/// shallower liquid than that of the table the power law of the first two rows is continued, and in deeper liquid the value
-/// is that of the last row.
+/// shallower liquid than in the table the power law through the first two rows is continued, and in deeper liquid the value
+/// of the last row is used.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {

@@ -138,9 +138,9 @@ mod tests {
         }
     }
 
-    /// The expected values have twelve digits. They are the same shifts, computed by Lagrange's averaged function: its
-    /// stationary values follow from solving for the excited modes, with integrals by Gauss's rule and Bessel functions by
-    /// their integral. They verify sign and magnitude of every term, also close to the resonance at 0.15.
+    /// The expected values have twelve digits. They were computed in another way: by Lagrange's averaged function, which is made
+    /// stationary by solving for the excited modes, with integrals by Gauss's rule and Bessel functions by their integral
+    /// representation. They verify sign and magnitude of every term, also close to the resonance at 0.15.
     #[test]
     fn third_order_coefficients_equal_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [

@@ -16,7 +16,7 @@ pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
-/// Creates an instance as a host of FMI 2.0 does, for hosts and tests in Rust.
+/// Creates an instance as an importer of FMI 2.0 does, for tests and other callers in Rust.
 pub fn instance(interface: Interface) -> Instance {
     Instance::new(interface)
 }

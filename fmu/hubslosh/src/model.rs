@@ -25,8 +25,8 @@ impl HubSlosh {
     }
 }
 
-/// The plant's parameters and integer twins, whose names end in `_kind`. A host that cannot set enumerations sets the twin
-/// to the number of the item instead, and a host that misreads Booleans sets it to 1 for false or 2 for true; if the twin is
+/// The plant's parameters and integer twins, whose names end in `_kind`. An importer that cannot set enumerations sets the twin
+/// to the number of the item instead, and an importer that misreads Booleans sets it to 1 for false or 2 for true; if the twin is
 /// 0, it has no effect. By default the liquid is released at [`START_ANGLE`].
 #[derive(Clone, Debug)]
 pub struct Parameters {

@@ -38,9 +38,10 @@ impl runtime::Model for HubSlosh {
 
 static SCALARS: [Scalar<HubSlosh>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// Direct dependencies. The hub's acceleration depends on all torques, including the liquid's restoring force, which is
-// proportional to g_axial. While the hub sticks, the friction torque depends on them as well. Forces and torques of the
-// liquid contain the hub's acceleration. Hub angle and rate affect the friction, and wheel_speed affects the wheel's limits.
+// Inputs and states on which outputs depend directly. The hub's acceleration depends on all torques, including the liquid's
+// restoring force, which is proportional to g_axial. While the hub sticks, the friction torque depends on them as well.
+// Forces and torques of the liquid contain the hub's acceleration. Hub angle and rate affect the friction, and wheel_speed
+// affects the wheel's limits.
 #[rustfmt::skip]
 const ALL_TORQUES: &[&str] = &[
     "theta", "omega", "wheel_speed", "bristle",
@@ -71,7 +72,7 @@ const WAVE_1: &[&str] = &[
     "slosh.v_tangential[1]",
     "g_axial",
 ];
-// Dependencies of initial values. The damping depends on the initial g_axial.
+// Parameters and inputs on which initial values depend. The damping depends on the initial g_axial.
 #[rustfmt::skip]
 const DYNAMICS: &[&str] = &[
     "tau_cmd", "tau_ext", "g_axial",
@@ -89,7 +90,7 @@ const TABLE_OF_MODES: &[Dimension] = &[Fixed(MODES)];
 
 type V = Variable<HubSlosh>;
 
-/// The variables. The outputs come first and in a useful order, because hosts plot all of them.
+/// The variables. The outputs come first and in a useful order, because importing tools plot all of them.
 #[rustfmt::skip]
 static VARIABLES: &[Variable<HubSlosh>] = &[
     // Outputs

@@ -95,8 +95,8 @@ fn torque(step: usize) -> f64 {
     0.06 * (0.7 * step as f64).sin()
 }
 
-/// Variables that are compared at communication points: the continuous variables, the gyro's reading and the
-/// number of contact changes.
+/// Variables that are compared at communication points: the continuous variables, the gyro's reading and the number of changes of
+/// the contact (stick or slip).
 const LOOKED_AT: [&str; 12] = [
     "theta",
     "omega",
@@ -272,7 +272,7 @@ fn torque_set_in_event_mode_that_breaks_stiction_makes_the_hub_slip() {
     three.new_discrete_states().unwrap();
     assert_eq!(get(&mut three, "event_count"), count, "a second update must have no effect");
     assert_eq!(real(&mut three, "event_time"), 0.5);
-    // In Step Mode the same torque causes an event at the start of the step.
+    // In step mode, without event mode between the steps, the same torque causes an event at the start of the step.
     let mut three: Three = initialised(Events::Reported, &values);
     handle(&mut three);
     set(&mut three, "tau_cmd", Value::Real(0.5));
@@ -353,8 +353,7 @@ fn continuous_states_cannot_be_set_in_co_simulation() {
     assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
 }
 
-/// Returns work_axial and omega_imu after 1 s in steps of 20 ms, with a g_axial that jumps between steps and
-/// is constant within them.
+/// Returns work_axial and omega_imu after 1 s in steps of 20 ms. g_axial jumps between steps and is constant within them.
 fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     let mut instance = Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);
     set(&mut instance, "imu.enabled", Value::Boolean(true));
@@ -371,8 +370,8 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     ["work_axial", "omega_imu"].map(|name| real(&mut instance, name))
 }
 
-/// The reference adds up its step sizes as the FMU does. In earlier versions the error of the work was up to 1.5e-4 J, and
-/// at 1e9 s gyro samples were one step late.
+/// The reference adds up its step sizes as the FMU does. In earlier versions, rounding errors of the simulation times caused
+/// errors of the work of up to 1.5e-4 J, and at 1e9 s gyro samples were one step late.
 #[test]
 fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock() {
     fn compare<V: Version>() {

@@ -52,10 +52,10 @@ impl Breaking {
     const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
 }
 
-/// Part of one mode's drag that grows with the amplitude, with the power series of the quantities in the module's
-/// head. `zeta` is zeta_A, 1/rad; `w_floor` is a constant that is added to W, 1/s2; `w` is W and its rate. `share`,
-/// the other drag (viscous or of a baffle), and the gains of both growing parts are divided by the whole drag at the
-/// start of the expansion.
+/// Part of one mode's drag that grows with the amplitude, with the power series of the quantities in the module's head. `zeta`
+/// is zeta_A, 1/rad; `w_floor` is a constant that is added to W, 1/s2; `w` is W and its rate. Three fields are divided by the
+/// whole drag at the start of the expansion: `share`, which is the drag that does not grow (viscous or of a baffle), and the
+/// gains of both growing parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
     pub acts: bool,
@@ -104,9 +104,9 @@ impl Growth {
         Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and
-    /// rate. `m` is the slosh mass, kg. `c` is the drag coefficient that does not depend on the amplitude; its viscous part
-    /// follows the series `viscous`. Returns the whole drag coefficient.
+    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and rate.
+    /// `m` is the slosh mass, kg. `c` is the drag coefficient that does not depend on the amplitude; its viscous part changes in
+    /// time as the series `viscous`. Returns the whole drag coefficient.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;

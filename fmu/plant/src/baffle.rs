@@ -34,8 +34,8 @@ use crate::parameters::{Parameters, Ring, SloshSource};
 /// times exp(-1.84 d/R), to the ring's width.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 divided by the smallest wave amplitude for which the baffle's law holds. At this amplitude A_0 adds
-/// 2e-4 to the damping.
+/// A_0 divided by the smallest wave amplitude for which the baffle's law holds. At this amplitude A_0 increases the damping by
+/// 2e-4 of its value.
 const FLOOR: f64 = 0.03;
 
 /// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
@@ -171,8 +171,8 @@ impl Baffle {
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and
-    /// rate. `m` is the slosh mass, kg. `c` is the viscous drag coefficient, which follows the series `viscous`. Returns the
+    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and rate.
+    /// `m` is the slosh mass, kg. `c` is the viscous drag coefficient, which changes in time as the series `viscous`. Returns the
     /// drag coefficient of baffle and viscosity together.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];

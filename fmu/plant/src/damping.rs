@@ -17,9 +17,9 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Fraction of the largest specific force g on a ramp. Where g is below it, the factor c/c_0 is replaced by its mean,
-/// because its power series converge only as far as g = 0. This time is so short that the error, which is of second order in
-/// the time, is below rounding.
+/// Specific force below which the factor c/c_0 is replaced by its mean, divided by the largest specific force g on a ramp. The
+/// power series of the factor converge only as far as g = 0. Since g is below this value only for a short time, the error, which
+/// is of second order in this time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
 /// Largest step as a fraction of the time to g = 0, which is the series' radius of convergence.

@@ -1,5 +1,5 @@
-//! The plant as equations x' = f(x, u) with events, and their partial derivatives, for hosts that
-//! integrate the states themselves.
+//! The plant as equations x' = f(x, u) with events, and their partial derivatives, for Model Exchange, in which the importing
+//! tool integrates the states.
 //!
 //! x is defined in `state.rs`. The contact of hub and bearing and the slosh regime are discrete states. They change only in
 //! [`Plant::take_event`], after an event indicator has crossed zero.
@@ -19,7 +19,7 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples that are taken at one instant. If more are due, the host does not handle
+/// Largest number of gyro samples that are taken at one instant. If more are due, the importing tool does not stop at
 /// the FMU's time events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
@@ -29,13 +29,13 @@ impl Plant {
         &self.state.x
     }
 
-    /// Sets the continuous states, in the order of [`x`], as a host has integrated them.
+    /// Sets the continuous states, in the order of [`x`], as the importing tool has integrated them.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.state.x = *x;
     }
 
-    /// Sets the simulation time of the host, s, and, if the host integrates the states itself, the time since the start, s.
-    /// Times of the host that differ by at most `resolution`, s, count as equal.
+    /// Sets the simulation time that the importing tool states, s, and in Model Exchange the time since the start, s. Times of
+    /// the importing tool that differ by at most `resolution`, s, count as equal.
     pub fn set_time(&mut self, time: f64, since_start: Option<f64>, resolution: f64) {
         (self.state.time, self.resolution) = (time, resolution);
         if let Some(elapsed) = since_start {
@@ -43,7 +43,7 @@ impl Plant {
         }
     }
 
-    /// Returns the derivatives x' of the continuous states by time, for hosts that integrate the states themselves.
+    /// Returns the derivatives x' of the continuous states by time.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
@@ -102,9 +102,9 @@ impl Plant {
         derivatives
     }
 
-    /// Returns the event indicators, in the order of [`indicator`]. They are positive between events and cross zero at
-    /// events. An indicator of an event that cannot happen is 1. No indicator is ever exactly 0, so that a host's root
-    /// finder sees no crossing right after an event.
+    /// Returns the event indicators, in the order of [`indicator`]. They are positive between events and cross zero at events. An
+    /// indicator of an event that cannot happen is 1. No indicator is ever exactly 0, so that the root finder of the importing
+    /// tool sees no crossing right after an event.
     pub fn event_indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let just_positive = |z: f64| if z == 0.0 { f64::MIN_POSITIVE } else { z };
         self.indicators(inputs).map(just_positive)
@@ -162,8 +162,8 @@ impl Plant {
             }
             self.find_contact(inputs);
         }
-        // A host's root finder may stop exactly at the break-away, where the bearing still holds the torque. The indicator
-        // would then not change its sign again.
+        // A root finder may stop exactly at the break-away, where the bearing still holds the torque. The indicator would then
+        // not change its sign again, so that the break-away is performed now.
         if self.state.contact == Contact::Stuck {
             let z = self.indicators(inputs);
             if z[indicator::BREAK_AWAY_FORWARD] <= 0.0 {
@@ -186,8 +186,8 @@ impl Plant {
         self.state.record_contact(contact, time);
     }
 
-    /// Returns true if an event is overdue although no indicator changed its sign in the host's last step: the host has
-    /// integrated past a change of the contact or past a speed limit of the rotor, or the wave has reached another regime.
+    /// Returns true if an event is overdue although no indicator changed its sign in the last step of the importing tool: its
+    /// integrator has passed a change of the contact or a speed limit of the rotor, or the wave has reached another regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let z = self.indicators(inputs);
         let lasting = [
@@ -222,8 +222,8 @@ impl Plant {
         Ok(())
     }
 
-    /// Adds the work that a changing g_axial has done since the last accepted step. A host that integrates the states itself
-    /// must call this function when its integrator has accepted a step.
+    /// Adds the work that a changing g_axial has done since the last accepted step. In Model Exchange this function must be
+    /// called when the integrator of the importing tool has accepted a step.
     ///
     /// Since the inputs' derivatives are not known here, the work is exact to fourth order in the step if g_axial is linear
     /// in time, and otherwise to second order.
@@ -243,7 +243,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Returns an error if the states that a host has integrated are outside the range of the models.
+    /// Returns an error if the states that the importing tool has integrated are outside the range of the models.
     ///
     /// # Errors
     /// [`StepError::Model`] with the number of the mode and the reason.
@@ -259,7 +259,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Returns the time of the gyro's next sample on the host's clock, s; `None` without a gyro.
+    /// Returns the simulation time at which the gyro's next sample is due, s; `None` without a gyro.
     pub fn next_time_event(&self) -> Option<f64> {
         self.next_sample().map(|due| self.state.time + due)
     }

@@ -3,9 +3,9 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp, number};
 
-/// Motion of the hub, on which liquid and bearing depend: the series of theta, w, w^2 and w' (rad, s), the specific
-/// force `g` along the tank's axis, m/s2, with its rate, and the time `damping_reach`, s, over which the series of
-/// the damping are valid.
+/// Motion of the hub as far as liquid and bearing depend on it: the series of theta, w, w^2 and w' (rad, s), the specific
+/// force `g` along the tank's axis, m/s2, with its rate, and the time `damping_reach`, s, over which the series of the
+/// liquid's damping are valid.
 #[derive(Clone, Debug)]
 pub struct HubMotion {
     pub theta: Series,

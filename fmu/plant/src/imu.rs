@@ -13,8 +13,7 @@
 
 use crate::parameters::Imu;
 
-/// Fraction of a sampling period by which the gyro may take a sample early, in addition to the resolution
-/// of the host's clock.
+/// Fraction of a sampling period by which the gyro may take a sample early, in addition to the resolution of the simulation time.
 const SLACK: f64 = 1e-6;
 
 pub(crate) const FLICKERS: usize = 8;
@@ -73,8 +72,8 @@ impl Imu {
         k as f64 / self.rate - since_start
     }
 
-    /// Returns true if a sample that is due in `due` seconds can be taken now. Communication points and time events of a
-    /// host match sampling times only to rounding and to the `resolution` of the host's clock.
+    /// Returns true if a sample that is due in `due` seconds can be taken now. Communication points and time events match
+    /// sampling times only up to rounding and to the `resolution` of the simulation time.
     #[inline(always)]
     pub(crate) fn is_due(&self, due: f64, resolution: f64) -> bool {
         due <= SLACK / self.rate + resolution
@@ -93,7 +92,7 @@ impl Imu {
             reading += gyro.walk;
             gyro.walk += self.rrw / libm::sqrt(self.rate) * normal_pair(self.seed, 1, gyro.next).0;
         }
-        // A quantisation step that is smaller than the rounding error of the reading has no effect.
+        // A quantisation step that is smaller than the rounding error of the reading would have no effect and is not applied.
         let seen = reading.abs() < 1e16 * self.lsb;
         gyro.held = if seen { libm::rint(reading / self.lsb) * self.lsb } else { reading };
         let keep = libm::exp(-1.0 / (self.rate * self.bias_time));
@@ -152,8 +151,8 @@ mod tests {
         const COUNT: usize = 200_000;
         let all: Vec<(f64, f64)> = (0..COUNT as u64).map(|k| normals(7, k)).collect();
         let mean = |f: &dyn Fn(usize) -> f64| (0..COUNT).map(f).sum::<f64>() / COUNT as f64;
-        // The standard errors are 1/sqrt(COUNT) = 0.0022 for means and correlations, and sqrt(2) times as large for the
-        // variance. Five standard errors are not exceeded by chance.
+        // The standard errors are 1/sqrt(COUNT) = 0.0022 for means and correlations, and sqrt(2) times as large for the variance.
+        // The test allows five standard errors, which chance practically never exceeds.
         assert!(mean(&|k| all[k].0).abs() < 0.012);
         assert!((mean(&|k| all[k].0 * all[k].0) - 1.0).abs() < 0.016);
         assert!((mean(&|k| all[k].1 * all[k].1) - 1.0).abs() < 0.016);

@@ -26,10 +26,10 @@
 //! e), and F is its ratio to e.(K^-1 e), for the two equations of small motions, with e the tangent. Hence l' = l F/f
 //! and m' = m f/M.
 //!
-//! f belongs to the tangential direction. For the radial direction n^2 and 1 - n^2 are exchanged: in F for models with one
-//! pendulum for both directions, and in f for the liquid. A spherical pendulum has the same frequency in both directions. In
-//! the model `liquid` the two frequencies differ by themselves, similar to the real liquid (deep: c = -0.36 along the slope
-//! and 0.37 across it; real liquid: -0.42 and 0.23).
+//! f belongs to the tangential direction of motion. For the radial direction n^2 and 1 - n^2 are exchanged: in F for models with
+//! one pendulum for both directions, and in f for the liquid. A spherical pendulum has the same frequency in both directions. In
+//! the model `liquid` the two frequencies differ of themselves, similarly to the real liquid: in deep liquid the coefficient c of
+//! omega^2 = (1 + c s^2) g/l is -0.36 along the slope and 0.37 across it, for the real liquid -0.42 and 0.23.
 
 use alloc::format;
 use alloc::string::String;
@@ -119,8 +119,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Relative error of a mode's frequency in the radial direction above which a warning is issued. Slosh models with one
-/// pendulum for both directions have this error.
+/// Relative error of a mode's frequency in the radial direction above which a warning is issued. The error arises because some
+/// slosh models have one pendulum for both directions.
 const APART: f64 = 0.01;
 
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {

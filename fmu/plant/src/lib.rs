@@ -5,10 +5,10 @@
 //! Frames and signs: z points up along the bearing axis. The hub's frame turns with theta about +z.
 //! x points from the axis to the tank's centre (radial), y along +theta (tangential). SI units.
 //!
-//! `plant.rs` couples all parts, `state.rs` declares the states, `outputs.rs` and `equations.rs`
-//! have the outputs and equations for a host. `motion.rs` integrates and locates stick and slip.
-//! `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `suspension.rs`, `wheel.rs` and `imu.rs` have
-//! the parts. The integrator and the power series are in the crate `taylor`.
+//! `plant.rs` couples all parts, `state.rs` declares the states, `outputs.rs` and `equations.rs` have the outputs, and
+//! the equations for Model Exchange. `motion.rs` integrates and locates stick and slip. `friction/`, `slosh/`,
+//! `damping.rs`, `tank.rs`, `suspension.rs`, `wheel.rs` and `imu.rs` have the parts. The integrator and the power series
+//! are in the crate `taylor`.
 
 #![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]

@@ -30,9 +30,10 @@ pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
-/// Position of the current stretch of motion within its step, which decides whether an event stops the step. `offset` is the
-/// time from the start of the step to the start of the stretch, s. An event stops the step only if it is later than `passed`
-/// seconds after the start of the step; `passed` is infinite if no event stops the step.
+/// Position of the current stretch of motion within its step, which decides whether an event stops the step. A stretch is a part
+/// of a step over which torque and specific force are linear in time. `offset` is the time from the start of the step to the
+/// start of the stretch, s. An event stops the step only if it is later than `passed` seconds after the start of the step;
+/// `passed` is infinite if no event stops the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
     pub offset: f64,
@@ -45,9 +46,9 @@ impl Stop {
         self.offset + t > self.passed
     }
 
-    /// Returns the time of the first gyro sample at which the step stops, at most `h` after the time `t` in the stretch.
-    /// The stretch begins `since_start` seconds after the gyro's start. At most `allowed` samples, from number `next` on,
-    /// may be taken before.
+    /// Returns the time in the stretch of the first gyro sample at which the step stops. Only samples within `h` seconds after
+    /// the time `t` are considered. The stretch begins `since_start` seconds after the gyro's start, and `next` is the number of
+    /// the next sample. Returns `None` if none of the next `allowed` samples stops the step.
     // Arguments are passed by value, because a reference would force all data of a stretch into memory.
     #[cold]
     fn at_sample(
@@ -79,8 +80,8 @@ pub(crate) struct Motion {
     with_amplitude: bool,
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// The specific force g, m/s2, and its rate in the last expansion of the modes. NaN if there was no expansion, or if the
-    /// expansion is valid only for one instant.
+    /// The specific force g, m/s2, and its rate for which the series of the modes' drag and weight were computed last. NaN if
+    /// they were not computed, or if they are valid only for one instant.
     g: [f64; 2],
     near_weightless: f64,
     tolerance: f64,
@@ -194,8 +195,8 @@ impl Motion {
             + self.hub.tilt.height(n, moment)
     }
 
-    /// Computes coefficient n of every quantity from the coefficients of the state up to n, and coefficient n + 1 of the
-    /// state. `ramp` is true if specific force, drag or weight changes, and `hangs` if there is a suspension line.
+    /// Computes coefficient n of every quantity from the coefficients of the state up to n, and coefficient n + 1 of the state.
+    /// `ramp` is true if specific force, drag or weight changes in time, and `hangs` if the hub hangs from a suspension line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,
@@ -269,7 +270,7 @@ impl Motion {
         }
         let forces = (self.varies, self.suspension.exists);
         self.derivatives(0, forces, modes, Contact::Stuck);
-        // For a law that cannot hold the hub the direction in which the torque departs from 0 is needed.
+        // A law that cannot hold the hub at rest needs the direction in which the torque departs from 0.
         if !self.law.sticks() {
             self.derivatives(1, forces, modes, Contact::Stuck);
         }
@@ -339,7 +340,7 @@ impl Motion {
         }
     }
 
-    /// Returns true if drag and weight depend only on g, and there is no suspension line.
+    /// Returns true if drag and weight depend on nothing but g, and there is no suspension line.
     fn is_plain(&self) -> bool {
         !self.varies && !self.suspension.exists
     }

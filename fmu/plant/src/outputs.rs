@@ -79,7 +79,7 @@ impl Plant {
     }
 
     /// Returns the outputs as [`Plant::outputs`] does, but with contact and slosh regime as they were at the last event, for
-    /// hosts that handle events.
+    /// importing tools that handle events.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);

@@ -163,9 +163,9 @@ pub struct Bench {
     pub tilt_azimuth: f64,
 }
 
-/// Friction laws of the bearing: viscous friction b omega; a Stribeck curve, with sgn(omega) smoothed to tanh(omega/eps), or
-/// set-valued so that the hub can stick; and LuGre, with bristles that deflect before they slide. The files of the laws
-/// describe when to choose which law.
+/// Friction laws of the bearing: viscous friction b omega; a Stribeck curve, in which sgn(omega) is either smoothed to
+/// tanh(omega/eps) or set-valued so that the hub can stick; and LuGre, with bristles that deflect before they slide. The files of
+/// the laws describe when to choose which law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -365,8 +365,8 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// The limit keeps a communication step with one mode below a second of computation, and a communication step with ten
-    /// spherical modes at about six seconds.
+    /// With this limit the computation of a communication step with one mode takes less than a second, and with ten spherical
+    /// modes about six seconds.
     fn default() -> Self {
         Solver { max_steps: 200_000 }
     }

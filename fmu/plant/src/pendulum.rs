@@ -8,7 +8,7 @@ use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 use crate::parameters::Init;
 
-/// Largest angle, rad, between the initial displacement of mode 1 and its direction that counts as a rounding
+/// Largest angle, rad, between the initial displacement of mode 1 and the mode's direction of motion that counts as a rounding
 /// error of decimal parameters.
 const ALONG: f64 = 1e-6;
 
@@ -163,7 +163,7 @@ impl Pendulum {
         starts.into_iter().find_map(|(name, unit, radial, tangential)| {
             let size = libm::hypot(radial, tangential);
             let off = libm::fabs(radial * t - tangential * x) > ALONG * size;
-            // A start along the direction with the same magnitude.
+            // Start values along the direction of motion with the same magnitude, for the message.
             let along = libm::copysign(size, radial * x + tangential * t);
             (self.is_askew() && off).then(|| {
                 format!(

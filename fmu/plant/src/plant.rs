@@ -47,7 +47,7 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
-    /// Times of the host that differ by less than this, s, count as equal.
+    /// Times of the importing tool that differ by less than this, s, count as equal.
     pub(crate) resolution: f64,
     pub(crate) stopped: Option<StoppedStep>,
 }
@@ -62,10 +62,9 @@ pub enum StepEnd {
     Event(f64),
 }
 
-/// A step that has stopped at an event. The plant continues it by repeating it from its `start` and passing this event, so
-/// that the motion is bit-identical whether a host stops at events or not. `h` is the length of the whole step and
-/// `passed` the elapsed time, s; `inputs` are tau_cmd, tau_ext and g_axial during the step; `time` and `x` are time and
-/// states at the event.
+/// A step that has stopped at an event. The plant continues it by repeating it from its `start` and passing this event, so that
+/// the motion is bit-identical whether steps stop at events or not. `h` is the length of the whole step and `passed` the elapsed
+/// time, s; `inputs` are tau_cmd, tau_ext and g_axial during the step; `time` and `x` are time and states at the event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoppedStep {
     start: State,
@@ -214,7 +213,7 @@ impl Plant {
         for (wave, pendulum) in wave.iter_mut().zip(calculated.pendulums(p)) {
             *wave = pendulum.wave;
         }
-        // If nothing restores the liquid at the start, the damping ratio refers to 1 m/s2.
+        // If nothing restores the liquid at the start, the damping ratio is defined at 1 m/s2 instead.
         let mut used = calculated.mass.iter().zip(&calculated.centring).filter(|(m, _)| **m > 0.0);
         let restored =
             state.start_g > 0.0 || used.clone().count() > 0 && used.all(|(_, a)| *a > 0.0);
@@ -348,7 +347,8 @@ impl Plant {
         let (mut t, mut steps, mut stopped) = (0.0, self.motion.steps(), None);
         let mut level = None;
         while t < h {
-            // A piece of zero length takes no step of the integrator, but counts as one step.
+            // A piece of zero length takes no step of the integrator, but counts as an internal step, so that the number
+            // of pieces is limited.
             steps.add_steps(1, begin + t)?;
             let speed = state.x[x::WHEEL_SPEED];
             let command = wheel::command_after(inputs.tau_cmd, t, level);
@@ -395,9 +395,9 @@ impl Plant {
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
-    /// Returns the work of all changes of g_axial since the start, J, including the present change. A jump does the work of
-    /// g_axial's change times the liquid's mass times height. If a host integrates the states itself, the work since its
-    /// last accepted step is computed by Hermite's rule, for a g_axial that is linear in time.
+    /// Returns the work of all changes of g_axial since the start, J, including the present change. A jump of g_axial does the
+    /// work jump times mass times height of the liquid. In Model Exchange the work since the last accepted step is computed by
+    /// Hermite's rule, for a g_axial that is linear in time.
     pub(crate) fn work_axial(&mut self, inputs: &Inputs) -> f64 {
         let last = self.state.axial;
         let change = inputs.g_axial.value - last.g;

@@ -65,8 +65,8 @@ pub struct State {
     pub(crate) ranges: Ranges,
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
-    /// Time since the start, s, and its rounding error. It is the sum of the lengths of all steps, because a host's clock
-    /// may have rounding errors, may drift, or may start at 1e9 s.
+    /// Time since the start, s, and its rounding error. It is the sum of the lengths of all steps, because the simulation times
+    /// of an importing tool may have rounding errors, may drift, or may start at 1e9 s.
     pub(crate) elapsed: [f64; 2],
     /// Specific force g_axial at the start, m/s2, to which the slosh damping ratio refers.
     pub(crate) start_g: f64,
@@ -74,9 +74,9 @@ pub struct State {
     pub(crate) gyro: Gyro,
 }
 
-/// Work done by a changing g_axial since the start, J, and the value of g_axial, m/s2, up to which this work is known.
-/// `accepted` contains the last accepted step of a host that integrates the states itself. It is empty after a step that the
-/// plant has integrated, because g_axial then changes only at an instant.
+/// Work done by a changing g_axial since the start, J, and the value of g_axial, m/s2, up to which this work is known. `accepted`
+/// contains the last accepted step in Model Exchange. It is empty after a step of Co-Simulation, because g_axial then changes
+/// only at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
     pub work: f64,
@@ -84,8 +84,7 @@ pub(crate) struct Axial {
     pub accepted: Option<Accepted>,
 }
 
-/// The liquid at the end of a step that a Model Exchange host has accepted: its mass times height, kg m, and the
-/// rate of this product.
+/// The liquid at the end of an accepted step in Model Exchange: its mass times height, kg m, and the rate of this product.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Accepted {
     pub time: f64,
@@ -202,7 +201,7 @@ impl State {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Sets the clock to `t`, s, after `begin`, which contains the host's time, s, and the time since the start with
+    /// Sets the clock to `t`, s, after `begin`, which contains the simulation time, s, and the time since the start with
     /// its rounding error, s.
     pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
         let (time, elapsed) = begin;

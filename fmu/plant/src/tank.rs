@@ -100,7 +100,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     }
     let omega2 = |n: usize| table.g_ref / length(n) + table.k[n] / table.mass[n];
     for n in 1..modes {
-        // The modes along each direction have their own order.
+        // The modes along each direction must be in the order of their own frequencies.
         let same = |m: &usize| table.direction[*m] == table.direction[n];
         let Some(before) = (0..n).rev().find(same).filter(|m| omega2(n) < omega2(*m)) else {
             continue;
@@ -113,7 +113,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         ));
     }
     let sum = table.most_along_one(modes);
-    // If a table is written in decimals, the fixed mass may be negative by its last digit.
+    // The fixed mass may be negative by the last digit of a table that is written in decimals.
     if sum > table.m_liq * (1.0 + 1e-9) {
         problems.push(format!(
             "the masses of slosh.table add up to {sum} kg along one direction (allowed: up to slosh.table.m_liq = {} kg)",
@@ -363,7 +363,7 @@ impl Calculated {
                 _ if restoring <= 0.0 => 0.0,
                 (SloshSource::Table, _) => slosh.table.zeta[n],
                 (_, true) if n == 0 => damping::cylinder(radius, tank.h, fluid.nu, restoring),
-                // The ratio to the mode's own laminar layer is the same as in the first mode.
+                // The ratio of the damping to the mode's own laminar layer is that of the first mode.
                 (_, true) => {
                     let mode = |n: usize| {
                         let g = g + all.centring[n];

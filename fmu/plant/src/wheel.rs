@@ -117,8 +117,8 @@ mod tests {
         (impulse, speed, pieces)
     }
 
-    /// A torque command passes each limit of the wheel only once although times are rounded. Otherwise parts of a step
-    /// without length would follow each other until the step is refused.
+    /// A torque command passes each limit of the wheel only once although times are rounded. Otherwise the step would be divided
+    /// at the same limit again and again, into parts of zero length, until it is refused.
     #[test]
     fn a_torque_command_passes_each_limit_once_despite_rounding() {
         let mut rng = fastrand::Rng::with_seed(1);
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn an_integration_piece_ends_where_the_command_passes_a_limit_or_zero() {
-        let w = Wheel { inertia: 1.0, ..wheel() }; // far from its speed limits
+        let w = Wheel { inertia: 1.0, ..wheel() }; // The speed limits are far away.
         let next = |command: Ramp| w.next(w.speed_0, command, 10.0).length;
         // The command starts at -0.5 N m and rises by 0.1 N m/s: to -0.26 N m in 2.4 s, to 0 in another 2.6 s, and
         // to 0.26 N m.

@@ -1,5 +1,5 @@
-//! The FMU SloshTank: one sloshing tank on a spacecraft that the host simulates. The table of variables is in [`table`], the
-//! physics in the crate `craft`, and FMI in the crate `runtime`.
+//! The FMU SloshTank: one sloshing tank on a spacecraft that the importing tool simulates. The table of variables is in
+//! [`table`], the physics in the crate `craft`, and FMI in the crate `runtime`.
 
 // The library's name is the FMU's modelIdentifier.
 #![allow(non_snake_case)]

@@ -8,8 +8,8 @@ use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
 
-/// Largest `coupling_ratio` (added mass of the liquid divided by the mass of the host) without a warning. If host and tank
-/// exchange forces once a step and both extrapolate, the exchange is stable up to 2/sqrt(3) - 1 = 0.155.
+/// Largest `coupling_ratio` without a warning: the added mass of the liquid divided by the mass of the craft that carries the
+/// tank. If craft and tank exchange forces once a step and both extrapolate, the exchange is stable up to 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
 const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
@@ -34,14 +34,14 @@ pub struct Model {
 }
 
 impl Model {
-    /// Returns the coupling ratio: the largest eigenvalue of M_host^-1 M_a, where M_host is the host's mass matrix and M_a
-    /// the added mass. Returns 0 if the host's mass is unknown.
+    /// Returns the coupling ratio: the largest eigenvalue of M_host^-1 M_a, where M_host is the mass matrix of the craft that
+    /// carries the tank and M_a the added mass. Returns 0 if the mass of the craft (`host.mass`) is unknown.
     pub fn coupling_ratio(&self) -> f64 {
         self.coupling_ratio
     }
 }
 
-/// The tank's parameters, with counts as integers for FMI. A host that cannot set enumerations sets `coupling_kind`, the
+/// The tank's parameters, with counts as integers for FMI. An importer that cannot set enumerations sets `coupling_kind`, the
 /// integer twin of the enumeration `coupling`, to the number of the item; if it is 0, it has no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
@@ -112,8 +112,8 @@ impl Parameters {
     }
 }
 
-/// Inputs of the tank: the motion of the host, by default rest without specific force. The slope of the angular velocity
-/// omega within a step is always omega_dot, whatever slope the host sets.
+/// Inputs of the tank: the motion of the craft that carries it, by default rest without specific force. The slope of the angular
+/// velocity omega within a step is always omega_dot, whatever slope the importer sets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     pub tank: TankInputs,
@@ -153,8 +153,8 @@ impl Dynamics for Model {
         }
         let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
-        // With a model of detached liquid host.mass is required, so that the warning cannot be switched off; such a host
-        // uses bias and added_mass anyway.
+        // No warning with a model of detached liquid: host.mass is then required, so that the user could not switch the warning
+        // off, and an importer that uses this model uses bias and added_mass anyway.
         if !is_split || ratio <= LIMIT || self.tank.has_ball() {
             return warnings;
         }

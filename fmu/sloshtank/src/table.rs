@@ -1,4 +1,5 @@
-//! All variables of SloshTank.fmu. The start values are those of `craft::TankParameters::default()`, with the host at rest.
+//! All variables of SloshTank.fmu. The start values are those of `craft::TankParameters::default()`, with the
+//! carrying craft at rest.
 
 use craft::{Coupling, MODES, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, join, scalar_count, scalars};
@@ -30,9 +31,9 @@ impl runtime::Model for Model {
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// With coupling = split the added mass depends neither on a nor on omega_dot, and the bias depends on them only weakly,
-// through the drag. If a host computes both with its last a, it therefore has no algebraic loop. With the other couplings
-// the bias contains a and omega_dot of the previous step.
+// With coupling = split the added mass depends neither on a nor on omega_dot, and the bias depends on them only weakly, through
+// the drag. If the importer computes both from its last a, there is therefore no algebraic loop. With the other couplings the
+// bias contains a and omega_dot of the previous step.
 const WRENCH: &[&str] = &[
     "tank.p",
     "tank.p_dot",
@@ -50,7 +51,7 @@ const EVERYTHING: &[&str] =
 const TANK: &[&str] = &["tank."];
 const SPINS: &[&str] = &["tank.", "omega"];
 const PLACES: &[&str] = &["tank.p", "tank.liquid", "tank.ball.position"];
-// Dependencies of tank.in_range.
+// Inputs and states on which tank.in_range depends directly.
 const MOTION: &[&str] =
     &["tank.p", "tank.p_dot", "tank.liquid", "tank.spin", "a", "omega", "omega_dot"];
 
@@ -225,7 +226,7 @@ const MOTIONS: &[V] = &[
 
 #[rustfmt::skip]
 const OTHERS: &[V] = &[
-    // The host (optional)
+    // Mass properties of the craft that carries the tank (optional)
     V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio and its warning and for the impulses of tank.ball.travel; 0: unknown")
         .range(0.0, 1e9),
     V::parameter("host.r", |p, n| &mut p.host.r[n], "m", "Centre of mass of the host without this tank from O, host axes")

@@ -26,10 +26,10 @@ const LUMP: &str = "the liquid of a tank leaves the bottom and moves on as detac
                     and momenta of crossings are valid. Impact forces, and the motion after an impact, are right only \
                     to an order of magnitude";
 
-/// Detects a Model Exchange host that leaves the reaction −h_w' of the wheels out of the torque: h_wheels changes along an
-/// axis on which torque has always been 0. `torque` is true for each axis on which torque has been different from 0, and
-/// `moved` counts the steps in which h_wheels changed without torque. One such step is accepted, because it may be the end
-/// of a ramp whose torque has already ended.
+/// Detects a wrong use in Model Exchange: h_wheels changes, but the importer has left the reaction −h_w' of the wheels out of
+/// the torque. `torque` is true for each axis on which the torque has been different from 0, and `moved` counts the steps in
+/// which h_wheels changed along an axis without torque. One such step is accepted, because it may be the end of a ramp whose
+/// torque has already ended.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
     torque: [bool; 3],
@@ -57,9 +57,9 @@ impl Wheels {
     }
 }
 
-/// The craft's parameters, with counts as integers for FMI. A host that cannot set enumerations sets `mount_kind` and
-/// `damping_law_kind`, the integer twins of the enumerations `mount` and `tank[].damping_law`, to the number of the item; a
-/// twin that is 0 has no effect.
+/// The craft's parameters, with counts as integers for FMI. An importer that cannot set enumerations sets `mount_kind` and
+/// `damping_law_kind`, the integer twins of the enumerations `mount` and `tank[].damping_law`, to the number of the item; a twin
+/// that is 0 has no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,

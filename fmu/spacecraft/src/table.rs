@@ -34,8 +34,8 @@ const DESCRIPTION: &str = "A rigid spacecraft in six degrees of freedom with up 
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// Direct dependencies. The accelerations depend on all forces. Tension, drag and centring force of the pendulums depend on
-// their directions and rates, and gravity on a pivot depends on the attitude.
+// Inputs and states on which outputs depend directly. The accelerations depend on all forces. Tension, drag and centring force of
+// the pendulums depend on their directions and rates, and gravity on a pivot depends on the attitude.
 const MOTION: &[&str] = &[
     "q",
     "omega",
@@ -86,7 +86,7 @@ const ENERGIES: &[&str] = &[
 ];
 const PLACES: &[&str] = &["tank[].p", "tank[].liquid", "tank[].ball.position", "appendage[].eta"];
 const ANGLES: &[&str] = &["tank[].p"];
-// Dependencies of initial values.
+// Parameters and inputs on which initial values depend.
 const EVERYTHING: &[&str] = &[
     "force",
     "torque",

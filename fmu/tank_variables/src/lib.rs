@@ -8,7 +8,8 @@ pub use runtime::variable::Dimension::{self, Fixed};
 use runtime::variable::Item;
 pub use runtime::variable::{Enumeration, Variable};
 
-/// A model with tanks, whose indices count from 0. Integer parameters are stored as the host has set them.
+/// A model with tanks; the indices of its tanks count from 0. Integer parameters are stored with the values that the importer has
+/// set.
 #[allow(missing_docs)]
 pub trait Tanks: runtime::Dynamics {
     fn tank(p: &Self::Parameters, i: usize) -> &Tank;

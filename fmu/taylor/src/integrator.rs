@@ -96,8 +96,8 @@ pub enum Convergence {
     Decay,
 }
 
-/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and
-/// n + 1, or n + 1 and n + 2. Terms after n are predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
+/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and n + 1, or n
+/// + 1 and n + 2. Terms after n are not computed but predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
 /// divided by its tolerance.
 ///
 /// For the prediction the slower of two decays over two orders is used: t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)),
@@ -189,8 +189,8 @@ pub trait KeptMotion: Motion {
     #[inline(always)]
     fn store_slopes(&mut self, _n: usize, _h: f64) {}
 
-    /// Returns the error of the states over the time `h`, divided by the allowed error, that follows from the difference
-    /// between the derivatives that [`KeptMotion::store_slopes`] has stored and those of the right-hand side.
+    /// Returns the error of the states over the time `h`, divided by the allowed error, that follows from a difference of
+    /// derivatives: the derivatives that [`KeptMotion::store_slopes`] has stored minus those of the right-hand side.
     #[inline(always)]
     fn slope_defect(&self, _h: f64) -> f64 {
         0.0
@@ -337,7 +337,7 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
 #[derive(Clone, Debug)]
 pub struct Expansion {
     orders: usize,
-    /// Number of the lowest orders whose coefficients were overwritten, because other functions have used the
+    /// Number of the lowest orders whose coefficients were overwritten. They are overwritten if another function uses the
     /// motion after the expansion.
     overwritten: usize,
     norms: [f64; ORDER + 1],
@@ -625,7 +625,7 @@ pub fn advance_kept<M: KeptMotion>(
         if is_verified {
             return Ok(());
         }
-        // The next expansion needs the derivatives at the end, too.
+        // The derivatives at the end are computed for the comparison; the next expansion needs them, too.
         if event.is_none() {
             motion.start(moved + length);
             motion.rates(0);
@@ -726,7 +726,7 @@ mod tests {
         fn event(&mut self, n: usize, h: f64) -> Option<f64> {
             let mut above = self.x;
             above[0] -= self.wall?;
-            // If the oscillator starts on the wall, the root at 0 is in the past.
+            // If the oscillator starts on the wall, the root at 0 belongs to the reflection before and is left out.
             let behind = usize::from(above[0] <= 1e-15);
             first_root(&above[behind..=n], h)
         }
@@ -1070,7 +1070,7 @@ mod tests {
         assert_eq!(orders(0.02, 1e-4), MIN_ORDER);
         assert!(orders(0.02, 1e-10) < orders(0.5, 1e-10));
         assert!(orders(0.02, 1e-8) < orders(0.02, 1e-12));
-        // In several successive expansions, each has the order with the fewest operations.
+        // If several expansions follow each other, each has the order that needs the fewest operations.
         let highest = [1e-6, 1e-10, 1e-14].map(|tolerance| orders(50.0, tolerance));
         assert!(highest[0] < highest[1] && highest[2] <= ORDER, "{highest:?}");
     }

@@ -17,7 +17,7 @@ pub trait Number:
     /// Returns a number from coefficients 0 and 1 of a quantity's power series. A [`Dual`] takes coefficient 1 as its
     /// derivative; an `f64` ignores it.
     fn with_slope(value: f64, slope: f64) -> Self;
-    /// Returns the result of the formula: the value of an `f64`, or the derivative of a [`Dual`].
+    /// Returns the value of an `f64`, or the derivative of a [`Dual`].
     fn result(self) -> f64;
     fn value(self) -> f64;
     /// Returns the larger of the number and `floor`. The value is computed as a maximum and not as a choice between

@@ -38,8 +38,8 @@ const ROUNDING: f64 = 2e-14;
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
-/// Smaller errors of a step are replaced by this value. Because of [`LONGER`] this has no effect on the length of the next
-/// step, but it avoids a division by 0 and powers that overflow, which end the process of a host that traps them.
+/// Smaller errors of a step are replaced by this value. Because of [`LONGER`] this has no effect on the length of the next step.
+/// It avoids a division by 0 and overflows of powers, which some importing tools trap and thereby end the process.
 const LEAST_ERROR: f64 = 1e-30;
 
 /// Larger errors of a step are replaced by this value, whose square does not overflow.
@@ -352,7 +352,8 @@ pub fn advance<const D: usize>(
             let change = 0.9 * libm::pow(error, -1.0 / order);
             let best = h * change.clamp(SHORTER, LONGER);
             if error <= 1.0 {
-                // A step that ends with the stretch says less about the length of the next step than the step before.
+                // The last step of a stretch is shortened, so that it says less about the length of the next step than
+                // the step before it.
                 pace.h = if is_last { f64::max(best, pace.h) } else { best };
                 t = if is_last { end } else { t + h };
                 break moved;

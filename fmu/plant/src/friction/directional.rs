@@ -44,7 +44,7 @@ impl OneWay {
         let angle = |j: usize| core::f64::consts::TAU * j as f64 / POINTS as f64;
         let lowest =
             (0..POINTS).map(|j| self.coefficient_at(angle(j))).fold(f64::INFINITY, f64::min);
-        // Between two points B is lower than at the nearer point by at most |B''| (spacing/2)^2 / 2.
+        // Between two points B is lower than at the nearer point by at most |B''| (spacing/2)^2/2.
         let [a1, b1, a2, b2] = self.harmonics.map(f64::abs);
         let bend = a1 + b1 + 4.0 * (a2 + b2);
         lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
@@ -113,7 +113,7 @@ impl DirectionalFactor {
         self.trig.is_some()
     }
 
-    /// Returns the mean of the factor B over the angle, for the hub's direction of rotation.
+    /// Returns the mean over the hub's angle of the factor B for one direction of rotation, the direction of `contact`.
     pub fn mean(&self, contact: Contact) -> f64 {
         self.one_way(contact).mean
     }

@@ -90,8 +90,8 @@ pub trait FrictionLaw {
     }
 }
 
-/// Defines an enumeration of all friction laws and passes each call on to the law that the plant uses. The compiler reports
-/// a missing law, because there must be one for every [`FrictionModel`].
+/// Defines an enumeration of all friction laws, which passes each call of a function of [`FrictionLaw`] on to the law that the
+/// plant uses. The compiler reports a missing law, because there must be one for every [`FrictionModel`].
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
         /// The friction law that the plant uses, with the functions of [`FrictionLaw`].

@@ -72,7 +72,7 @@ impl FrictionLaw for Stribeck {
 
     fn contact_at_rest(&self, [net, _]: [f64; 2], theta: f64, before: Contact) -> Contact {
         let (against_backward, against_forward) = self.holding_torques(theta);
-        // The torque on a hub that has just broken away equals the limit, except for rounding errors.
+        // The torque on a hub at the instant of break-away equals the largest holding torque, except for rounding errors.
         let limit = |hold: f64, from: Contact| {
             if before == from { hold * (1.0 - 1e-12) } else { hold }
         };

@@ -64,7 +64,7 @@ impl SloshMode for Linear {
         }
         self.g_al[n] = self.p.weight(n, ramp, &self.al);
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
-        // If nothing varies, the mode moves along the tangent.
+        // If neither drag nor weight changes in time, the mode moves along the tangent.
         let arm = if ramp { r_t } else { r };
         let mut t = arm * (m * self.g_al[n] + c * l * self.drag[n]);
         let mut j = 0.0;

@@ -131,7 +131,7 @@ impl Spherical {
 
 impl SloshMode for Spherical {
     const UNROLLED: bool = true;
-    // The value of J at the start of the expansion is used; T includes the change of J.
+    // The value of J at the start of the expansion is used throughout, because T includes the effect of its change.
     const MOVES_INERTIA: bool = false;
 
     fn new(p: &Pendulum) -> Self {

@@ -272,8 +272,8 @@ impl SloshMode for ThirdOrder {
 mod tests {
     use super::*;
 
-    /// The range of the model ends at a displacement of one length, or where a tenth of the stiffness of
-    /// a softening spring remains.
+    /// The range of the model ends at a displacement of one length. With a softening spring it ends earlier, where only a tenth
+    /// of the spring's stiffness is left.
     #[test]
     fn the_third_order_model_ends_at_a_displacement_of_one_length_or_at_a_tenth_of_its_stiffness() {
         let outside = |spring: f64, q: [f64; 2]| {

@@ -64,7 +64,8 @@ fn energy_balances_for_every_model_friction_and_damping() {
 
 #[test]
 fn the_dissipated_power_equals_the_rate_at_which_energy_is_lost() {
-    // The central difference of the energy over 2 ms has the error (2 pi f h)^2/6 of the power's change, about 1e-4.
+    // The power is computed as a central difference of the energy over 2 ms, which has the error (2 pi f h)^2/6 of the
+    // power's change, about 1e-4.
     for slosh in SLOSH {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.init.omega, p.init.slosh_angle, p.init.slosh_rate_radial) = (0.1, 0.2, 1.0);
@@ -96,7 +97,7 @@ fn momentum_is_constant_without_torque_and_friction() {
                     break;
                 }
                 let now = plant.outputs(&inputs);
-                // The hub's part of the momentum shows how much momentum is exchanged.
+                // The largest momentum of the hub shows how much momentum hub and liquid exchange.
                 largest = largest.max((now.omega * p.hub.inertia).abs());
                 change = change.max((now.momentum - first.momentum).abs());
             }
@@ -376,8 +377,8 @@ fn random_steps_give_finite_results_or_a_clear_error() {
     while done < count {
         let slosh = SLOSH[rng.usize(0..SLOSH.len())];
         let friction = FRICTION[rng.usize(0..FRICTION.len())];
-        // Half of the plants are the bench, which a torque of 100 N m accelerates by 310 rad/s2. A smaller plant gets a
-        // torque that does not accelerate it more.
+        // Half of the plants are the default bench, which a torque of 100 N m accelerates by 310 rad/s2. The torque on a smaller
+        // plant is limited so that it does not accelerate it more.
         let mut p =
             if rng.bool() { bench(slosh, friction) } else { anywhere(&mut rng, slosh, friction) };
         // The number of modes is random, and usually small, because ten spherical modes are slow.

@@ -54,7 +54,8 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
     all
 }
 
-/// The axial specific force changes linearly; the output `work_axial` is the work of this change.
+/// The axial specific force changes in ramps and jumps. The energy balances if the output `work_axial` is included as the
+/// work of these changes.
 #[test]
 fn energy_balances_with_the_work_of_a_changing_g() {
     for slosh in SloshModel::ALL {
@@ -86,7 +87,7 @@ fn energy_balances_with_the_work_of_a_changing_g() {
     }
 }
 
-/// A jump of g does the work of the change of g times mass times height of hub and liquid. The energy is computed from the
+/// A jump of g does the work jump times mass times height of hub and liquid. The energy is computed in another way, from the
 /// components of gravity across the axis. Both give the same result, and so do their derivatives.
 #[test]
 fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
@@ -170,14 +171,14 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
 fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::None);
-        // The limit allows 20 halvings of g to a millionth, 34 growths by half from there, and the steps
-        // that the motion needs.
+        // The limit of 100 internal steps allows for 20 halvings of g down to a millionth, for 34 steps in which g grows by half
+        // from there, and for the steps that the motion needs.
         p.solver = Solver { max_steps: 100 };
         let inputs = |value, slope| Inputs { g_axial: Ramp { value, slope }, ..Inputs::default() };
         let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, -98.1), 0.1).unwrap();
         plant.step(&inputs(0.0, 98.1), 0.1).unwrap();
-        // The steps are also limited if the end of the ramp is inexact because of the rounding of the clock.
+        // The number of steps is also limited if the end of the ramp is inexact because of rounding of the simulation time.
         let (slope, h) = (-9.81 / 0.3, 0.3);
         let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.1, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, slope), h).unwrap();
@@ -221,7 +222,7 @@ fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
             assert!((changed / started - 1.0).abs() < 0.01, "{g}: {changed} {started}");
             let plant = Plant::new(&p, &inputs_with_gravity(g), 0.0, TOLERANCE).unwrap();
             let zeta = plant.calculated().damping[0];
-            // The definitions of the ratio by energy and by its peaks differ by zeta^2.
+            // The damping ratio by the energy and the damping ratio by its peaks are defined differently and differ by zeta^2.
             assert!((started / zeta - 1.0).abs() < 0.01, "{g}: {started} {zeta}");
             let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
             let [shown, _] = plant.damping_ratio(0, &inputs_with_gravity(g));
@@ -289,7 +290,7 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
             let got = get(&outputs);
             assert!((got - difference).abs() < 1e-6 * (1e-3 + difference.abs()), "{slosh:?} {n}");
         }
-        // Without specific force the derivative does not exist; a finite number is returned.
+        // Without specific force the derivative with respect to g does not exist; a finite number is returned.
         let at_zero = plant.directional_derivative(&inputs_with_gravity(0.0), &none, &du);
         assert!(at_zero.iter().all(|x| x.is_finite()));
         let at_zero = plant.output_derivatives(&inputs_with_gravity(0.0), &none, &du);
@@ -297,8 +298,8 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
     }
 }
 
-/// Simulates a Model Exchange host with fixed steps of Runge-Kutta 4. Returns the residual of the energy balance, divided by
-/// the work of g.
+/// Simulates Model Exchange with fixed steps of a Runge-Kutta method of order 4. Returns the residual of the energy balance,
+/// divided by the work of g.
 fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g(0.0)), 0.0, TOLERANCE).unwrap();
     let energy = plant.outputs_held(&inputs_with_gravity(g(0.0))).energy;
@@ -331,16 +332,15 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     ((o.energy - energy - o.work - o.work_axial + o.heat) / o.work_axial).abs()
 }
 
-/// In a Model Exchange host the residual of the energy balance falls with the host's step size, with the order of its
-/// integrator, because trial evaluations of the integrator do not change `work_axial`.
+/// In Model Exchange the residual of the energy balance falls with the step size, with the order of the integrator, because trial
+/// evaluations of the integrator do not change `work_axial`.
 #[test]
 fn work_of_a_changing_g_is_added_at_accepted_steps_only() {
     for (slosh, tilt) in SLOSHING.into_iter().flat_map(|slosh| [(slosh, 0.0), (slosh, 0.1)]) {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (tilt, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (4.0 * tilt, 2.0);
-        // If g is linear in time, the residual is of fourth order, as the host's integrator; for a sine it
-        // is of second order.
+        // If g is linear in time, the residual is of fourth order, like the integrator; for a sine it is of second order.
         for (order, g) in [
             (4, (|t: f64| 9.0 - 3.0 * t) as fn(f64) -> f64),
             (2, |t: f64| 9.0 + 2.0 * libm::sin(5.0 * t)),

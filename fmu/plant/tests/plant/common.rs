@@ -48,7 +48,7 @@ pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionMo
     p.friction.d = torque * between(0.0, 0.1);
     p.friction.omega_s = between(0.01, 0.5);
     p.friction.eps = 10f64.powf(between(-4.0, -1.0));
-    // The bristles deflect by 10 mrad and have no damping of their own, so that they are passive with any friction.
+    // The bristles have no damping of their own, so that they are passive with any friction. They deflect by 10 mrad.
     p.friction.sigma0 = 100.0 * (p.friction.c + p.friction.d);
     p.friction.sigma1 = 0.0;
     p.friction.asymmetry = between(-0.3, 0.3);

@@ -1,5 +1,5 @@
-//! Steps over rounded corners in the force laws, where power series converge only over short times: the errors must
-//! be within the tolerance.
+//! Steps over rounded corners in the force laws, near which power series converge only over short times. The errors of these
+//! steps must be within the tolerance.
 
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};
@@ -45,9 +45,9 @@ fn table(rng: &mut fastrand::Rng, varies: bool) -> Vec<Row> {
     (0..8).map(row).collect()
 }
 
-/// Returns parameters of the default bench with a random slosh model and friction law. Half of the benches each have drag
-/// that grows with the amplitude, breaking waves, a ring baffle, a tilt, friction that depends on direction and angle, a
-/// spring, and a wheel at its limits.
+/// Returns parameters of the default bench with a random slosh model and friction law. Each of the following has a probability of
+/// one half: drag that grows with the amplitude, breaking waves, a ring baffle, a tilt, friction that depends on direction and
+/// angle, a spring, and a wheel at its limits.
 fn parameters(rng: &mut fastrand::Rng) -> Parameters {
     let slosh = SloshModel::ALL[rng.usize(..SloshModel::ALL.len())];
     let friction = FrictionModel::ALL[rng.usize(..FrictionModel::ALL.len())];
@@ -79,7 +79,8 @@ fn parameters(rng: &mut fastrand::Rng) -> Parameters {
     p
 }
 
-/// Returns the states after each row, or the reason why the motion ends, because large waves leave the range of some models.
+/// Returns the states after each row. Returns the reason instead if the motion ends because large waves leave the range
+/// of the slosh model.
 fn run(p: &Parameters, rows: &[Row], tolerance: f64, longest: f64) -> Result<Vec<f64>, String> {
     let first = rows[0].inputs(0.0);
     let mut plant = Plant::new(p, &first, 0.0, tolerance).map_err(|why| why.join("; "))?;
@@ -100,9 +101,9 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
 }
 
-/// Compares steps that are as long as the rows of the random tables of torque with the exact motion, which is computed in
-/// steps of 1 ms at a tolerance of 1e-13. The allowed error is 30 times the tolerance. Where the motion itself amplifies
-/// errors, the allowed error is multiplied by the growth of a small change of the initial state.
+/// Compares steps that are as long as the rows of random tables of torque with a reference that is computed in steps of 1 ms at a
+/// tolerance of 1e-13. The allowed error is 30 times the tolerance. Where the motion itself amplifies errors, the allowed error
+/// is multiplied by the growth of a small change of the initial state.
 fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
     let (mut worst, mut compared, mut ended) = ((0.0, 0, 0.0), 0, 0);
     for seed in seeds {

@@ -165,9 +165,9 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     }
 }
 
-/// The damping ratio that follows from each decrement is zeta + zeta_b max(0, k a - s_b). The tested steepness is 0.1 away
-/// from the onset s_b, where the rounded corner changes zeta by 1 %. In a nonlinear model the amplitude varies within a
-/// period by the relative amount A^2/16, as for a pendulum.
+/// The damping ratio that follows from each decrement is zeta + zeta_b max(0, k a - s_b). The tested steepness differs by 0.1
+/// from the onset s_b. At this difference the rounded corner changes zeta by 1 %. In a nonlinear model the amplitude varies
+/// within a period by the relative amount A^2/16, as for a pendulum.
 #[test]
 fn breaking_adds_damping_above_the_steepness_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -193,7 +193,7 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
     }
 }
 
-/// Without other damping, the dissipated power is the power of breaking waves, from far above the onset to rest.
+/// Without other damping, the dissipated power equals the power that breaking waves lose, from far above the onset to rest.
 /// It is never negative.
 #[test]
 fn breaking_waves_only_dissipate_energy() {

@@ -30,7 +30,7 @@ fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
 }
 
 fn gain(system: &([[f64; 4]; 4], [f64; 4]), f: f64) -> f64 {
-    // Nothing depends on theta, so that three complex equations remain, which Cramer's rule solves.
+    // Nothing depends on theta. Therefore three complex equations remain, which are solved by Cramer's rule.
     let (a, b) = system;
     type C = (f64, f64);
     let mul = |x: C, y: C| (x.0 * y.0 - x.1 * y.1, x.0 * y.1 + x.1 * y.0);
@@ -106,8 +106,8 @@ fn errata_a1_energy_and_momentum_of_released_liquid_do_not_grow() {
 
 #[test]
 fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
-    // In quasi-static acceleration F = -m_liq r w'. The printed D = sum m_i - m_0 leaves the modal masses out, which gives
-    // -1.33 instead of -2.09 kg at 10 cm.
+    // In quasi-static acceleration F = -m_liq r w'. The printed D = sum m_i - m_0 leaves out the modal masses in the sum with
+    // m_0, which gives -1.33 instead of -2.09 kg at 10 cm.
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 0.5;
@@ -117,7 +117,7 @@ fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
     inputs.tau_cmd = Ramp::held(0.1);
     let o = plant.outputs(&inputs);
     let mass = -o.f_tangential / (p.tank.r * o.omega_dot);
-    // The delay because of the ramp is 2 zeta/(omega_n t) = 7e-4 of the modal mass.
+    // The ramp delays the liquid, which changes the result by 2 zeta/(omega_n t) = 7e-4 of the modal mass.
     assert!((mass / plant.calculated().m_liq - 1.0).abs() < 1e-3, "{mass}");
 }
 

@@ -1,4 +1,4 @@
-//! Tests of the event indicators and events of the plant in a Model Exchange host, which integrates the states itself.
+//! Tests of the plant's event indicators and events in Model Exchange, in which the importing tool integrates the states.
 
 use super::common::bench;
 use plant::{
@@ -10,8 +10,8 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// At the limit of the static friction the bearing still holds the hub. When the event has been handled, the hub turns, and
-/// no event is overdue.
+/// At the limit of the static friction the bearing still holds the hub. After the break-away event has been handled the hub
+/// turns, and no event is overdue.
 #[test]
 fn after_a_break_away_no_event_is_overdue() {
     let p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
@@ -84,7 +84,7 @@ fn indicators_of_the_wheel_are_distances_to_its_limits() {
     assert_eq!(z[indicator::TORQUE_SIGN], 0.1);
     assert_eq!(z[indicator::SPEED_MAX], p.wheel.speed_max - p.wheel.speed_0);
     assert_eq!(z[indicator::SPEED_MIN], p.wheel.speed_0 - p.wheel.speed_min);
-    // If a host has integrated past a speed limit, the event sets the rotor's speed to the limit.
+    // If the integrator has passed a speed limit, the event sets the rotor's speed to the limit.
     for (beyond, limit) in [
         (p.wheel.speed_max + 1e-6, p.wheel.speed_max),
         (p.wheel.speed_min - 1e-6, p.wheel.speed_min),
@@ -119,8 +119,8 @@ fn the_gyros_samples_are_time_events() {
     assert!((next - 3.1).abs() < 1e-15, "all overdue samples must have been taken");
 }
 
-/// The derivatives with respect to each state are also tested where the outputs are strongly nonlinear. If the direction is
-/// 100 times as long, the derivatives are 100 times as large, and they equal the change by a small step.
+/// The derivatives with respect to each state are also tested where the outputs are strongly nonlinear. If the direction of the
+/// derivative is 100 times as long, the derivatives are 100 times as large, and they equal the change by a small step.
 #[test]
 fn output_derivatives_are_linear_in_each_direction() {
     for slosh in SloshModel::ALL {
@@ -189,7 +189,7 @@ fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
         let left = start + 2.0 * rest - plant.time();
         assert_eq!(plant.step_to_event(&torque(-0.001), left).unwrap(), StepEnd::End);
         assert_eq!(plant.time(), start + 2.0 * rest);
-        // An event after the end of the step does not stop the step.
+        // An event after the requested end of a step does not stop the step.
         let mut plant = Plant::new(&p, &torque(-0.001), start, 1e-9).unwrap();
         let end = plant.step_to_event(&torque(-0.001), 0.9 * rest).unwrap();
         assert_eq!((end, plant.stopped()), (StepEnd::End, None));
@@ -253,7 +253,7 @@ fn continuing_after_events_equals_one_whole_step() {
         let all = stops(&mut stopped, &inputs, 2.015625);
         assert!(all.len() > 50, "{slosh:?}: {}", all.len());
         assert_eq!(whole.state().to_words(), stopped.state().to_words(), "{slosh:?}");
-        // At each event the plant is saved and another plant resumes.
+        // At each event the plant is saved, and another plant continues from the saved state.
         let (mut saved, mut count) = (fresh(), 0);
         while saved.time() < 2.015625 {
             let (state, words) = (*saved.state(), saved.stopped().map(StoppedStep::to_words));
@@ -270,8 +270,9 @@ fn continuing_after_events_equals_one_whole_step() {
     }
 }
 
-/// If the step after a stop has another end or another torque, it is a new step from the present state, which
-/// finds its own events.
+/// A step that stops at an event is usually continued by a step with the same end and the same torque, which skips this event. If
+/// the next step has another end or another torque instead, it is a new step from the present state, and it finds the same events
+/// as a plant that has never stopped.
 #[test]
 fn after_a_stop_at_an_event_a_step_with_another_end_or_torque_is_a_new_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -292,7 +293,7 @@ fn after_a_stop_at_an_event_a_step_with_another_end_or_torque_is_a_new_step() {
         assert_eq!(plant.state().to_words(), fresh.state().to_words(), "{inputs_then:?} {h}");
         assert_eq!(plant.stopped(), fresh.stopped(), "{inputs_then:?} {h}");
     }
-    // The end of the step may differ by the rounding of its computation.
+    // The end of the continued step may differ from the end of the whole step by rounding.
     let mut plant = Plant::new(&p, &inputs, 0.0, 1e-8).unwrap();
     let mut whole = plant.clone();
     whole.step(&inputs, 0.1).unwrap();

@@ -101,7 +101,7 @@ fn dissipation_becomes_negative_only_if_sigma1_is_above_its_limit() {
 
 #[test]
 fn stiff_lugre_bristles_approach_the_set_valued_law() {
-    // The torque is a sine, which the hub follows with sliding, reversal and rest.
+    // The torque is a sine. The hub follows it with sliding, reversal and rest.
     let run = |model: FrictionModel, sigma0: f64| {
         let mut p = bench(SloshModel::Linear);
         p.friction.model = model;
@@ -179,8 +179,8 @@ fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
     }
 }
 
-/// Before a hub with LuGre friction slides, its torque as a function of the deflection is a hysteresis loop, which is closed
-/// from the second cycle on.
+/// Before a hub with LuGre friction slides, its friction torque as a function of the deflection is a hysteresis loop, which is
+/// closed from the second cycle on.
 #[test]
 fn friction_before_sliding_follows_a_closed_hysteresis_loop() {
     let mut p = bench(SloshModel::Frozen);
@@ -268,7 +268,8 @@ fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     assert!(o.omega.abs() < 1e-8, "{}", o.omega);
     assert!((o.tau_friction + 0.002).abs() < 1e-7, "{}", o.tau_friction);
     assert!((plant.continuous_states()[x::BRISTLE] - 0.002 / 200.0).abs() < 1e-9);
-    // The hub is at rest at first, under a torque that falls from 0: the contact has the right direction at once.
+    // At first the hub is at rest under a torque that falls from 0. The contact must have the direction of the
+    // following motion at once.
     let mut plant = Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).unwrap();
     let mut mirrored = plant.clone();
     let ramp = |slope| Inputs { tau_cmd: Ramp { value: 0.0, slope }, ..Inputs::default() };

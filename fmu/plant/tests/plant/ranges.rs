@@ -162,8 +162,8 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     }
 }
 
-/// For every reason there is a plant just beyond the limit, and one just within it. The bench's cylinder has h/R = 1.227,
-/// with relative changes of omega^2 by -0.429 and +0.367 times the squared angle.
+/// For every reason the test has a plant just beyond the limit, and a plant just within it. The bench's cylinder has h/R = 1.227;
+/// there omega^2 changes by the factors 1 - 0.429 A^2 in planar motion and 1 + 0.367 A^2 in circular motion.
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {

@@ -43,7 +43,7 @@ fn errors_of_states_stay_within_the_solver_tolerance() {
                 let found = after(&p, &inputs, tolerance, 2.0);
                 let off = found.iter().zip(exact).map(|(a, b)| (a - b).abs());
                 let off = off.fold(0.0, f64::max);
-                // The test is for rates of 3 rad/s; a step may have an error of a hundredth of the tolerance.
+                // The states have rates of about 3 rad/s, and the error of a step may be a hundredth of the tolerance.
                 assert!(off < 0.1 * tolerance, "{slosh:?} {friction:?} {tolerance:e}: {off:e}");
             }
         }
