@@ -169,8 +169,8 @@ fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
         "fmu/runtime/src/v3/model_exchange.rs",
         "fmu/runtime/src/v3/stepping.rs",
         "fmu/runtime/src/v3/values.rs",
-        "harness/host/src/c_abi.rs", // and its submodules
-        "harness/host/src/fmi2.rs",  // and its submodules
+        "harness/host/src/c_abi.rs", // this file and its submodules
+        "harness/host/src/fmi2.rs",  // this file and its submodules
         "harness/host/src/fmi3.rs",
         "harness/native/src/instance.rs",
         "harness/native/src/numbers.rs",
@@ -294,7 +294,7 @@ fn textual_errors(file: &str, code: &str) -> Vec<String> {
         if tokens[at] != "Result" || tokens.get(at + 1) != Some(&"<") {
             continue;
         }
-        // the arguments of the type, each as a list of tokens
+        // Collect the arguments of the type, each as a list of tokens.
         let (mut depth, mut arguments) = (1, vec![Vec::new()]);
         for token in &tokens[at + 2..] {
             depth += i32::from(matches!(*token, "<" | "(" | "["));
@@ -562,8 +562,8 @@ fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTr
     left
 }
 
-/// Crates whose modules import an item from the module that defines it, and not through a re-export of the crate's
-/// root. The root imports every module, so that a module which imports from the root would be in a cycle with it.
+/// Crates in which modules must import an item from the module that defines it, and not through a re-export of the crate's root.
+/// The root imports every module, so that a module which imports from the root would be in a cycle with it.
 const NAMED_AT_HOME: [&str; 17] = [
     "fmu/plant",
     "fmu/craft",
@@ -640,7 +640,7 @@ fn circular_imports_are_found_in_every_form() {
         let found = modules(&crate_of(&files)).remove(&vec!["one".into()]).unwrap_or_default();
         assert_eq!(circles(found).len(), 2, "{way}");
     }
-    // an import in one direction, and another through the folder
+    // one/first names one/second, and one/second names an item of their common folder: this is no cycle.
     let files = [("one/first", "use super::second::C;"), ("one/second", "use super::Kept;")];
     assert!(modules(&crate_of(&files)).into_values().all(|beside| circles(beside).is_empty()));
 }

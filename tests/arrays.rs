@@ -34,7 +34,7 @@ struct Variable {
     reference: u32,
     kind: String,
     causality: String,
-    /// Lengths of the dimensions, or value references of the parameters that determine the lengths.
+    /// Length of each dimension, or the value reference of the structural parameter that determines the length.
     dimensions: Vec<Result<usize, u32>>,
     xml: Element,
 }
@@ -71,7 +71,7 @@ impl Variable {
             all = all.iter().flat_map(|head| (1..=length).map(move |n| longer(n)(head))).collect();
         }
         let name = key(&self.name).0;
-        // The name of a scalar contains its indices.
+        // For the layout with scalars, the name itself contains the indices.
         let own = key(&self.name).1;
         all.into_iter().map(|indices| (name.clone(), [&own[..], &indices].concat())).collect()
     }
@@ -451,7 +451,7 @@ fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let there = three.all_values();
     let state = three.instance.get_state().unwrap();
     let bytes = three.instance.serialize(&state).unwrap();
-    // restored in an instance of another size, which then gets the size of the state
+    // The state is restored in an instance with arrays of another size, which then get the size in the state.
     let mut one = opened[0].instance(Interface::CoSimulation);
     let state = one.instance.deserialize(&bytes).unwrap();
     one.instance.set_state(&state).unwrap();
@@ -508,7 +508,7 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
         let expected =
             scalars.instance.adjoint_derivative(&of_rows, &of_columns, &weights, columns.len());
         assert_eq!(along.unwrap(), expected.unwrap(), "{}", case.model.name);
-        // derivatives of the outputs, with an order for each array
+        // Time derivatives of the outputs; the call has one order for each array.
         let outputs: Vec<_> =
             unknown.iter().filter(|v| v.causality == "output").map(|v| v.reference).collect();
         let keys = elements(&outputs, arrays);
@@ -521,7 +521,7 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
             .unwrap();
         scalars.instance.output_derivatives(&of_keys, &orders, &mut rates[1]).unwrap();
         assert_eq!(rates[0], rates[1]);
-        // the dependencies of each element at this point
+        // Dependencies of each element of the unknowns at this point.
         for v in &unknown {
             let found = arrays.instance.dependencies(v.reference).unwrap();
             let own = v.keys(&arrays.sizes);
@@ -711,8 +711,8 @@ fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
                 run.instance.update_discrete_states().unwrap();
                 run.instance.enter_continuous_time_mode().unwrap();
             }
-            // the states from attitude to dissipation, and drained; for each tank one mode, liquid, ball and
-            // spin; eta and eta_dot
+            // The continuous states are those from attitude to dissipation, and drained; for each tank one mode, liquid, ball and
+            // spin; and eta and eta_dot.
             let counts = two.each_mut().map(|run| run.instance.number_of_states().unwrap());
             assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6 + 3) + 2 * 3, 140]);
             let counts = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());

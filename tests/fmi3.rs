@@ -82,7 +82,7 @@ fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_in_every_event_config
     }
 }
 
-/// Tests arrays as FMPy passes them, and with sizes set in configuration mode, which FMPy leaves to its users.
+/// Tests arrays as FMPy passes them. Also tests array sizes that are set in configuration mode, which FMPy does not do by itself.
 const FMPY_ARRAYS: &str = r#"
 import shutil
 import sys

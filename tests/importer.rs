@@ -115,7 +115,7 @@ fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
     theirs.enter_continuous_time_mode().unwrap();
     ours.enter_continuous_time_mode().unwrap();
 
-    // Euler's method in both
+    // Both hosts integrate by Euler's method.
     let (mut x, mut y) = ([0.0; STATES], [0.0; STATES]);
     let (mut dx, mut dy) = ([0.0; STATES], [0.0; STATES]);
     let (mut z, mut w) = ([0.0; INDICATORS], [0.0; INDICATORS]);
@@ -148,7 +148,7 @@ fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
             ours.enter_continuous_time_mode().unwrap();
         }
     }
-    // The crate requires as many unknowns as knowns.
+    // The crate requires as many unknowns as knowns, so that one of each is used.
     let (unknowns, knowns) = (references(&fmu, &["omega_dot"]), references(&fmu, &["tau_cmd"]));
     let mut answer = [0.0];
     theirs.get_directional_derivative(&unknowns, &knowns, &[1.0], &mut answer).unwrap();
@@ -175,8 +175,8 @@ mod fmi3 {
 
     use super::{SPHERICAL, bits, start_instance};
 
-    /// Imports the FMU with the crate fmi. It gets a copy of the description without units and nominal values of variables,
-    /// because version 0.8 of the crate's schema does not know these attributes, which the standard defines (2.4.7.5).
+    /// Imports the FMU 3.0 with the crate fmi. The crate gets a copy of the description without units and nominal values of
+    /// variables, because version 0.8 of its schema does not know these attributes, although the standard defines them (2.4.7.5).
     fn import(model: &Model) -> (Fmi3Import, ModelDescription) {
         let packed = packed_version_for_tests(model, Fmi::V3);
         let copy = tempfile::NamedTempFile::new().unwrap();
@@ -198,7 +198,7 @@ mod fmi3 {
                     let attributes = ["unit=", "displayUnit=", "nominal="];
                     !is_real || !attributes.iter().any(|name| part.starts_with(name))
                 };
-                // Inside a text no quote follows a space and a name.
+                // Splitting at spaces is safe, because no text of the description contains one of these names and a quote.
                 let parts: Vec<&str> = line.split(' ').filter(known).collect();
                 writeln!(to, "{}", parts.join(" ")).unwrap();
             }
@@ -212,7 +212,7 @@ mod fmi3 {
         names.iter().map(|name| description.variable(name).unwrap().reference).collect()
     }
 
-    /// Enters and leaves event mode, in which nothing may happen.
+    /// Enters and leaves event mode, in which no event may be due.
     fn pass_event_mode(instance: &mut impl Common) {
         let mut flags = EventFlags::default();
         instance.update_discrete_states(&mut flags).unwrap();

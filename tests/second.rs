@@ -59,7 +59,7 @@ fn a_minimal_fmu_needs_only_a_table_and_a_model() {
         Command::new(harness()).arg("check").arg(&fmu),
         "hubslosh check found errors in the second FMU",
     );
-    // It is built for this machine only, so that it may need a newer glibc than the released FMUs.
+    // The library is built for this machine only, and may therefore need a newer glibc than the released FMUs.
     assert!(report.contains(" 0 errors, "), "{report}");
     run(Command::new(python()).args(["-c", FMPY]).arg(&fmu), "fmpy and the second FMU disagree");
 }

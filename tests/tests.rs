@@ -16,7 +16,7 @@ mod life {
     mod instance;
 }
 mod physics {
-    // the file of the crate `plant`, unchanged
+    // The file is shared with the crate `plant`.
     #[path = "../../fmu/plant/tests/plant/free_oscillation.rs"]
     mod free_oscillation;
     mod liquid;

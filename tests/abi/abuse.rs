@@ -113,7 +113,7 @@ fn letter(variable: &Variable) -> char {
 #[derive(Clone, Copy)]
 struct Share {
     of: &'static str,
-    /// Number of instances that exist at the same time, and number of times the library is loaded.
+    /// Arguments of `life.c`: the number of instances that exist at the same time, and the number of times the library is loaded.
     lives: [&'static str; 2],
     pairs: usize,
 }
@@ -179,8 +179,8 @@ fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
     }
 }
 
-/// Tests which functions are allowed in which mode (`modes.c`). `names` are an output, a variable that depends directly
-/// on an input, this input, an Integer, an enumeration and a Boolean.
+/// Tests in which mode each function is allowed (`modes.c`). `names` are an output, a variable that depends directly on an input,
+/// this input, an Integer, an enumeration and a Boolean.
 fn check_functions_in_every_mode(model: &pack::Model, names: [&str; 6], sets: bool) {
     let fmu = Unpacked::new(model, Fmi::V3);
     run(
@@ -245,7 +245,7 @@ fn check_random_calls<M: runtime::Model>(inputs: u32) {
         }
         let said = run(&mut host, "the hostile host broke the FMU, or the FMU broke its promise");
         print!("{name}, {layout:?}: {said}");
-        // If few calls were accepted, the random calls would prove nothing.
+        // If the FMU had accepted only few of the random calls, the test would prove nothing.
         assert!(number(&said, " accepted") > 0.1 * number(&said, " calls"), "{said}");
     }
 }
@@ -396,7 +396,7 @@ fn check_that_no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     let expected = 2 * (settings + share.pairs);
     assert_eq!(number(&said, " runs"), expected as f64, "{said}");
     assert!(number(&said, " with no number") > 0.0, "{said}");
-    // A model may refuse contradicting values. If more were refused, the test would prove less.
+    // A model may refuse contradicting values. If it refused more runs than this, the test would prove less.
     assert!(number(&said, " refused") <= 0.5 * number(&said, " runs"), "{said}");
 }
 
@@ -600,8 +600,8 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// Runs all tests of this file in both versions of FMI, whereas `cargo test` runs each test in one version. The run
-/// takes minutes and is started by hand.
+/// Runs all tests of this file in both versions of FMI, whereas `cargo test` runs each test in one version only. This takes
+/// minutes, so that the test is ignored by default.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
@@ -625,7 +625,7 @@ fn abuse_tests_run_in_both_versions_of_fmi() {
 #[ignore = "three seconds: .ci/long-tests"]
 fn handles_of_other_libraries_or_versions_and_freed_or_random_handles_are_errors() {
     if under_valgrind() {
-        return; // valgrind would report the read of a freed instance's mark
+        return; // valgrind would report that the mark of a freed instance is read
     }
     for fmi in VERSIONS {
         let all: Vec<Unpacked> =
@@ -648,8 +648,8 @@ fn handles_of_other_libraries_or_versions_and_freed_or_random_handles_are_errors
     }
 }
 
-/// Stack that an FMU needs, kB: to instantiate and initialise, and for steps. The book's page on real time states these
-/// numbers. They depend on the compiler, so that they are a quarter above the measured values.
+/// Largest stack that an FMU needs, kB: first to instantiate and initialise, then for steps. The book's page on real time states
+/// these numbers. They depend on the compiler, so that they are a quarter above the measured values.
 #[cfg(target_os = "linux")]
 const STACK: [(&str, [u32; 2]); 3] =
     [("HubSlosh", [64, 23]), ("Spacecraft", [156, 112]), ("SloshTank", [122, 66])];
@@ -706,8 +706,8 @@ const STEPS: usize = 250;
 
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
-/// Returns the bits of all Reals, ten times in 5 s of a motion, in a host with another floating-point environment. The
-/// motion is bit-identical in both versions of FMI, whether the FMU handles events or, in FMI 3.0, the host.
+/// Returns the bits of all Reals, at ten instants within 5 s of a motion, in a host with another floating-point environment.
+/// Asserts that the motion is bit-identical in both versions of FMI, and in FMI 3.0 whether the FMU or the host handles events.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn check_that_rounding_changes_only_last_digits(model: &str, settings: Settings) {
     if under_valgrind() {
@@ -830,7 +830,7 @@ fn random_values_of_variables_give_finite_results_or_an_error() {
     values::<SloshTank::Model>(8);
 }
 
-/// Runs sequences of calls by hosts whose clocks have different rounding errors (`fmu/fuzz/src/clocks.rs`).
+/// Runs sequences of calls by hosts whose simulation times have different rounding errors (`fmu/fuzz/src/clocks.rs`).
 fn clocks(sequences: [usize; 3]) {
     fn play<M: runtime::Model>(sequences: usize) {
         let mut rng = fastrand::Rng::with_seed(3);

@@ -182,7 +182,7 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
         .map(|s| s.to_string())
         .collect();
     assert_eq!(expected.len(), 44);
-    // The library serves both versions; the model description determines the version that a host uses.
+    // The library contains the functions of both versions; the model description that a host reads determines the version.
     let expected = &expected | &fmi3_functions();
     for name in binaries {
         let mut bytes = Vec::new();
@@ -223,7 +223,7 @@ fn the_binary_can_be_loaded_and_unloaded_many_times() {
         let fmu = open();
         let mut instance = stepping(&fmu, &[]);
         instance.do_step(0.0, 0.1).unwrap();
-        // A panic hook that was left behind would point to code that is no longer loaded.
+        // A panic hook that is still installed after unloading would point to code that is no longer loaded.
         assert_refused(instance.do_step(f64::NAN, 0.1), &[]);
     }
 }
@@ -729,12 +729,12 @@ fn an_experiment_with_invalid_times_is_refused() {
     instance.setup_experiment(Some(1e-6), 0.0, Some(1.0)).unwrap();
 }
 
-/// A torque of 1e12 N·m for 1e200 s needs more integration steps than `solver.max_steps` allows: fmi2DoStep returns
-/// fmi2Error, the state stays that of the start, and the instance can only be terminated or reset.
+/// A torque of 1e12 N·m for 1e200 s needs more integration steps than `solver.max_steps` allows: fmi2DoStep returns fmi2Error,
+/// the instance keeps the state that it had before the step, and it can only be terminated or reset.
 #[test]
 fn a_diverging_run_is_an_error() {
     let fmu = open();
-    // The motion is so fast and so long that no number of integration steps is enough.
+    // The hub rotates so fast, and the step is so long, that no allowed number of integration steps is enough.
     let mut instance = stepping(&fmu, &[("slosh.model", "frozen"), ("tau_cmd", "1e12")]);
     assert_refused(
         instance.do_step(0.0, 1e200),

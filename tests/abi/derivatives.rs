@@ -8,8 +8,8 @@ use host::description::{ModelDescription, Type, Value, Variable};
 use host::fmi3::{Fmu, Instance, Interface};
 use pack::{Fmi, model, packed_version_for_tests};
 
-/// Rounding error of a sum, relative to the sum of the magnitudes of its products. There are up to 100 products, and
-/// each number of the Jacobian is itself rounded.
+/// Rounding error of a sum of up to 100 products, relative to the sum of the magnitudes of the products. The numbers of the
+/// Jacobian in these products have rounding errors as well.
 const ROUNDING: f64 = 1e-13;
 /// Error of central differences of order 4 with a step of 1e-3 of a known's size. The truncation error is (1e-3)^4 of
 /// the fifth derivative; the rounding error is 1e-16/1e-3, or more if large terms cancel in a value.
@@ -24,7 +24,7 @@ fn open(name: &str) -> Fmu {
 struct Sides {
     unknowns: Vec<u32>,
     knowns: Vec<u32>,
-    /// Number of knowns that are inputs. The inputs come first, then the states.
+    /// Number of knowns that are inputs. In the list of knowns the inputs come first, then the states.
     inputs: usize,
     names: Vec<String>,
 }
@@ -74,7 +74,7 @@ impl Point<'_, '_> {
         values
     }
 
-    /// Returns the unknowns at the point whose knowns are moved by `s` in a direction.
+    /// Returns the unknowns after the knowns have been moved by `s` times `direction` from the point.
     fn unknowns_at(&mut self, s: f64, direction: &[f64]) -> Vec<f64> {
         let there: Vec<f64> = self.x.iter().zip(direction).map(|(x, d)| x + s * d).collect();
         self.go(&there, direction);
@@ -115,7 +115,7 @@ impl Point<'_, '_> {
             sizes.iter().map(|size| size * (2.0 * rng.f64() - 1.0)).collect()
         };
         let direction = random(&self.sizes);
-        // Each unknown is weighted by the inverse of its change along the direction.
+        // Each unknown is weighted by the inverse of its change along the direction, so that all unknowns count equally.
         let forward = self.forward(&direction);
         // Derivatives are linear in the seed; a factor of two is exact in every product.
         let none = self.forward(&vec![0.0; direction.len()]);
@@ -175,7 +175,7 @@ impl Point<'_, '_> {
             let (mut by_differences, mut size) = (0.0, 0.0);
             let mut by_forward = 0.0;
             for i in 0..forward.len() {
-                // The function has the shape of a cone here; differences across its tip have no meaning.
+                // wave_height as a function of the slosh angles is a cone; differences across its tip have no meaning.
                 let is_tip = [&p2, &p1, &m1, &m2].iter().any(|p| p[i] < 5e-3);
                 if sides.names[i] == "wave_height" && is_tip {
                     by_forward += weights[i] * forward[i];

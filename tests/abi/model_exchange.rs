@@ -99,7 +99,7 @@ impl<'fmu> Host<'fmu> {
             let is_due = due <= (self.time + h).min(end);
             let goal = if is_due { due } else { (self.time + h).min(end) };
             let before = self.indicators(self.time, &self.x.clone());
-            // A sign change that begins at zero has just been handled.
+            // An indicator that starts at zero belongs to an event that was just handled, so that it does not count.
             let crosses =
                 |z: &[f64; INDICATORS]| before.iter().zip(z).any(|(before, z)| before * z < 0.0);
             let mut length = goal - self.time;
@@ -147,7 +147,8 @@ fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()
 }
 
-/// Runs the host and Co-Simulation to `end`, compares all values once a second, and returns the numbers of events of the host.
+/// Runs the host and Co-Simulation to `end`, and compares all values once a second. Returns the numbers of events that
+/// the host has handled.
 fn compare(
     settings: &[(&str, &str)],
     changes: Changes,
@@ -190,8 +191,8 @@ fn compare(
     (host.events, count as i32)
 }
 
-/// At 15 rad/s, order 4 with 0.5 ms has a phase lag of omega (omega h)^4/120 = 4e-10 rad per second, that is 1e-8 after
-/// 20 s. Forces are some newtons, slosh rates some rad/s.
+/// The Runge-Kutta method of order 4 with steps of 0.5 ms has, at 15 rad/s, a phase lag of omega (omega h)^4/120 = 4e-10 rad per
+/// second, that is 1e-8 after 20 s. Forces are some newtons, slosh rates some rad/s.
 #[test]
 fn a_model_exchange_host_equals_co_simulation_with_stick_and_slip() {
     for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
@@ -307,7 +308,7 @@ fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
         let got = host.instance.real("theta").unwrap();
         worst.push((got - own.real("theta").unwrap()).abs());
     }
-    // (omega_1 h)/2 of the energy per radian: one per cent at 50 us after 5 s
+    // The error of the energy is (omega_1 h)/2 per radian, which is one per cent after 5 s in steps of 50 us.
     assert!(worst[1] < 1e-3 && worst[1] < 0.7 * worst[0], "{worst:?}");
 }
 
@@ -470,7 +471,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     }
     for (name, expected) in values(&mut own) {
         let got = exchanged[&name];
-        // the tolerance of the test with stick and slip above
+        // This is the tolerance of the test with stick and slip above.
         let allowed = 1e-7 * expected.abs().max(1.0);
         assert!((got - expected).abs() <= allowed, "{name}: {got} {expected}");
     }
@@ -556,7 +557,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     late.new_discrete_states().unwrap();
     assert_eq!(values(&mut late), values(&mut early));
     assert_eq!(late.get("event_count").unwrap(), Value::Integer(0));
-    // This is now an event like any other; restoring a state restores the first event mode.
+    // Event mode is now entered as usual, so that parameters are refused; restoring a state restores the first event mode.
     assert!(late.set("init.slosh_angle", "0.2").is_err());
     let bytes = late.serialize(&saved).unwrap();
     let read = late.deserialize(&bytes).unwrap();
@@ -601,7 +602,7 @@ fn a_refused_event_leaves_the_parameters_to_be_corrected() {
     with.kind = MODEL_EXCHANGE;
     let mut instance = fmu.instantiate_with(&with).unwrap();
     instance.set("imu.enabled", "true").unwrap();
-    // so late that a step to the next sample does not change the time
+    // The time is so large that a step to the next gyro sample does not change it.
     instance.setup_experiment(None, 1e16, None).unwrap();
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();

@@ -554,9 +554,9 @@ fn bytes_that_are_not_a_saved_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
-/// A gyro sample is due at the end of each of these steps. It must not come one step late because of the difference
-/// between the sum of the steps and the host's clock, 1e-11 s after 52 s. The rate changes by 1e-3 rad/s per step; the
-/// allowed part of a period causes 1e-6 of this change.
+/// A gyro sample is due at the end of each of these steps. It must not come one step late because of the difference between the
+/// sum of the steps and the host's times, 1e-11 s after 52 s. The rate changes by 1e-3 rad/s per step. The gyro may take a sample
+/// a millionth of a period early, which changes the reading by a millionth of this.
 #[test]
 fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies() {
     let h = 0.01;
@@ -641,7 +641,7 @@ fn output_derivatives_equal_differences_of_the_outputs() {
                 after.push(real(&mut other, scalar.variable.name));
             }
             let now = real(&mut instance, scalar.variable.name);
-            // one-sided difference of second order
+            // This is a one-sided difference of second order.
             let moved = (4.0 * (after[0] - now) - (after[1] - now)) / (2.0 * h);
             let size = derivative.abs().max(now.abs()).max(1e-3);
             // The gyro takes no sample during this time.
@@ -752,7 +752,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|k| at(k * h));
     for (n, answer) in answers.iter().enumerate() {
         let name = TABLE.scalars[unknowns[n] as usize].name();
-        // The function has the shape of a cone here; differences across its tip have no meaning.
+        // wave_height as a function of the slosh angles is a cone; differences across its tip have no meaning.
         if name == "wave_height" && [p2[n], p1[n], m1[n], m2[n]].iter().any(|x| *x < 5e-3) {
             continue;
         }
@@ -836,7 +836,7 @@ fn only_friction_parameters_can_be_changed_between_steps() {
         assert!(try_set(&mut instance, name, value).is_err(), "{name}");
         assert_eq!(to_bytes(&instance), before, "{name}");
     }
-    // brakes the hub
+    // The friction brakes the hub.
     set(&mut instance, &[("friction.c", Value::Real(10.0))]);
     instance.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut instance, "omega"), 0.0);

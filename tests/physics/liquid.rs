@@ -7,8 +7,9 @@ use plant::SloshModel;
 
 use super::free_oscillation::shifts;
 
-/// The plant uses eight excited modes of each azimuthal number. Ten times as many change s and kappa by less than 1e-4 of
-/// their values. Near a secondary resonance both coefficients, and therefore this difference, grow without bound.
+/// The plant's coefficients s and kappa include eight excited modes of each azimuthal number. Ten times as many modes would
+/// change s and kappa by less than 1e-4 of their values. Near a secondary resonance both coefficients, and therefore this
+/// difference, grow without bound.
 #[test]
 fn coefficients_of_the_model_equal_those_of_potential_flow() {
     let all = Overlaps::new(60);

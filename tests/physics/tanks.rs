@@ -36,9 +36,9 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The bench's cylinder is described in three ways: by its dimensions, by the closed form of `hubslosh tank`, and by
-/// its contour through the boundary integral equation. Masses and lengths agree to 1e-11, and the motion over 10 s to
-/// the integrator's tolerance times the growth of a small change in rotary motion.
+/// The bench's cylinder is described in three ways: by its dimensions, by the closed form of `hubslosh tank`, and by its contour,
+/// for which a boundary integral equation is solved. Masses and lengths agree to 1e-11. The motions over 10 s agree to the
+/// integrator's tolerance times the growth of a small change in rotary motion.
 #[test]
 fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
     for model in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
@@ -81,7 +81,7 @@ fn a_box_takes_liquid_along_about_its_vertical_axis() {
         let inputs = Inputs { tau_cmd: Ramp::held(1e-3), ..Inputs::default() };
         Plant::new(&p, &inputs, 0.0, 1e-9).unwrap().outputs(&inputs).omega_dot
     };
-    // If the tank is on the axis itself, only the liquid's own inertia counts.
+    // If the tank is on the hub's axis, only the liquid's own inertia counts.
     let [without, with] = [0.0, own].map(acceleration);
     assert!((without - 1.0).abs() < 1e-12, "{without}");
     assert!((with * (1e-3 + own) / 1e-3 - 1.0).abs() < 1e-12, "{with}");

@@ -18,7 +18,7 @@ const TOLERANCE: f64 = 1e-10;
 /// Number of communication steps of a random run of 2 s, whose inputs jump every half second.
 const COUNT: usize = 100;
 
-/// Returns the outputs of a tank, with those that `component` does not read set to 0.
+/// Returns the outputs of a tank, in which outputs that `component` does not read are set to 0.
 fn read(out: TankOutputs) -> TankOutputs {
     TankOutputs {
         axial: 0.0,
@@ -113,8 +113,8 @@ fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     }
 }
 
-/// The inputs of a record bring the FMU and the crate to the same state, bit for bit. The crate's test `reference`
-/// compares this state with the record.
+/// For each reference record the FMU and the crate reach bit-identical states with the inputs of the record. The crate's test
+/// `reference` compares this state with the record.
 #[test]
 fn spacecraft_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("craft") {

@@ -375,7 +375,7 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
         wave_height: next.one(),
         spin_ratio: next.one(),
         spin_number: next.one(),
-        // Not read, because tests compare only forces and motion.
+        // The following outputs are not read, because tests compare only forces and motion.
         axial: 0.0,
         turning: 0.0,
         ranges: craft::Ranges::default(),

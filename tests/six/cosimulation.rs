@@ -1,4 +1,4 @@
-//! A tank on a rigid body that another program simulates; both exchange signals once per communication step H.
+//! A tank on a rigid body that another program simulates. Tank and body exchange signals once per communication step H.
 //!
 //! lambda is the largest eigenvalue of M_body^-1 M_a; w_0 and w_p are the slosh frequencies with a fixed and with a
 //! free body. The total wrench contains -M_a [a; w']. If the body receives a delayed copy of it, errors grow from step
@@ -10,9 +10,9 @@
 //! Jacobi, both extrapolate                               z^4 + lambda (2 z - 1)^2 = 0   0.1547
 //! ```
 //!
-//! for every H; the last column is the limit of stability. If added mass and bias are exchanged separately, there
-//! is no such loop. Held values then make the slosh mode grow at the rate (w_p^2 - w_0^2) H/4, and three times as
-//! fast in Jacobi's order.
+//! for every H; the last column is the limit of stability. If added mass and bias are exchanged separately, there is no such
+//! loop. Values that are held over a step then make the slosh mode grow at the rate (w_p^2 - w_0^2) H/4, and three times as fast
+//! if tank and body step in parallel (Jacobi).
 //!
 //! Source: the recurrences follow from one eigendirection of the exchange; the growth rates follow from delays of the
 //! restoring force by H/2 and 3 H/2.
@@ -27,16 +27,16 @@ use super::component::{SloshTank, Spacecraft};
 
 const THRUST: f64 = 2400.0;
 
-/// The form in which the body receives the tank's force.
+/// The form in which the body receives the tank's force: the total wrench, bias and added mass, or one of the following.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Exchange {
     Total,
     Split,
-    /// The lumped matrix is added to the matrix of the equations that the body solves.
+    /// The constant lumped matrix is added to the matrix of the equations that the body solves.
     Lumped,
-    /// The lumped mass is part of the body itself.
+    /// The lumped mass is part of the mass, centre of mass and inertia of the body.
     RigidBody,
-    /// The added mass at rest is a constant matrix, and its share is subtracted from the wrench.
+    /// The added mass at rest is used as a constant matrix, and the force that belongs to it is taken out of the total wrench.
     Constant,
 }
 
@@ -47,12 +47,12 @@ enum Order {
     GaussSeidelLinear,
     JacobiHeld,
     JacobiLinear,
-    /// As `GaussSeidelLinear`; then both steps are repeated with the tank's values at the end of the step.
+    /// The steps of `GaussSeidelLinear` are made and then repeated with the tank's values at the end of the step.
     Repeated,
 }
 use Order::*;
 
-/// The matrix and the right-hand side that the body receives.
+/// Matrix and right-hand side of the tank's terms in the equations of the body.
 type Given = (Matrix6<f64>, Vector6<f64>);
 
 /// A rigid body under thrust along z with a tank. Only its rates and accelerations matter to the tank.
@@ -111,7 +111,7 @@ impl Pair {
         mass_matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-arm * mass));
         mass_matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&(arm * mass));
         mass_matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
-        // The body starts with the acceleration of the whole craft.
+        // At the start the body has the acceleration of the whole craft.
         let force = Ramp::held([0.0, 0.0, THRUST]);
         let u = Inputs { force, ..Inputs::default() };
         let start = Spacecraft::new(p, &u, 0.0, 1e-9).unwrap().outputs(&u);
@@ -166,7 +166,7 @@ impl Pair {
         matrix: &Matrix6<f64>,
         rhs: &Vector6<f64>,
     ) -> Vector6<f64> {
-        // A plain rigid body has the lumped mass in all of its equations.
+        // A plain rigid body has the lumped mass in all of its equations, including the gyroscopic terms.
         let (mut moment, mut inertia) = (self.moment, self.inertia);
         if self.exchange == Exchange::RigidBody {
             moment += Vector3::new(matrix[(5, 1)], matrix[(3, 2)], matrix[(4, 0)]);
@@ -336,7 +336,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     (f64::ln(means[1] / means[0]) / 50.0, formula)
 }
 
-/// Fraction for a body of 300 kg: lambda = 1.3.
+/// Mass of a body of 300 kg divided by the mass of the default craft. With the default tank lambda is 1.3.
 const LIGHT: f64 = 300.0 / 1180.0;
 
 /// Tank and craft are two FMUs that exchange force and acceleration once in a communication step, in Jacobi or
@@ -405,9 +405,9 @@ fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) ->
     worst / largest
 }
 
-/// Held values converge with first order, linearly extrapolated values with second order. The total wrench converges
-/// only at the lower mass ratio, and with first order. With the constant matrix a share of the wrench, m sin(angle) [a;
-/// w'], is still delayed; its error of first order shows when the error of second order has become small.
+/// Held values converge with first order, linearly extrapolated values with second order. The total wrench converges only for the
+/// heavier body, and with first order. With the constant matrix a part of the wrench, m sin(angle) [a; w'], is still delayed; its
+/// error of first order becomes visible when the error of second order is small.
 #[test]
 fn coupling_converges_with_its_order() {
     use Exchange::*;
@@ -436,8 +436,8 @@ fn coupling_converges_with_its_order() {
     }
 }
 
-/// The box moves in both of its planes, and m_0 is below 0. With lumped coupling its modes count twice, so that a
-/// larger share of the force is one step late. Held values then remove more damping: at lambda = 8 and 20 ms the
+/// The liquid in the box moves along both horizontal axes, and m_0 is below 0. In lumped coupling the modes of a box count twice,
+/// so that a larger share of the force is one step late. Held values then remove more damping: at lambda = 8 and 20 ms the
 /// simulation diverges. Extrapolated values do not diverge.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
@@ -460,8 +460,8 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     }
 }
 
-/// The lumped matrix is on the side of the body: in the equations that it solves, or in the body itself; bias^ comes
-/// from the tank. The coupling is stable at any mass ratio, and converges at least with first order.
+/// With a lumped matrix, which is either added to the equations of the body or part of the body itself, and the bias^ of the
+/// tank, the coupling is stable at any mass ratio, and converges at least with first order.
 #[test]
 fn lumped_coupling_is_stable_and_converges_up_to_lambda_6() {
     let lambda = ratio(Tank::default());

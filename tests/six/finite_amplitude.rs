@@ -252,14 +252,14 @@ fn the_recoil_of_a_craft_is_inversely_proportional_to_its_mass() {
     let (tank, heavy) = (bench(1.227), 1e6);
     let period = TAU / linear_frequency(&tank);
     let released = Tank { p_0: [[0.02, 0.0, -1.0]; MODES], ..tank };
-    // After a quarter of a period the slosh mass is ahead in phase by pi/2 times the gain in frequency.
+    // After a quarter of a period, the slosh mass of the craft is ahead in phase by pi/2 times the relative gain in frequency.
     let (mut alone, mut carried) =
         (SloshTank::start(&released), Carried::with_mass(heavy, &released));
     Moved::step(&mut alone, [0.0; 2], period / 4.0);
     carried.step([0.0; 2], period / 4.0);
     let gain = (alone.bob()[0] - carried.bob()[0]) / (0.02 * TAU / 4.0);
     let expected = tank.mass[0] / (2.0 * heavy);
-    // the error is of second order in the angle
+    // The error is of second order in the angle.
     assert!((gain / expected - 1.0).abs() < 1e-2, "{gain:e} {expected:e}");
 
     let [lighter, heavier] = [1e9, HEAVY].map(|heavy| forced(0.985, 0.18097e-3, heavy).1);

@@ -8,8 +8,8 @@ use super::component::{SloshTank, Spacecraft, load};
 const KNOT: f64 = 0.01;
 const G: f64 = 9.81;
 
-/// Returns the torque on the hub from knot k to the next, N m, and its slope; it excites the liquid to about
-/// 30 degrees.
+/// Returns the torque on the hub between time knot k and the next, N m, and its slope. The torque makes the liquid swing
+/// to about 30 degrees.
 fn torque(k: usize) -> (f64, f64) {
     let at = |k: usize| 1.5 * f64::sin(13.0 * k as f64 * KNOT);
     (at(k), (at(k + 1) - at(k)) / KNOT)
@@ -79,8 +79,8 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// A mass of 1e11 kg and corresponding moments of inertia allow the craft to move only about one axis. Motion in the
-/// other directions is inversely proportional to the mass.
+/// A craft with a mass of 1e11 kg, and corresponding moments of inertia about the other axes, moves only about one axis. Its
+/// motion in the other directions is inversely proportional to the mass.
 #[test]
 fn spacecraft_on_one_axis_equals_hubslosh() {
     let fmu = load("HubSlosh");
@@ -112,7 +112,7 @@ fn spacecraft_on_one_axis_equals_hubslosh() {
             ] {
                 assert_close(got, bench.real(name).unwrap(), allowed, name);
             }
-            // relative to some 10 N m/(kg m2) and 2 N m
+            // The errors are relative to accelerations and torques of some 10 N m/(kg m2) and 2 N m.
             let [omega_dot, tau] = ["omega_dot", "tau_fluid"].map(|name| bench.real(name).unwrap());
             assert_close(out.omega_dot[2], omega_dot, 10.0 * allowed, "omega_dot");
             assert_close(out.slosh_torque[2], tau, 10.0 * allowed, "tau_fluid");
@@ -122,8 +122,8 @@ fn spacecraft_on_one_axis_equals_hubslosh() {
     }
 }
 
-/// The host solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage of its integrator. The error of
-/// Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
+/// The hub that carries the tank is simulated here and solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage
+/// of the integrator. The error of Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
 #[test]
 fn slosh_tank_on_a_hub_equals_hubslosh() {
     const STEPS: usize = 40;
@@ -142,7 +142,7 @@ fn slosh_tank_on_a_hub_equals_hubslosh() {
         let a = Ramp::held([0.0, 0.0, G]);
         let mut u = TankInputs { a, omega: [0.0, 0.0, x[0]], ..TankInputs::default() };
         let out = tank.outputs(&u);
-        // elements 36 and 66 of the upper triangle, in row-major order
+        // These are elements 36 and 66 of M_a; the upper triangle is stored in row-major order.
         let (m_36, m_66) = (out.added_mass[14], out.added_mass[20]);
         let w_d = (tau + out.bias[5] - m_36 * G) / (i_hub + m_66);
         u.omega_dot = Ramp::held([0.0, 0.0, w_d]);

@@ -10,8 +10,8 @@ use spacecraft::Model as CraftModel;
 
 const STEP: f64 = 0.01;
 
-/// Simulates one second with Euler steps of a host; h_wheels[2] and the torque about y are functions of time. Returns
-/// true if the FMU warns.
+/// Simulates one second of Model Exchange by Euler steps; h_wheels[2] and the torque about y are functions of time. Returns true
+/// if the FMU warns.
 fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool) -> bool {
     let inputs = |t: f64| {
         let mut inputs = Inputs::default();
@@ -57,9 +57,9 @@ fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_to
     assert!(is_warned(ramp, |_| 0.0, false));
 }
 
-/// The thrust is reversed, so that the liquid detaches. The host, which integrates the FMU, then moves the liquid to
-/// half a metre above its tank. Only if the liquid moves further outwards does the FMU request an event at the end of
-/// the step; the event reverses the liquid's velocity.
+/// The thrust is reversed, so that the liquid detaches. The host, which integrates the FMU, then sets the position of the liquid
+/// to half a metre above its tank. Only if the liquid moves further outwards does the FMU request an event at the end of the
+/// step; the event reverses the liquid's velocity.
 #[test]
 fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     let mut parameters = spacecraft::Parameters::default();
@@ -86,8 +86,8 @@ fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     assert!(!model.accept_step(&inputs).unwrap());
 }
 
-/// Accelerates the host backwards while the liquid is half a metre above its tank, to which a host that integrates the
-/// FMU can move it.
+/// The craft that carries the tank accelerates backwards while the liquid is half a metre above its tank. In Model Exchange a
+/// host can set such a position.
 #[test]
 fn a_step_of_slosh_tank_that_ends_with_the_liquid_outside_asks_for_an_event() {
     let mut parameters = sloshtank::Parameters::default();

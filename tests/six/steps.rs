@@ -12,8 +12,8 @@ use super::component::{SloshTank, Spacecraft, load};
 use super::random::{Random, draining_tank};
 use super::records::{STEP, at_end, motion_at_end};
 
-/// Directly after a step the outputs are limits from the left: they include the torque of wheels that have accelerated
-/// and the rate of a host that has rotated.
+/// Directly after a step the outputs are limits from the left: they include the torque of wheels that have accelerated in the
+/// step, and the rate of a tank that has rotated.
 #[test]
 fn outputs_after_a_step_belong_to_its_end() {
     for seed in 0..10 {
@@ -57,7 +57,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
         let tolerance = random.magnitude(1e-14, 1e-1);
         let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap();
         let mut tank = SloshTank::new(&alone, &TankInputs::default(), 0.0, tolerance).unwrap();
-        // After fmi2Error an instance makes no further steps.
+        // After fmi2Error no further steps of this instance are made.
         let [mut craft_goes_on, mut tank_goes_on] = [true; 2];
         for _ in 0..100 {
             let nonsense = random.below(20) == 0;
@@ -169,7 +169,7 @@ fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_
     assert_eq!(a(&[("mount_kind", 1)]).unwrap(), Value::Real(0.0));
     let why = a(&[("mount", 2), ("mount_kind", 1)]).unwrap_err().text;
     assert!(why.contains("mount_kind = 1 contradicts mount = 2"), "{why}");
-    // At rest with the slosh mass straight below its hinge: the added mass contains the slosh mass only along z, with
+    // The slosh mass is at rest straight below its hinge. The added mass therefore contains the slosh mass only along z, but with
     // `lumped` also along x.
     let m = |settings: &[(&str, i32)]| with_kind::<Tank>(settings, "added_mass[1]");
     assert_eq!(m(&[("coupling_kind", 1)]).unwrap(), Value::Real(253.493));
@@ -180,7 +180,8 @@ fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_
     assert!(why.contains("coupling_kind = 3 contradicts coupling = 2"), "{why}");
 }
 
-/// A host that integrates the FMU moves the wheels and applies no torque. There is one warning, however many steps follow.
+/// In Model Exchange the momentum of the wheels changes and no torque is applied. There is one warning, however many steps
+/// follow.
 #[test]
 fn a_warning_names_wheels_that_move_without_a_torque_once_in_model_exchange() {
     let fmu = load("Spacecraft");
@@ -229,8 +230,8 @@ fn detached_liquid_moves_in_the_packed_fmu_as_in_the_crate() {
     assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }
 
-/// SloshTank with detached liquid on the craft of another simulator gives the craft the impulses that the Rust crate
-/// computes.
+/// SloshTank with detached liquid is attached to a craft that another program simulates. It gives this craft the impulses that
+/// the Rust crate computes.
 #[test]
 fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
     let mut p = TankParameters { host: Some(Parameters::default().craft), ..Default::default() };

@@ -28,8 +28,8 @@ fn named(row: &str) -> impl Iterator<Item = &str> {
     last.split('`').skip(1).step_by(2)
 }
 
-/// Returns the names in the rows that the sources do not contain: `function_name`, `crate::file_stem` and
-/// `test_file.py`. Commands, and scripts with a path, are not checked.
+/// Returns the names in the rows of a table that do not exist in the sources. Names have the forms `function_name`,
+/// `crate::file_stem` and `test_file.py`; commands, and scripts with a path, are not checked.
 fn missing(rows: &[String]) -> Vec<&str> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let (mut code, mut files) = (String::new(), Vec::new());

@@ -49,7 +49,7 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
         // Inputs have no attribute `initial` in either version: exact is the default, and CasADi accepts no other form.
         assert_eq!(old.get("initial"), new.get("initial"), "{name}");
         assert_eq!(new.get("initial").is_none(), new.get("causality") == Some("input"), "{name}");
-        // Positions count from 1 in both versions: the value reference in FMI 3.0 is the position.
+        // Variables have the same position in both versions, and the value reference in FMI 3.0 is the position counted from 1.
         let reference = (place + 1).to_string();
         assert_eq!(new.get("valueReference"), Some(&*reference), "{name}");
         assert_eq!(kind.get("derivative"), new.get("derivative"), "{name}");
@@ -120,7 +120,7 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
         let new: Vec<_> = new.map(|unknown| of(unknown, "valueReference")).collect();
         assert_eq!(old.len(), new.len(), "{list}");
         for (old, new) in old.iter().zip(&new) {
-            // In long lists of initial values, FMI 2.0 has dependencies only for some outputs, and FMI 3.0 has no kinds.
+            // Long lists of dependencies of initial values exist in FMI 2.0 only for some outputs, and have no kinds in FMI 3.0.
             let has_kinds = new[2].is_some();
             let known = if has_kinds { 3 } else { 1 + usize::from(old[1].is_some()) };
             let is_long = new[1].as_ref().is_some_and(|list| list.split(' ').count() > 100);

@@ -35,7 +35,7 @@ fn up_to_date<M: Model>() {
     }
 }
 
-/// The row of an array on the page must have the start value of every element, as the XML has.
+/// In the row of an array the page must state the start value of every element that the XML states.
 #[test]
 fn pages_of_variables_have_the_start_values_of_all_components() {
     let row = |page: &str, name: &str| {
