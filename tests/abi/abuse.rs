@@ -142,9 +142,9 @@ fn number(said: &str, word: &str) -> f64 {
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
 }
 
-/// Thousands of instances are stepped in turns, and each has the results that it has by itself. The library is loaded
-/// hundreds of times, and is no longer mapped after it is unloaded. States are saved and restored, Model Exchange
-/// handles its events, and steps allocate no memory.
+/// Thousands of instances are stepped in turns, and each has the same results as when it runs alone. The library is loaded
+/// hundreds of times, and is no longer mapped after it is unloaded. States are saved and restored, events are handled in Model
+/// Exchange, and steps allocate no memory.
 fn a_whole_life(fmi: Fmi, share: Share) {
     let fmu = Unpacked::new(HUBSLOSH, fmi);
     let [instances, loads] = match std::env::var("HUBSLOSH_VALGRIND").as_deref() {

@@ -332,7 +332,7 @@ fn every_callback_and_the_resource_location_may_be_null() {
     instance.do_step(0.0, 0.1).unwrap();
     // An error must be reported, but there is no logger.
     assert!(instance.do_step(0.0, -0.1).is_err());
-    // A failing fmi2Instantiate has no logger either.
+    // If fmi2Instantiate fails, there is no logger for the reason, either.
     with.guid = None;
     assert!(fmu.instantiate_with(&with).is_err());
 }
@@ -608,7 +608,7 @@ fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     instance.exit_initialization_mode().unwrap();
 }
 
-/// A minimum wheel speed above the initial wheel speed is refused at the end of initialisation, by both names.
+/// A minimum wheel speed above the initial wheel speed is refused at the end of initialisation; the message contains both names.
 #[test]
 fn parameters_that_contradict_each_other_are_reported() {
     let fmu = open();

@@ -569,7 +569,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     }
 }
 
-/// Reading a value creates the plant; setting a parameter afterwards creates it again.
+/// Reading a value makes the FMU compute the initial state; if a parameter is set afterwards, the FMU computes it again.
 #[test]
 fn after_initialization_the_order_of_setting_and_reading_does_not_matter() {
     let fmu = open();

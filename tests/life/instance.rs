@@ -962,7 +962,7 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
                     (Value::Boolean(b), _) => Value::Boolean(!b),
                 };
             set(&mut other, &[(&parameter.name(), value)]);
-            // Together with another item of the enumeration the integer would be a contradiction.
+            // The enumeration gets its start value, so that it does not contradict its integer twin.
             if let Some(group) = parameter.variable.name.strip_suffix(".kind") {
                 let model = TABLE.scalars[reference_of_model(group) as usize];
                 set(&mut other, &[(&model.name(), model.start().unwrap())]);

@@ -314,7 +314,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
         let [p, p_d] = pair.slosh();
         f64::hypot(p, p_d / f64::sqrt(w_p_2))
     };
-    // The mean of the peaks over a period removes the effect of the delay on the phase.
+    // The mean of the peaks over a period does not depend on the phase, which the delay changes.
     let mut means = [0.0; 2];
     let steps = |t: f64| (t / h).round() as usize;
     let period = std::f64::consts::TAU / f64::sqrt(w_p_2);

@@ -1,9 +1,9 @@
 //! Waves of finite amplitude through the packed SloshTank and, on a heavy craft, the packed Spacecraft, compared with fully
 //! nonlinear potential flow, which has no expansion in steepness.
 //!
-//! A force on the craft gives craft and tank the acceleration of the tank by itself, except for the recoil: a slosh
-//! mass m that swings pushes a craft of mass M. The recoil raises the frequency by m/(2 M), which is 4e-12 here; each
-//! test compares the two FMUs to 1e-9.
+//! A force on the craft gives its tank the same acceleration that SloshTank receives as an input, except for the recoil: a slosh
+//! mass m that swings pushes a craft of mass M. The recoil raises the frequency by m/(2 M), which is 4e-12 here; each test
+//! compares the two FMUs to 1e-9.
 
 use std::f64::consts::TAU;
 

@@ -348,8 +348,8 @@ pub(crate) struct Flexing {
     momentum: Vector,
     moment: Vector,
     growth: [Symmetric; ORDER + 1],
-    /// `turned` and `grown` are the vectors w x y and D w; `flow` and `spin` are their sums with K and L
-    /// (see the module's head).
+    /// Series of the vectors w x y (`turned`) and D w (`grown`) and of the sums K + w x y (`flow`) and L + D w (`spin`); the
+    /// module's head defines the symbols.
     turned: Vector,
     grown: Vector,
     flow: Vector,

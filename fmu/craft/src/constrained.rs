@@ -482,7 +482,7 @@ impl ConstrainedBob {
             by_higher = higher.expand(n, w[2], &self.r, &self.r_d, &self.u);
             higher.set_rate(n, &self.r, self.r_d[n], &self.u);
         }
-        // f of the newest order, without the terms of the multipliers of this order.
+        // The force f of order n, without the terms that contain the multipliers of order n.
         let mut f = if self.follows {
             self.set_drag(n);
             scale(1.0 / self.m, self.dragged[n])
@@ -632,7 +632,7 @@ impl ConstrainedBob {
         surface::bound_message(self.coefficients, higher, self.mode, name)
     }
 
-    /// Sets coefficient n of W, the rate of spin of the liquid.
+    /// Sets coefficient n of the liquid's rate of spin W.
     pub fn set_spin(&mut self, n: usize, turning: f64) {
         if let Some(higher) = &mut self.higher {
             higher.liquid[n] = turning;

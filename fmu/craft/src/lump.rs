@@ -658,7 +658,8 @@ impl Lump {
             swing[k] =
                 product(&thrust, &left, k) - dots(&self.x_d, &self.x_d, 0, k) / self.swing_length;
         }
-        // Magnitudes for rounding errors: the specific force from all rotations, and the factors of the products.
+        // Terms from which the magnitudes of rounding errors are estimated: the specific force from all rotations, and the
+        // factors of the products.
         let arm = largest(self.hinge);
         let turning = largest(w[0]) * largest(w[0]) + largest(w_d[0]);
         let of_thrust = 1e-10 * self.floor + 1e-12 * (largest(a[0]) + turning * arm);

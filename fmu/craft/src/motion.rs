@@ -308,8 +308,8 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Computes the mass matrix M for the present directions of the bobs, and factorises it. On a pivot the upper three rows
-    /// only pass on the given acceleration a.
+    /// Computes the mass matrix M for the present directions of the bobs, and factorises it. On a pivot M is changed so that the
+    /// solution contains the given acceleration a unchanged ([`hold_upper_rows`]).
     #[inline(always)]
     fn factorise(&mut self) {
         self.matrix = self.mass_matrix;

@@ -1177,7 +1177,7 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     if smallest_pivot(&at_rest) < SINGULAR {
         return Some(String::new());
     }
-    // The least inertia of the bobs is checked at the start and at the points of fill tables.
+    // The smallest inertia, after the reduction by the bobs, is checked at the start and at the points of fill tables.
     let is_singular = |point: usize| {
         let least = tanks.iter().fold(body, |sum, tank| {
             let tank = tank.at_point(point);

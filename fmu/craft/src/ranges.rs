@@ -160,7 +160,7 @@ impl Bounds {
     ) -> Option<Ranges> {
         /// Largest relative difference of angles that arises by rounding.
         const ROUNDING: f64 = 1e-12;
-        // Whether motion is rotary may differ between both ends of the interval and its inner points.
+        // The wave may be rotary at inner points of the interval although it is not rotary at both ends, or vice versa.
         if (0..self.modes).any(|n| exceeds(&out, n, self.angle_limits(n, liquid)[1])) {
             return None;
         }

@@ -199,7 +199,8 @@ impl FillCurves {
         [0, 1, 2].map(|k| self.rigid[k].evaluate(at))
     }
 
-    /// Returns the damping ratio of mode `n` at the specific force `g_ref`; `None` if the table does not contain it.
+    /// Returns the damping ratio, valid at the specific force `g_ref`, of mode `n` at the fill `at`; `None` if the table does not
+    /// contain damping ratios for this mode.
     pub fn zeta<T: Number>(&self, n: usize, at: Place<T>) -> Option<T> {
         self.modes[n].zeta.as_ref().map(|curve| curve.evaluate(at)[0])
     }

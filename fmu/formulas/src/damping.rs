@@ -607,7 +607,7 @@ mod tests {
     fn a_wall_of_several_shapes_has_the_mean_of_their_damping() {
         let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];
         is_near(numbers(&parts), [4.0 / 3.0 + 0.5 * 1.15 + 1.45 / 6.0, 1.0, 5.2]);
-        // A share below 5 % changes the end of the interval in proportion.
+        // A shape with a share below 5 % of the wall changes the end of the interval in proportion to its share.
         is_near(numbers(&[part(0.01, 4.0, 1.0)]), [1.4755, 1.0, 1.3 * (1.45 + 0.2 * 2.55)]);
         // The result is continuous where a shape becomes the whole wall, whether its correlation agrees with
         // 1.45 layers or not.

@@ -26,7 +26,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     let turning = |j: usize| j > 0 && j + 1 < count && secant(j - 1) * secant(j) < 0.0;
     let limited = |j: usize| j + 1 < count && (within || !turning(j) && !turning(j + 1));
     let sign = |j: usize| if secant(j) < 0.0 { -1.0 } else { 1.0 };
-    // The limits, in the direction of the rise, are 0 <= d and 2 (d_0 + d_1)/5 < secant in every interval.
+    // The slopes are limited so that every interval has 0 <= d and 2 (d_0 + d_1)/5 < secant, in the direction of the rise.
     for j in (0..count).filter(|j| limited(*j)) {
         for slope in &mut slope[j..j + 2] {
             *slope = sign(j) * (sign(j) * *slope).clamp(0.0, 2.4 * secant(j).abs());
@@ -39,8 +39,8 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
             slope[j + 1] *= most / sum;
         }
     }
-    // The differences of Bernstein coefficients are b_2 - b_1 = h d/5 + h^2 s/20, b_4 - b_3 = h d/5 - h^2 s/20, and b_3 -
-    // b_2 = h [secant - 2 (d_0 + d_1)/5] + h^2 (s_1 - s_0)/20.
+    // For a monotone curve the differences of the Bernstein coefficients must have the sign of the rise: b_2 - b_1 = h d/5 + h^2
+    // s/20, b_4 - b_3 = h d/5 - h^2 s/20, and b_3 - b_2 = h [secant - 2 (d_0 + d_1)/5] + h^2 (s_1 - s_0)/20.
     for i in 0..count {
         let mut limit = [f64::NEG_INFINITY, f64::INFINITY];
         for (j, at_left) in [(i, true), (i.wrapping_sub(1), false)] {
@@ -50,7 +50,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
             let h = x[j + 1] - x[j];
             let room = (20.0 / h) * (secant(j) - 0.4 * (slope[j] + slope[j + 1])).abs();
             let own = 4.0 * slope[i].abs() / h;
-            // At the left end s >= -own and s <= room/2; at the right end the signs are opposite.
+            // Therefore s is at least -own and at most room/2 at the left end; at the right end the signs are opposite.
             let (low, high) = if at_left { (-own, 0.5 * room) } else { (-0.5 * room, own) };
             let (low, high) = if sign(j) > 0.0 { (low, high) } else { (-high, -low) };
             limit = [limit[0].max(low), limit[1].min(high)];

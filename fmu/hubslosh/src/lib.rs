@@ -30,7 +30,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
 }
 
 pub mod fmi2 {
-    // The parameter types are those of the standard's header.
+    // The exported functions have argument types with the names of the standard's header.
     pub use runtime::v2::*;
 
     runtime::export_fmi2!(crate::HubSlosh);

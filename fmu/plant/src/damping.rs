@@ -38,8 +38,8 @@ pub struct Damping {
 }
 
 impl Damping {
-    /// Creates the damping of all modes. The damping ratios in `calculated` must be those at the
-    /// specific force `reference`, m/s2, at which every mode must have a restoring force.
+    /// Creates the damping of all modes. At the specific force `reference`, m/s2, for which the damping ratios in `calculated`
+    /// must be valid, every mode must have a restoring force.
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
         let by_correlation =
             p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;

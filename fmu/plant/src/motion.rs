@@ -146,7 +146,7 @@ impl Motion {
     #[cold]
     fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
         self.hub.g = [g.value, g.slope];
-        // Drag that depends on the amplitude is valid only at this instant.
+        // A drag that depends on the amplitude was computed for this instant only and must not be used again.
         self.g = if self.with_amplitude { [f64::NAN; 2] } else { self.hub.g };
         self.hub.damping_reach = f64::INFINITY;
         for (n, mode) in modes.iter_mut().enumerate() {

@@ -52,8 +52,8 @@ pub struct Plant {
     pub(crate) stopped: Option<StoppedStep>,
 }
 
-/// How a step that may stop at events has ended: at its `End`, at its end together with an event, or at an event before its
-/// end, with the elapsed time, s.
+/// Way in which a step that may stop at events has ended: at its end (`End`), at its end together with an event, or earlier at an
+/// event, with the elapsed time, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum StepEnd {

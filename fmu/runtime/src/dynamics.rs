@@ -161,7 +161,7 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         let _ = before;
     }
 
-    /// Changes tunable parameters while the simulation runs.
+    /// Changes the values of tunable parameters while the simulation runs.
     fn tune(
         &mut self,
         parameters: &Self::Parameters,

@@ -10,7 +10,7 @@ pub mod table;
 pub use model::Model;
 
 pub mod fmi2 {
-    // The parameter types are those of the standard's header.
+    // The exported functions have argument types with the names of the standard's header.
     pub use runtime::v2::*;
 
     runtime::export_fmi2!(crate::Model);

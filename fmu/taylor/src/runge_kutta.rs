@@ -23,7 +23,7 @@ pub trait System<const D: usize> {
         &[Range { start: 0, end: D }]
     }
 
-    /// Writes the rates x' of all states in use to `rate`. Its other elements may have any value.
+    /// Writes the rates x' of all states in use to `rate`. The elements of `rate` that belong to other states are ignored.
     fn write_rates(&self, t: f64, x: &[f64; D], rate: &mut [f64; D]);
 
     /// Returns for each state the magnitude to which the error of a step is relative, from states and rates at the start `t`

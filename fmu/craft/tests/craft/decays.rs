@@ -260,7 +260,7 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
         V::from_row_slice(&with[3..6]) - V::from_row_slice(&without[3..6])
     };
     let still = drag(V::zeros(), V::zeros());
-    // Expected c/m p'_x of the laminar law; p' is tangential to the sphere, 0.1 rad from the axis.
+    // The expected value is c/m p'_x under the laminar law. p' is tangential to the sphere at 0.1 rad from the axis.
     let w_ref = (G / tank.length[0]).sqrt();
     let expected = -2.0 * 0.05 * w_ref * (2.0 / G).powf(0.25) * 0.5;
     assert!((still.x / expected - 1.0).abs() < 0.02, "{still} {expected}");

@@ -132,7 +132,7 @@ impl HostWithTanks {
             states[..18].copy_from_slice(&x[at..at + 18]);
             states[TANK_STATES - 3..].copy_from_slice(&x[index::spin(i)..][..3]);
             tank.set_continuous_states(&states);
-            // Neither bias nor added mass depends on a and w', so that these inputs may be 0.
+            // Neither bias nor added mass depends on a and w' here, so that these inputs may be 0.
             let out = tank.outputs(&TankInputs { omega, ..TankInputs::default() });
             let mut element = out.added_mass.iter();
             for i in 0..6 {

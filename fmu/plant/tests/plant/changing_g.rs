@@ -322,7 +322,7 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
         plant.accept_step(&inputs_with_gravity(g(t + h))).unwrap();
     }
     let o = plant.outputs_held(&inputs_with_gravity(g(2.0)));
-    // The work of a jump at an instant is exact.
+    // A jump at an instant does exactly the expected work, without an error of the integrator.
     let jumped = inputs_with_gravity(g(2.0) + 3.0);
     let after = plant.outputs_held(&jumped);
     let jump = after.energy - o.energy - (after.work_axial - o.work_axial);

@@ -310,7 +310,7 @@ fn directions_of_modes_are_refused_for_models_without_them() {
     // kg and this part.
     let heavy = refused(|p| p.slosh.table.mass[2] = 4.9).unwrap();
     assert!(heavy.contains("along one direction"), "{heavy}");
-    // Along both directions together, the modal masses may exceed the mass of liquid.
+    // The sum of the modal masses along both directions may exceed the mass of liquid.
     assert_eq!(refused(|p| p.slosh.table.mass[..3].copy_from_slice(&[4.0, 0.1, 4.0])), None);
     let light = refused(|p| {
         p.hub.inertia = 1e-9;

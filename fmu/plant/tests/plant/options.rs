@@ -461,8 +461,8 @@ fn warnings_name_breaking_parameters_without_effect() {
     }
 }
 
-/// The onset of breaking for a mode of a table follows from the wave elevation and the wave number in the table. With the
-/// values of a cylinder the waves begin to break as in the cylinder.
+/// For a mode of a table, the amplitude at which waves begin to break follows from the wave elevation and the wave number in the
+/// table. With the values of a cylinder it equals the amplitude in the cylinder.
 #[test]
 fn steepness_follows_from_the_wave_elevation_and_wave_number_in_the_table() {
     let power = |p: &Parameters| plant(p).outputs(&inputs_with_gravity(9.81)).power_dissipated;

@@ -1,5 +1,5 @@
-//! Tests of Co-Simulation in FMI 3.0 with a host that handles events. Events occur within the steps; discrete outputs change
-//! when the host updates discrete states.
+//! Tests of Co-Simulation in FMI 3.0 with a host that handles events in event mode. The FMU applies events within the steps, but
+//! the host sees the changed discrete outputs only after it has updated the discrete states.
 
 use super::*;
 use crate::call::{Events, InstanceState};

@@ -97,7 +97,7 @@ fn only_used_units_and_enumerations_are_declared() {
     assert!(Spring::table().enumerations().is_empty());
 }
 
-/// Returns the exponents of kg, m, s, rad of a part of a unit's name.
+/// Returns the exponents of kg, m, s and rad of one factor in a unit's name, for example [1, 1, -2, 0] for `N` in `N.m`.
 fn base(symbol: &str) -> [i32; 4] {
     match symbol {
         "1" => [0, 0, 0, 0],

@@ -189,8 +189,8 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// A square depends on all levels and inputs of the present trays, even where all are 0 and the derivatives vanish. A rate
-/// depends on its own input.
+/// An element of `square` depends on all levels and inflows of the present trays, even where all are 0 and the derivatives
+/// vanish. A rate depends on its own inflow.
 #[test]
 fn array_elements_depend_on_others_even_where_the_derivative_vanishes() {
     let lines = Lines::default();
