@@ -27,7 +27,7 @@ fn pytest(arguments: &mut Command, sentence: &str) {
             .env("PYTHONPYCACHEPREFIX", target().join("python").join("bytecode")),
         sentence,
     );
-    // the last line of pytest, such as "61 passed in 20.07s"
+    // This is the last line of pytest's output, such as "61 passed in 20.07s".
     let last = said.trim_end().lines().last().unwrap_or_default();
     let left_out = ["skipped", "deselected", "xfailed"].iter().any(|word| last.contains(word));
     assert!(last.contains(" passed") && !left_out, "pytest did not run every test:\n{said}");
@@ -121,7 +121,7 @@ fn the_studies_compute_the_numbers_of_the_book() {
 /// Runs the examples in Python and the loop in Rust with the packed FMUs.
 #[test]
 fn the_examples_give_the_results_that_their_readmes_state() {
-    // all FMUs in one folder
+    // The examples expect all FMUs in one folder.
     let [fmu, ..] = pack::MODELS.each_ref().map(pack::packed_model_for_tests);
     let folder = fmu.with_file_name("one-loop");
     std::fs::create_dir_all(&folder).expect("a folder in the target directory");

@@ -32,10 +32,10 @@ mod six {
     mod hubslosh;
     mod models;
     mod steps;
-    // random tanks at the limits of their models
+    // Tests of random tanks at the limits of their models, from the crate `craft`.
     #[path = "../../fmu/craft/tests/craft/limit_cases.rs"]
     mod limit_cases;
-    // random craft and reference records of the crate `craft`
+    // Random craft and reference records from the crate `craft`.
     #[path = "../../fmu/craft/tests/craft/random.rs"]
     mod random;
     #[path = "../../fmu/craft/tests/craft/records.rs"]

@@ -69,7 +69,7 @@ impl Unpacked {
         let program = self.directory.path().join(name);
         let sources = sources.iter().map(|source| root().join(source));
         let version = if self.fmi == Fmi::V2 { 2 } else { 3 };
-        // valgrind replaces the allocator that counts
+        // valgrind has its own allocator instead of the one that counts allocations.
         let counts = (!under_valgrind()).then_some("-DCOUNT_ALLOCATIONS");
         if !program.exists() {
             run(
@@ -304,7 +304,7 @@ fn check_that_no_model_traps(fmi: Fmi, share: Share) {
         "a floating-point exception was raised",
     );
     print!("{said}");
-    // at least 5 slosh models, 4 friction laws, 3 gyros, 8 scenes and 2 interfaces
+    // The runs are combinations of at least 5 slosh models, 4 friction laws, 3 gyros, 8 scenes and 2 interfaces.
     let runs = if share.of == "all" { 960.0 } else { 480.0 };
     assert!(number(&said, " runs") >= runs, "{said}");
     // LuGre refuses the only scene without dry friction.
@@ -384,9 +384,9 @@ fn check_that_no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     let settable = settable.filter(|v| ["parameter", "input"].contains(&v.causality.as_str()));
     let (settable, version) = (settable.count(), if fmi == Fmi::V2 { 2 } else { 3 });
     let settings = match share.of {
-        // min, start and max
+        // Each variable is set to its min, start and max in each scene.
         "all" => 3 * settable * scenes.len(),
-        // min and max in one scene by each version, and the start value in each scene
+        // Each version sets the min or the max of each variable in one scene, and its start value in each scene.
         _ => {
             let ends = |scene: usize| (0..2 * settable).map(move |k| scene + k / 2 + k % 2);
             let is_set = |place: &usize| place % (scenes.len() + 1) == version % 2;
@@ -455,7 +455,8 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
                 ("friction.asymmetry", "0.1"),
             ],
         ],
-        // four tanks: one constant, one given by its dimensions, one that drains, one given by its frequency
+        // The four tanks are one with constant liquid, one that is given by its dimensions, one that drains, and one that is
+        // given by its frequency.
         "Spacecraft" => {
             let four_tanks = vec![
                 few,
@@ -488,7 +489,7 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
                 ("tank[1].p_dot_0[1,1]", "0.1"),
                 ("force[1]", "10"),
             ];
-            // zeros in the tables of tanks, points and modes that are not used
+            // The tables of tanks, points and modes that are not used contain zeros.
             let unused_tanks = vec![
                 few,
                 ("tank[2].fill.points", "6"),

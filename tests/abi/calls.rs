@@ -239,7 +239,7 @@ fn several_copies_and_instances_do_not_disturb_each_other() {
     let mut instances: Vec<_> =
         [&first, &second].into_iter().cycle().take(20).map(|fmu| stepping(fmu, LIVELY)).collect();
     let torque = [reference(&first, "tau_cmd")];
-    // in turns: each step of `drive` in all instances
+    // The instances take turns: each step of `drive` is made in all of them.
     let mut at = 0.0;
     for (n, h) in [0.01, 0.14, 0.2, 0.05, 0.3, 0.3].into_iter().enumerate() {
         for instance in &mut instances {

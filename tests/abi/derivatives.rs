@@ -129,7 +129,7 @@ impl Point<'_, '_> {
         let weights = random(&weigh);
         let adjoint = self.adjoint(&weights);
 
-        // w.(J v) = (J^T w).v, and J itself, column by column
+        // Checks w.(J v) = (J^T w).v, and J itself column by column.
         let mut columns = Vec::new();
         for j in 0..sides.knowns.len() {
             let mut one = vec![0.0; sides.knowns.len()];
@@ -157,7 +157,7 @@ impl Point<'_, '_> {
             self.what
         );
 
-        // both kinds against finite differences, the adjoint derivatives for each known separately
+        // Compares both kinds of derivatives with finite differences; the adjoint derivatives for each known separately.
         const H: f64 = 1e-3;
         let directions = moved.iter().map(|j| {
             let mut one = vec![0.0; sides.knowns.len()];

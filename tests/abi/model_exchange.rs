@@ -449,7 +449,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     host.indicators(0.0, &host.x.clone());
     host.instance.enter_event_mode().unwrap();
     host.event_iteration();
-    // a time at which the gyro takes no sample
+    // At this time the gyro takes no sample.
     host.run(5.01, 5e-4);
 
     let meant = [
@@ -638,7 +638,7 @@ fn states_out_of_the_models_range_end_the_run() {
     let fmu = open();
     let mut host = Host::new(&fmu, &[("slosh.model", "liquid")]);
     let mut x = host.x;
-    // slosh.q_radial[1]; the pendulum is 4.5 cm long
+    // This state is slosh.q_radial[1], m; the pendulum is 4.5 cm long.
     x[plant::x::SLOSH] = 0.1;
     host.instance.set_continuous_states(&x).unwrap();
     let error = host.instance.completed_integrator_step().unwrap_err();

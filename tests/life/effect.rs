@@ -117,7 +117,7 @@ fn no_warning_names_a_parameter_of_hubslosh_that_changes_an_output() {
     let moving = [("init.omega", 0.3), ("tau_cmd", 0.3), ("tau_ext", -0.5)];
     let with =
         |more: &[(&'static str, f64)]| -> Vec<(&'static str, f64)> { [&moving[..], more].concat() };
-    // each friction law and each slosh model at least once
+    // The settings contain each friction law and each slosh model at least once.
     for n in 1..=5 {
         let (friction, slosh) = (f64::from(n), f64::from(1 + n % 5));
         let models = [("friction.model", friction), ("slosh.model", slosh), ("slosh.modes", 1.0)];

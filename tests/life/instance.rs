@@ -147,7 +147,7 @@ fn inputs_set_in_initialization_mode_count_from_the_start() {
     set(&mut instance, &[("g_axial", Value::Real(9.81 / 4.0))]);
     instance.exit_initialization_mode().unwrap();
     let quarter = real(&mut instance, "slosh.frequency[1]");
-    // sqrt(g/l) has two rounding errors.
+    // sqrt(g/l) is computed with two rounding errors.
     assert!((quarter / on_earth - 0.5).abs() < 1e-15);
 }
 
@@ -864,12 +864,13 @@ fn a_state_of_the_other_interface_is_refused() {
     assert_eq!(exchange.interface(), Interface::ModelExchange);
 }
 
-/// The model description declares these dependencies, with which an importer breaks algebraic loops.
+/// If a change of an input immediately changes an output, the model description must list the input as a dependency of the
+/// output, because importers find algebraic loops by these lists.
 #[test]
 fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
-            // a moving hub, and a hub that is stuck at the start
+            // The instances have a moving hub, and a hub that is stuck at the start.
             let mut moving = moving_instance(slosh_model, friction_model);
             moving.do_step(0.0, 0.5).unwrap();
             let stuck = stepping(&[

@@ -295,7 +295,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     let mut tank = Tank { zeta: [0.0; 3], ..Tank::default() };
     tank.p_0[0] = [0.01, 0.0, -1.0];
     let p = parameters(share, tank);
-    // w_p^2 and w_0^2 by the closed forms for one tank on the axis
+    // w_p^2 and w_0^2 follow from the closed forms for one tank on the axis.
     let mass = p.craft.mass + tank.m_0;
     let z_0 = tank.position[2] + tank.h_0;
     let center = (p.craft.mass * p.craft.r[2] + tank.m_0 * z_0) / mass;

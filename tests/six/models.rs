@@ -50,7 +50,7 @@ fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_to
     assert!(!is_warned(sine, reaction, false));
     assert!(!is_warned(sine, |_| 0.0, true), "jumps at events turn the craft by impulses");
     assert!(!is_warned(|_| 5.0, |_| 0.0, false), "wheels that hold their momentum");
-    // a ramp between two knots, with a reaction torque only during the ramp
+    // The momentum is a ramp between two knots, with a reaction torque only during the ramp.
     let ramp = |t: f64| (10.0 * (t - 0.5)).clamp(0.0, 1.0);
     let reaction = |t: f64| if (0.5..0.6).contains(&t) { -10.0 } else { 0.0 };
     assert!(!is_warned(ramp, reaction, false));
@@ -99,7 +99,7 @@ fn a_step_of_slosh_tank_that_ends_with_the_liquid_outside_asks_for_an_event() {
     assert!(model.accept_step(&inputs).unwrap(), "liquid that has to leave its bottom");
     model.handle_event(&inputs).unwrap();
     assert!(!model.accept_step(&inputs).unwrap());
-    // position and velocity of the detached liquid, which precede the three states of the spin
+    // `ball` is the index of position and velocity of the detached liquid, which precede the three states of the spin.
     let ball = TANK_STATES - 9;
     let mut x = model.continuous_states().to_vec();
     x[ball + 2] += 1.1;

@@ -49,7 +49,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
     while steps < count {
         let mut p = random.parameters();
         p.init.omega = [(); 3].map(|()| random.magnitude(1e-6, 1e2));
-        // every third tank drains
+        // Every third tank drains.
         if random.below(3) == 0 {
             p.tank[0] = draining_tank(&mut random, 2);
         }
@@ -141,7 +141,7 @@ fn with_kind<M: runtime::Model>(
     shown: &str,
 ) -> Result<Value, runtime::call::Fault> {
     let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
-    // at rest
+    // The tank is at rest.
     for name in ["init.omega[1]", "init.omega[3]", "a[1]", "a[3]"] {
         if let Some(reference) = M::table().find(name) {
             instance.set(&SET_REAL, &[reference], |_| Value::Real(0.0))?;

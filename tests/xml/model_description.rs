@@ -298,7 +298,7 @@ fn every_dependency_list_is_given_and_contains_only_inputs_parameters_and_states
             assert!(dependencies.is_sorted_by(|a, b| a < b));
             assert!(dependencies.iter().all(|index| allowed.contains(&kind(index))));
             let Some(kinds) = unknown.get("dependenciesKind") else {
-                // an initial value that depends on nearly everything
+                // The list of an initial value that depends on nearly everything is left out.
                 assert!(list == "InitialUnknowns" && unknown.get("dependencies").is_none());
                 continue;
             };

@@ -455,7 +455,7 @@ impl Flexing {
             self.eta[j][n + 1] = self.rate[j][n] / order;
         }
         self.set_displacement(n + 1);
-        // Derivatives of w x y and D w by time, without the terms that contain w' of the newest order.
+        // Derivatives of w x y and D w by time, without the terms that contain coefficient n of w'.
         let [turned, grown] = if self.along && n == 1 {
             self.rates_along(w, w_d)
         } else {

@@ -250,7 +250,7 @@ pub(crate) trait Carrier {
         self.evaluate_at(t);
         let loss = before - self.energy_with(dv);
         *self.dissipated() += loss;
-        // The tolerance is for rounding errors.
+        // The tolerance allows for rounding errors.
         loss >= -1e-14 * before
     }
 }

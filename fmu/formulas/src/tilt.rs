@@ -190,8 +190,8 @@ mod tests {
             let u = |r: f64| libm::j1(a * r);
             let d = |r: f64| a * (libm::jn(0, a * r) - libm::jn(2, a * r)) / 2.0;
             let u_r = |r: f64| a * (libm::jn(0, a * r) + libm::jn(2, a * r)) / 2.0; // u/r
-            // Integrals divided by pi: the norm, and those of x^2 psi^2 and x psi psi_x, in which the angle contributes 3/4
-            // and 1/4, or 1/4 and -1/4.
+            // The following integrals are divided by pi. They are the norm and the integrals of x^2 psi^2 and x psi psi_x, in
+            // which the integration over the angle gives the factors 3/4 and 1/4, or 1/4 and -1/4.
             let norm = integral(&|r| r * u(r) * u(r));
             let (u2, ud, uu) = (
                 integral(&|r| r * r * r * u(r) * u(r)),

@@ -150,8 +150,9 @@ fn compare<M: Model, V: Values>(
             what()
         );
         for (n, scalar) in outputs::<M>().enumerate() {
-            // A gyro sample is due at the end of a step that is shorter because of the rounding at 1e9 s. It is not due at
-            // the end of a step whose size is smaller by the same amount.
+            // At 1e9 s rounding of the host's times makes a step slightly shorter. The gyro still takes the sample that is due at
+            // the end of this step, but it would not take it at the end of a step in which the size itself is that much smaller.
+            // Therefore the gyro's output is compared with the run with even steps.
             let is_sampled = scalar.variable.name == "omega_imu" && has_own_steps;
             let exact = if is_sampled { &even_steps } else { same_steps };
             let is_placed = is_sampled || interface == Interface::ModelExchange;

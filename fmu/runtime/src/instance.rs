@@ -974,7 +974,8 @@ impl<M: Model, V: Version> Instance<M, V> {
                 model.set_time(self.clock.now());
                 let end = at + h;
                 let why = format_args!("step from {at:?} s to {end:?} s failed: {text}");
-                // If the instance enters a state of its own after a failed step, the host cannot try a smaller step.
+                // In FMI 3.0 an error would end the simulation, so that a step is discarded if a shorter one may succeed. In FMI
+                // 2.0 the instance enters the state "step failed", in which no shorter step is possible.
                 if shorter_may_succeed && V::AFTER_ERROR.is_some() {
                     return Err(call.discard(why));
                 }

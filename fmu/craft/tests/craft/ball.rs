@@ -573,7 +573,7 @@ fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
         let (rates, want) = (craft.derivatives(&u), newton(&p, &x, &u, &slides));
         let out = craft.outputs(&u);
         let near = |a: &[f64], b: V, what: &str| {
-            // The tolerance is for two ways to solve linear systems whose condition number is 1e4.
+            // The tolerance allows for rounding errors in two ways to solve linear systems whose condition number is 1e4.
             assert!((v(a) - b).norm() < 1e-11 * (1.0 + b.norm()), "{seed} {what}: {a:?} {b}");
         };
         near(&rates[index::OMEGA..], want.w_d, "w'");

@@ -265,7 +265,7 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     let expected = -2.0 * 0.05 * w_ref * (2.0 / G).powf(0.25) * 0.5;
     assert!((still.x / expected - 1.0).abs() < 0.02, "{still} {expected}");
     for (w, w_d) in [(V::zeros(), V::new(1.5, 2.0, 0.0)), (V::new(1.0, -0.5, 1.2), V::zeros())] {
-        // The tolerance is for differences of numbers of about 10 1/s2.
+        // The tolerance allows for rounding errors of differences of numbers of about 10 1/s2.
         assert!((drag(w, w_d) - still).norm() < 1e-13, "{} {still}", drag(w, w_d));
     }
 }

@@ -183,7 +183,8 @@ fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
             });
             for x in ends {
                 for i in 0..index::WORK {
-                    // The tolerance is for five seconds of tumbling motion and the rounding errors of 250 steps.
+                    // The tolerance allows for the growth of errors in five seconds of tumbling motion, and for the rounding
+                    // errors of 250 steps.
                     let off = (x[i] - short[i]).abs() / (1.0 + short[i].abs());
                     assert!(off < tolerance.max(1e-11), "{seed} {tolerance}: x[{i}] {off:e}");
                 }

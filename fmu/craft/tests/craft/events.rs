@@ -669,7 +669,7 @@ fn without_location(case: &Case, seed: u64) -> f64 {
     let end = own.craft.outputs(&case.u);
     let balance = end.energy - end.work + end.dissipated - begin.energy;
     let balance = balance.abs() / (1.0 + end.energy);
-    // The tolerance is for rounding errors and the errors of Dormand and Prince's method.
+    // The tolerance allows for rounding errors and for the errors of Dormand and Prince's method.
     assert!(balance < 1e-9, "{seed}: {balance:e}");
     let (height, semi, _) = wall(&case.p, 0);
     let at = v(&end.tank[0].ball_position) - V::z() * height;

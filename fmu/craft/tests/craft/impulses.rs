@@ -65,7 +65,7 @@ fn an_impulse_of_the_host_does_not_change_the_bobs_velocities_across_their_rods(
                 velocity -= b * b.dot(&kick);
                 assert!(change.dot(&b).abs() < 1e-14, "p' stays in the plane");
             }
-            // The tolerance is for 1 m/s on rods of 0.1 m.
+            // The tolerance allows for rounding errors of velocities of 1 m/s and of rods of 0.1 m.
             assert!((velocity - rod * rod.dot(&velocity)).norm() < 1e-14, "{seed} {n}");
             assert!(change.dot(&rod).abs() < 1e-14, "p' stays tangential");
         }

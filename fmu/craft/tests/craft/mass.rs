@@ -41,7 +41,7 @@ fn liquid(tank: &Tank, p: &[[f64; 3]]) -> Vec<Body> {
 #[track_caller]
 fn assert_same(got: (f64, [f64; 3], [[f64; 3]; 3]), want: &Body) {
     let (mass, center, inertia) = got;
-    // The tolerance is for rounding errors of about 1000 kg, 1 m and 1000 kg m2.
+    // The tolerances allow for rounding errors in numbers of about 1000 kg, 1 m and 1000 kg m2.
     assert!((mass / want.0 - 1.0).abs() < 1e-14);
     assert!((V::from(center) - want.1).norm() < 1e-13);
     for i in 0..3 {

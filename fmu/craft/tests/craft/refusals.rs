@@ -98,10 +98,10 @@ fn parameters_are_accepted_up_to_the_ends_of_their_ranges_and_refused_beyond() {
 #[test]
 fn parameters_of_unused_tanks_and_modes_are_not_checked() {
     let mut p = craft();
-    p.tank[2].m_0 = -1.0; // there are two tanks
-    p.tank[0].mass[2] = -1.0; // of two modes
-    p.tank[0].depth = -1.0; // no cylinder
-    p.tank[0].outlet = f64::NAN; // does not drain
+    p.tank[2].m_0 = -1.0; // not used, because there are two tanks
+    p.tank[0].mass[2] = -1.0; // not used, because the tank has two modes
+    p.tank[0].depth = -1.0; // not used, because the tank is no cylinder
+    p.tank[0].outlet = f64::NAN; // not used, because the tank does not drain
     p.tank[0].fill.i_0[0] = -1.0;
     assert_eq!(p.problems(), [""; 0]);
     p.tanks = 4;

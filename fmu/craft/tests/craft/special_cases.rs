@@ -42,7 +42,7 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     let mut cylinder = given;
     let tank = &mut cylinder.tank[0];
     (tank.diameter, tank.depth, tank.density) = (0.9, 0.6, 1000.0);
-    // The modes of `formulas::cylinder` have their heights from mid-depth.
+    // Heights in `formulas::cylinder` are measured from mid-depth.
     tank.position[2] -= 0.3;
     let (got, want) = (after_ten_seconds(&cylinder), after_ten_seconds(&given));
     let off = largest_difference(&got[..index::POSITION], &want[..index::POSITION]);

@@ -176,8 +176,9 @@ const CYLINDERS: [([f64; 4], [f64; 2], [f64; 2]); 6] = [
     ([2.0, 0.3, 0.41797, 1.90865], [1.6293091, -1.1714488], [1.4, 2.4]),
 ];
 
-/// Each row contains h/R, Omega^2 R/g and l/Omega of the same liquids, and real and imaginary part of the force on the tank
-/// per lateral acceleration exp(-i l t), kg, at the rate (l - i/20) Omega, from the equations of a rotating liquid.
+/// Each row contains h/R, Omega^2 R/g, the factor lambda, and the real and the imaginary part of the force on the tank, divided
+/// by its lateral acceleration, kg. The acceleration is proportional to exp(-i l t) with l = (lambda - i/20) Omega. The forces
+/// were computed from the equations of a rotating liquid, for the same liquids as above.
 const FORCES: [[f64; 5]; 48] = [
     [1.0, 0.1, -3.0, 6.90214, 0.32358],
     [1.0, 0.1, -2.5, 4.98723, 0.11426],

@@ -167,7 +167,7 @@ fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
         let mut craft = start(&p);
         craft.step(&Inputs::default(), TAU / omega2.sqrt() * 7.0 / 3.0).unwrap();
         let out = craft.outputs(&Inputs::default());
-        // The factor is cos(7 2 pi/3) = -1/2.
+        // After 7/3 periods each angle is cos(7 2 pi/3) = -1/2 of its start.
         for (got, start) in [(2.0 * out.q[2], e), (out.tank[0].angle_x[0], phi + e)] {
             assert!((got / start + 0.5).abs() < 1e-6, "{omega2}: {got} {start}");
         }

@@ -172,7 +172,7 @@ mod tests {
                 series[0] = x;
                 series
             });
-            // The tolerance is for rounding errors of five terms.
+            // The tolerance allows for rounding errors of five terms.
             assert!((one.coefficient_at(theta) - expected).abs() < 1e-15, "{theta}");
             assert!((one.coefficient(0, &series) - expected).abs() < 1e-15, "{theta}");
         }
@@ -187,7 +187,7 @@ mod tests {
             for harmonics in [[-c, -s, 0.0, 0.0], [0.0, 0.0, -c2, -s2]] {
                 let one = OneWay { mean: 1.5, harmonics };
                 let below = 0.5 - one.lowest();
-                // The lower tolerance is for rounding errors.
+                // The lower tolerance allows for rounding errors.
                 assert!((-1e-15..2e-6).contains(&below), "{place} {harmonics:?} {below:e}");
             }
         }

@@ -249,7 +249,7 @@ impl SloshMode for Spherical {
                 inv_l * (mul_part(n, e_x, &self.dir, 0) + mul_part(n, e_y, &self.dir, 1));
         }
         let [plus, minus] = component_products(n, &self.dir, &self.drag_swapped);
-        // L and L p without the terms that contain w' of the newest order, which J represents.
+        // L and L p without the terms that contain coefficient n of w', because J represents these terms.
         let y_0 = self.dir[0][1];
         self.tension[n] = self.tension_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
         self.pulled = scale_head(n, &self.tension, &self.dir);

@@ -137,7 +137,7 @@ fn energy_never_grows_without_torque() {
                         break;
                     }
                     let now = plant.outputs(&inputs);
-                    // The tolerance is for rounding of the energy and the error of the step.
+                    // The tolerance allows for rounding of the energy and for the error of the step.
                     assert!(now.energy <= last.energy + 1e-11 * first.energy, "{p:?}");
                     assert!(now.power_dissipated >= 0.0, "{p:?}");
                     assert!(now.heat >= last.heat - 1e-13 * first.energy, "{p:?}");
@@ -171,7 +171,7 @@ fn hub_equation_holds_between_the_outputs() {
                 let terms = [o.tau_actuator, inputs.tau_ext.value, o.tau_friction, o.tau_fluid];
                 let size = terms.iter().map(|t| t.abs()).sum::<f64>();
                 let rest = p.hub.inertia * o.omega_dot - terms.iter().sum::<f64>();
-                // The liquid's torque is computed from forces, and not by the formula of omega_dot. The tolerance is for
+                // The liquid's torque is computed from forces, and not by the formula of omega_dot. The tolerance allows for
                 // rounding errors with a heavy liquid on a light hub.
                 assert!(rest.abs() <= 1e-11 * size, "{slosh:?} {friction:?} {rest:e} {size:e}");
             }

@@ -74,7 +74,7 @@ fn energy_balances_with_the_work_of_a_changing_g() {
                         + (now.work_axial - last.work_axial).abs();
                     axial += (now.work_axial - last.work_axial).abs();
                     let balance = now.energy - first.energy - now.work - now.work_axial + now.heat;
-                    // The tolerance is that of the integrator; a missing term would be a visible fraction of the throughput.
+                    // The tolerance is the solver's tolerance; a missing term would be a visible fraction of the throughput.
                     assert!(
                         balance.abs() < 1e-8 * throughput,
                         "{slosh:?} {friction:?} {balance:e}"
@@ -104,7 +104,7 @@ fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
         });
         for (value, other) in before.iter().zip(&after) {
             let residual = other.energy - value.energy - (other.work_axial - value.work_axial);
-            // The tolerance is for rounding of energies of 0.1 to 1 J and powers of 0.1 to 1 W.
+            // The tolerance allows for rounding errors in energies of 0.1 to 1 J and powers of 0.1 to 1 W.
             assert!(residual.abs() < 1e-14, "{slosh:?} {residual:e}");
         }
     }
@@ -119,10 +119,10 @@ fn motion_under_ramps_does_not_depend_on_the_communication_step() {
             p.slosh.zeta = 0.05;
             let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
             let [a, b] = [coarse.last().unwrap(), fine.last().unwrap()];
-            // The tolerance is for rates of 2 rad/s at the tolerance of the solver.
+            // The tolerance is the error of rates of 2 rad/s at the solver's tolerance.
             assert!((a.omega - b.omega).abs() < 1e-9, "{slosh:?} {}", a.omega - b.omega);
             assert!((a.slosh_rate - b.slosh_rate).abs() < 2e-9, "{slosh:?}");
-            // The tolerance is for energies of 0.1 J at the tolerance of the solver.
+            // The tolerance is the error of energies of 0.1 J at the solver's tolerance.
             assert!((a.work_axial - b.work_axial).abs() < 1e-10, "{slosh:?}");
         }
     }

@@ -138,8 +138,8 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
             let speed2 = velocity[0].powi(2) + velocity[1].powi(2) + up_d.powi(2);
             energy += m * (speed2 / 2.0 + G * felt - e_x * x - e_y * y);
         }
-        // The tolerances are for forces of 10 N, and for differences of accelerations of 100 m/s2 (second and third mode)
-        // with an error of 1e-8.
+        // The tolerances allow for errors in forces of 10 N, and in differences of accelerations of 100 m/s2 (second and third
+        // mode) with an error of 1e-8.
         let what = format!("{slosh:?}");
         assert_near(o.omega, w, 1e-9, &what);
         assert_near(o.omega_dot, wd, 1e-6, &what);
@@ -206,7 +206,7 @@ fn a_bench_starts_at_the_given_slosh_angles_and_rates() {
         let shown = [o.slosh_angle, o.slosh_rate, o.slosh_angle_radial, o.slosh_rate_radial];
         let given = [0.3, 1.5, p.init.slosh_angle_radial, p.init.slosh_rate_radial];
         for (shown, given) in shown.iter().zip(given) {
-            // The tolerance is for the rounding errors of a few functions.
+            // The tolerance allows for the rounding errors of a few functions.
             assert!((shown - given).abs() < 1e-14, "{slosh:?} {shown} {given}");
         }
     }

@@ -74,7 +74,7 @@ fn dissipation_becomes_negative_only_if_sigma1_is_above_its_limit() {
             let omega = 10f64.powf(k as f64 / 20.0 - 5.0);
             for omega in [omega, -omega] {
                 let power = dissipation(&mut plant, &p.friction, omega, f64::from(j) / 50.0);
-                // The tolerance is for rounding of terms that cancel.
+                // The tolerance allows for rounding errors of terms that cancel.
                 assert!(power >= -1e-13 * omega * omega, "{omega} {j}: {power}");
                 least = least.min(power / (p.friction.b * omega * omega));
             }
@@ -218,7 +218,7 @@ fn lag(frequency: f64) -> f64 {
     let steps = 20_000;
     let h = core::f64::consts::TAU / frequency / steps as f64;
     let all = driven(&p, rate, h, 2 * steps);
-    // sin = 0: the rate rises at the end of the first period, and falls half a period later.
+    // Both instants have the mean rate: it rises at the end of the first period, and falls half a period later.
     -all[steps - 1].1 + all[steps - 1 + steps / 2].1
 }
 

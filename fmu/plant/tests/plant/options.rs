@@ -104,7 +104,7 @@ fn motion_with_all_options_does_not_depend_on_the_communication_step() {
         let p = everything(slosh, FrictionModel::Viscous);
         let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
         let [a, b] = [coarse.last().unwrap(), fine.last().unwrap()];
-        // The tolerance is for rates of 1 rad/s and energies of 0.1 J at the tolerance of the solver.
+        // The tolerance is the error of rates of 1 rad/s and energies of 0.1 J at the solver's tolerance.
         assert!((a.omega - b.omega).abs() < 2e-9, "{slosh:?} {}", a.omega - b.omega);
         assert!((a.slosh_rate - b.slosh_rate).abs() < 2e-9, "{slosh:?}");
         assert!((a.work_axial - b.work_axial).abs() < 1e-9, "{slosh:?}");
@@ -171,7 +171,8 @@ fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
     let inertia = p.hub.inertia + m_0 * p.tank.r * p.tank.r;
     let omega = (9.81 * 0.1f64.tan() * moment / inertia).sqrt();
     plant.step(&inputs_with_gravity(9.81), TAU / omega / 3.0).unwrap();
-    // The factor is cos(120 degrees). The period of a pendulum at 1 mrad is longer by 6e-8.
+    // After a third of a period the angle is cos(120 degrees) = -1/2 of its start. At 1 mrad the period of a pendulum is longer
+    // by 6e-8 of itself.
     let theta = plant.outputs(&inputs_with_gravity(9.81)).theta;
     assert!((theta / 1e-3 + 0.5).abs() < 1e-6, "{theta}");
 }
@@ -316,7 +317,8 @@ fn capillarity_centres_the_liquid_down_to_weightlessness() {
             assert!((frequency * TAU / omega - 1.0).abs() < 1e-12, "{g} {frequency}");
             plant.step(&inputs_with_gravity(g), TAU / omega / 3.0).unwrap();
             let angle = plant.outputs(&inputs_with_gravity(g)).slosh_angle;
-            // The factor is cos(120 degrees). The tolerance includes the third order at 1 mrad.
+            // After a third of a period the angle is cos(120 degrees) = -1/2 of its start. The tolerance includes the third
+            // order at 1 mrad.
             assert!((angle / 1e-3 + 0.5).abs() < 1e-5, "{slosh:?} {g} {angle}");
         }
     }

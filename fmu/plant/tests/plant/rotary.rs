@@ -108,8 +108,8 @@ fn leaves_the_plane(eps: f64, mu: f64) -> bool {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.tank.r = 1000.0;
     p.hub.inertia = 1e12;
-    // This damping is large enough to end the initial transient and too small to move the boundaries. A growth rate that
-    // exceeds it, zeta w, shifts mu by about (2 zeta/eps^(2/3))^2 = 4e-4.
+    // This damping is large enough to end the initial transient and too small to move the boundaries: the growth rate of the
+    // radial displacement must exceed zeta w, which shifts mu by about (2 zeta/eps^(2/3))^2 = 4e-4.
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 1e-4;
     let l = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().calculated().length[0];

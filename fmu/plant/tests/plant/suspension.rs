@@ -105,7 +105,7 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
         }
         let o = plant.outputs(&Inputs::default());
         for (got, start) in [(o.theta, 1e-2), (o.slosh_angle, 1e-2 * ratio)] {
-            // The factor is cos(7 2 pi/3) = -1/2.
+            // After 7/3 periods each angle is cos(7 2 pi/3) = -1/2 of its start.
             assert!((got / start + 0.5).abs() < 1e-8, "{omega2}: {got} {start}");
         }
     }
