@@ -79,8 +79,8 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// A craft with a mass of 1e11 kg, and corresponding moments of inertia about the other axes, moves only about one axis. Its
-/// motion in the other directions is inversely proportional to the mass.
+/// A craft with a mass of 1e11 kg, and with moments of inertia of this size about all axes but one, moves only about this axis.
+/// Its motion in the other directions is inversely proportional to the mass.
 #[test]
 fn spacecraft_on_one_axis_equals_hubslosh() {
     let fmu = load("HubSlosh");

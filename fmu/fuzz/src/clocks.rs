@@ -1,5 +1,5 @@
-//! Fuzzing with hosts that make the same sequence of calls with different clocks: multiplied, accumulated, wrong by a unit
-//! in the last place, or started at 1e9 s. All of them must get the same outputs.
+//! Fuzzing with hosts that make the same sequence of calls but compute the simulation time in different ways: multiplied (k h),
+//! accumulated (t += h), wrong by a unit in the last place, or started at 1e9 s. All of them must get the same outputs.
 
 use arbitrary::{Result, Unstructured};
 

@@ -188,7 +188,8 @@ pub unsafe fn array_mut<'a, T>(
 /// Borrows the host's variable into which a function writes one result. The host passes `pointer` to the variable as the argument
 /// `name`.
 ///
-/// # Errors If `pointer` is NULL.
+/// # Errors
+/// If `pointer` is NULL.
 pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
     unsafe { pointer.as_mut() }.ok_or_else(|| null_argument(call, name))
 }
@@ -351,7 +352,8 @@ pub fn silence_panics() {
 
 /// Returns the filter that lets only messages of the log categories `names` pass to the host's log.
 ///
-/// # Errors If a name is unknown or NULL.
+/// # Errors
+/// If a name is unknown or NULL.
 pub unsafe fn filter<M: Model>(
     call: &Call,
     categories: *const *const c_char,

@@ -192,7 +192,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
 
     /// Checks the states after a step of the host's integrator (Model Exchange). Returns true if an event must be handled now.
     ///
-    /// # Errors The reason why the states that the host has set are not valid.
+    /// # Errors
+    /// The reason why the states that the host has set are not valid.
     fn accept_step(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
         let _ = inputs;
         Ok(false)

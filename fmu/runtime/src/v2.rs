@@ -257,7 +257,8 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
 /// Returns the interface of the requested instance, and the part of the variables that the model description with this GUID
 /// contains.
 ///
-/// # Errors If the instance cannot be created; the text is the reason.
+/// # Errors
+/// If the instance cannot be created; the text is the reason.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,

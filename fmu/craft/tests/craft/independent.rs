@@ -724,9 +724,9 @@ fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     assert!(tight > 5);
 }
 
-/// A single tank that is moved as a craft moves by Newton's law has the same force and torque and the same p'' of its bobs
-/// as the tank in this craft. The drag does not depend on the acceleration, because in the craft it would depend on the
-/// motion of craft and liquids as one rigid body, but in the single tank on the given motion.
+/// A SloshTank that is moved like the tank of a craft, whose motion is computed by Newton's law, has the same force and torque
+/// and the same p'' of its bobs as the tank in the craft. The drag must not depend on the acceleration here, because in the craft
+/// it would depend on the motion of craft and liquids as one rigid body, but in the SloshTank on the given motion.
 #[test]
 fn a_single_tank_follows_newtons_law() {
     for seed in 0..300 {

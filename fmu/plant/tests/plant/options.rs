@@ -245,7 +245,7 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     p.init.slosh_angle = 0.1 / wave;
     let (found, within) = zeta(&p);
     assert!((found - 0.0468).abs() < 5e-5 && within, "{found}");
-    // A rate has the same effect as an angle, because it is part of the same wave.
+    // A slosh rate has the same effect as a slosh angle, because both contribute to the amplitude of the wave.
     let omega = (9.81 / plant(&p).calculated().length[0]).sqrt();
     (p.init.slosh_angle, p.init.slosh_rate) = (0.0, 0.1 / wave * omega);
     assert!((zeta(&p).0 / found - 1.0).abs() < 1e-6);

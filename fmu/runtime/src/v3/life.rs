@@ -67,7 +67,8 @@ pub(super) unsafe fn instantiate<M: Model>(
 /// Returns two properties of the model description to which the host's instantiationToken belongs: the layout of its variables
 /// (scalars or arrays), and which part of the variables it contains.
 ///
-/// # Errors If the token or the instance's name is not accepted.
+/// # Errors
+/// If the token or the instance's name is not accepted.
 fn check_token<M: Model>(
     name: Option<String>,
     token: Option<String>,
@@ -101,7 +102,8 @@ pub(super) struct Stepping {
 /// Creates an instance for Co-Simulation. `variables` is the host's list requiredIntermediateVariables: a pointer to the value
 /// references of the variables that it reads or sets within steps, and their number.
 ///
-/// # Errors If one of these variables cannot be read or set within a step.
+/// # Errors
+/// If one of these variables cannot be read or set within a step.
 pub(super) unsafe fn co_simulation<M: Model>(
     arrays: Option<&Arrays>,
     with: Stepping,
