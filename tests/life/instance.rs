@@ -282,8 +282,8 @@ fn communication_points_may_be_off_by_rounding() {
     }
 }
 
-/// An input with a slope has the same course in one long step as in many short steps. The results of both agree
-/// to the tolerance 1e-8.
+/// An input with a slope changes in one long step as it changes in many short steps. The results of both agree within the
+/// tolerance 1e-8.
 #[test]
 fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     let run = |cuts: u32| {
@@ -765,9 +765,9 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
 }
 
-/// The known derivatives are those of sqrt(g/l)/2 pi with respect to g, of theta with respect to its start value,
-/// and of the hub's acceleration with respect to the torque. The last is the inverse of the inertia of hub and
-/// liquid if nothing else moves.
+/// The derivatives are known in closed form: of sqrt(g/l)/2 pi with respect to g, of theta with respect to its start value,
+/// and of the hub's acceleration with respect to the torque. The last one is the inverse of the inertia of hub and liquid
+/// if nothing else moves.
 #[test]
 fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and_parameters() {
     let mut instance = new_instance();

@@ -56,8 +56,8 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
     assert_eq!(row(&page, "a[1..3]"), "0");
 }
 
-/// Returns the number of scalar parameters, and the number of those that a craft with one tank of one mode and without
-/// appendages has.
+/// Returns two numbers of scalar parameters: of the whole table, and of the part that a craft with one tank of one mode
+/// and without appendages needs.
 fn parameters<M: Model>() -> [usize; 2] {
     /// arrays of a tank whose first index is the number of the mode
     const OF_MODES: [&str; 32] = [

@@ -639,8 +639,8 @@ impl ConstrainedBob {
         }
     }
 
-    /// Returns coefficient n of the mode's contribution to I_zz s_z: the moment of inertia of the spinning liquid about
-    /// the tank's axis times its slip (`spin.rs`). It is called before [`ConstrainedBob::reaction`] of this order; `w`
+    /// Returns coefficient n of the mode's contribution to I_zz s_z, where I_zz is the moment of inertia of the spinning liquid
+    /// about the tank's axis and s_z its slip (`spin.rs`). It must be called before [`ConstrainedBob::reaction`] of order n; `w`
     /// is coefficient n of the angular velocity.
     pub fn reaction_on_spin(&self, n: usize, w: Vec3) -> f64 {
         let Some(higher) = self.higher.as_ref().filter(|it| it.by.gyroscopic != [0.0; 2]) else {

@@ -1111,8 +1111,7 @@ impl Craft {
         if problems.0.len() > before {
             return;
         }
-        // If two moments of inertia and their product of inertia are inconsistent, this principal minor of
-        // the matrix is negative.
+        // This principal minor of the matrix is negative if a product of inertia is too large for its two moments of inertia.
         let minors = [
             ("Jxx", "Jyy", "Jxy", xx * yy, xy * xy),
             ("Jxx", "Jzz", "Jxz", xx * zz, xz * xz),

@@ -272,7 +272,7 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
         near(rubbing.convergence_radius([0.0, 0.0, 3.0]), libm::sqrt(way / 300.0));
         near(rubbing.convergence_radius([0.0, -3.0, 0.0]), way / 300.0);
-        // v' and v'' both count: (v')^2 + 4 v''/2 way = 10^2 + 4 100 way.
+        // Both v' and v'' count: the time t follows from |v'| t + |v''| t^2/2 = way.
         let speed = 10.0 + libm::sqrt(100.0 + 400.0 * way);
         near(rubbing.convergence_radius([0.0, 0.1, -1.0]), 2.0 * way / speed);
         assert_eq!(rubbing.convergence_radius([0.0; 3]), f64::INFINITY);

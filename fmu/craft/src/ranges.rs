@@ -139,7 +139,7 @@ impl Bounds {
             return Ranges { regime: Regime::Nonlinear, limited_by, is_physical: false };
         }
         let upright = self.are_upright(out.p.map(|p| p[2]));
-        // If the tank has no wave height per angle, the one of a cylinder is used: 2 R/(xi^2 - 1).
+        // If the tank has no wave height per angle, the wave height of a cylinder is used: 2 R/(xi^2 - 1).
         let height = match self.radius > 0.0 {
             true => out.wave_height / self.radius,
             false => 2.0 * libm::hypot(out.angle_x[0], out.angle_y[0]) / (XI[0] * XI[0] - 1.0),

@@ -570,8 +570,9 @@ mod tests {
         [factor, low, high]
     }
 
-    /// Damping of a tank's first mode divided by that of its laminar wall layer, with lower and upper limits. If the
-    /// correlation agrees with 1.45 layers, the limits are ±30 % of the correlation; otherwise they include both estimates.
+    /// The expected numbers are the damping of a tank's first mode divided by the damping of its laminar wall layer, and lower
+    /// and upper limits of this ratio. If the correlation agrees with 1.45 layers, the limits are ±30 % of the correlation;
+    /// otherwise they include both estimates.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [

@@ -89,13 +89,13 @@ pub const FREQUENCY: f64 = 3e-3;
 /// only because the model's frequency changes with the slosh angle in another way than the liquid's frequency.
 pub const FORCED: f64 = 8.5e-4;
 
-/// Relative error of the third order's frequency at the angle at which the error of a forced response is 3 %, for a tank
-/// in which only free motion was compared with potential flow. It is the smallest such error in upright cylinders with h/R
-/// of 0.4 and more.
+/// Relative error of the third order's frequency at the slosh angle at which the error of a forced response is 3 %. It is used
+/// for a tank in which only free motion was compared with potential flow, and is the smallest error that was found in upright
+/// cylinders with h/R of 0.4 and more.
 pub const FORCED_UNCOMPARED: f64 = 1.7e-4;
-/// Ratio of two slosh angles at which the error of a forced response is 3 %: with [`energy_terms`], divided by that of the
-/// third order. It is for a tank in which only free motion was compared with potential flow, and is the smallest such
-/// ratio in upright cylinders.
+/// Ratio of two slosh angles at which the error of a forced response is 3 %: the angle of the model with [`energy_terms`],
+/// divided by the angle of the third order. It is used for a tank in which only free motion was compared with potential flow, and
+/// is the smallest ratio that was found in upright cylinders.
 pub const ENERGY_UNCOMPARED: f64 = 1.06;
 /// Largest slosh angle, rad, at which the error of a forced response of the third order was below 3 %
 /// in any upright cylinder.
@@ -189,7 +189,7 @@ pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
 pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]) -> f64 {
     let off = shifts.iter().zip(exact);
     let off = off.filter_map(|(shift, exact)| Some((shift.as_ref()? - exact).abs()));
-    // The relative error of omega is half that of its square.
+    // The relative error of omega is half the relative error of omega^2.
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 

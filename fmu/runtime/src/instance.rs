@@ -1684,7 +1684,7 @@ mod tests {
         }
         assert!(states.iter().all(|part| part.abs() <= 1.0), "{states:?}");
         assert!(inputs.iter().all(|part| (0.0..=1.0).contains(part)), "{inputs:?}");
-        // The displacements fill the interval: of 24 places none is far from its neighbour. An input has the same
+        // The displacements fill the interval: of 24 displacements none is far from its neighbour. An input has the same
         // displacement for two points.
         states.sort_unstable_by(f64::total_cmp);
         assert!(states[0] < -0.85 && states[23] > 0.85, "{states:?}");

@@ -831,7 +831,7 @@ mod tests {
         // The predicted terms, 2 x 0.5/20 = 0.05 and 2 x 2/30, are below a quarter, and the decays are tenfold and more.
         assert!(are_negligible([0.5, 2.0, 20.0, 30.0]));
         assert!(are_negligible([0.5, 2.0, 9.0, 30.0]));
-        // One of the two terms does not decay enough over two orders, and then the other.
+        // First one of the two terms does not decay enough over two orders, and then the other one.
         assert!(!are_negligible([0.5, 2.0, 4.0, 30.0]));
         assert!(!are_negligible([0.05, 2.0, 20.0, 19.0]));
         // The decay is sufficient, but the predicted terms 4 x 1/12 and 8 x 8/81 are too large.
@@ -894,7 +894,7 @@ mod tests {
             assert_eq!(n, highest);
             let term = |n: usize| motion.coefficient_norm(n) * h.powi(n as i32);
             let largest = f64::max(term(n), term(n - 1));
-            // One of the two terms is at its limit, except for the rounding of a power.
+            // One of the last two terms is at the tolerance, except for the rounding of a power.
             assert!((largest - 1.0).abs() < 1e-12, "{largest}");
         }
     }

@@ -90,13 +90,14 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     }
 }
 
-/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero. The length is at least a fixed fraction of the
-/// longest such length. If there is no zero up to `left`, the length is more than `left`.
+/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero. The length is at least a fixed fraction
+/// of the longest length for which a bound of f'' proves this. If there is no zero up to `left`, the returned length
+/// is more than `left`.
 fn step_before_zero(a: &[f64], left: f64) -> f64 {
     let slope = a.get(1).copied().unwrap_or(0.0);
     let (mut length, mut longest): (f64, f64) = (left, 0.0);
     loop {
-        // Upper bound of -f'' over this length:
+        // Upper bound of -f'' over the first `length`:
         let (mut power, mut bend) = (1.0, 0.0);
         for (j, x) in a.iter().enumerate().skip(2) {
             bend -= (j * (j - 1)) as f64 * x.min(0.0) * power;

@@ -92,8 +92,9 @@ const SHORT: Method<6> = Method {
     order: 5.0,
 };
 
-/// Dormand and Prince's method of order 8, with error estimates of orders 5 and 3. The combined estimate is about as large
-/// as the error itself, while the estimate of [`SHORT`] is 5 to 50 times its error; the margin compensates for this.
+/// Dormand and Prince's method of order 8, with error estimates of orders 5 and 3. The combined estimate is about as large as
+/// the error itself, while the estimate of [`SHORT`] is 5 to 50 times its error. The larger `margin` of this method
+/// compensates for the difference.
 const LONG: Method<12> = Method {
     stages: &[
         (0.05260015195876773, &[(0, 0.05260015195876773)]),

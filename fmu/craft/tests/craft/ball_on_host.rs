@@ -382,9 +382,9 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
     assert!(seen[1..4].iter().all(|count| *count > 3_000), "{seen:?}");
 }
 
-/// Motion along the axis does not rotate the body that carries the tank, so that the effect of its delay by one step is known
-/// exactly. With two steps a second the body has the same velocity as a Spacecraft, through a reversal of thrust, bounces and
-/// settling at both ends.
+/// Motion along the axis does not rotate the body that carries the tank. Although the body receives the impulses one step late,
+/// it therefore has the same velocity as a Spacecraft, also with only two steps a second, through a reversal of thrust, bounces
+/// and settling at both ends.
 #[test]
 fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };

@@ -687,9 +687,9 @@ fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     }
 }
 
-/// The constant matrix counts each bob at its hinge, and the bobs of planar modes with twice their mass. This matrix minus
-/// M_a is positive semidefinite for all directions of the bobs, so that the remaining algebraic loop converges. If planar
-/// modes counted with less than twice their mass, it would not be.
+/// The constant matrix of `Lumped` contains each bob as a point mass at its hinge, and the bobs of planar modes with twice their
+/// mass. This matrix minus M_a is positive semidefinite for all directions of the bobs, so that the remaining algebraic loop
+/// converges. With less than twice the mass of planar modes the difference would not be positive semidefinite.
 #[test]
 fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     let mut tight = 0;
@@ -913,8 +913,8 @@ fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     worst
 }
 
-/// Each typical error in the equations is visible in at least one reference record, even if the accelerations are computed
-/// from the record's own states.
+/// Each typical error in the equations is visible in at least one reference record, even though the accelerations are computed
+/// from the states in the record, so that errors do not add up.
 #[test]
 fn reference_records_catch_typical_mistakes() {
     let all = records::records("craft");

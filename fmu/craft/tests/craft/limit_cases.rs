@@ -108,7 +108,7 @@ fn a_tank_is_out_of_range_beyond_each_of_its_limits_only() {
             let limit = case.tank.angle_limit[0];
             case.move_bob(limit * 1.001 + (0.0989 - 0.0005) * by, 0.0);
         }),
-        // The second mode exceeds its limit while the first mode is at rest.
+        // Here the second mode exceeds its limit while the first mode is at rest.
         (LimitedBy::ThirdOrder, |case, by| {
             case.move_bob(0.0, 0.0);
             case.tank.modes = 2;

@@ -40,8 +40,8 @@ fn craft(tank: Tank) -> Parameters {
     p
 }
 
-/// A craft with a box that moves in a plane of symmetry moves, at any amplitude, as a craft with an axisymmetric tank. The
-/// mode along the other axis is then rigid at its position at rest.
+/// If a craft with a box moves in a plane of symmetry, it moves, at any amplitude, like a craft with an axisymmetric tank: the
+/// mode along the other axis stays at its position at rest and acts as rigid liquid.
 #[test]
 fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
     for along in [0, 1] {

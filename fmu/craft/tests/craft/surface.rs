@@ -537,7 +537,7 @@ fn a_step_is_refused_if_the_largest_valid_angle_falls_to_the_angle_of_a_bob() {
         "{why}"
     );
     assert!(slosh.continuous_states()[6 * MODES + 1] > 305.0);
-    // With the coefficients of the last point the same initial angle is refused.
+    // If the tank starts at the last point of the table, the same initial angle is refused.
     let empty = TankParameters { tank: Tank { liquid_0: 300.0, ..tank }, ..p };
     let said = empty.problems();
     assert!(said.len() == 1 && said[0].contains("exceeds 16.1 degrees"), "{said:?}");

@@ -324,7 +324,7 @@ fn saved_data_that_is_not_a_stopped_step_is_refused() {
     // Invalid values of the length of the step and of the elapsed time:
     let bad = [(0, 0.01), (0, f64::INFINITY), (0, f64::NAN), (1, 0.1), (1, -1e-9), (1, f64::NAN)];
     assert!(bad.iter().all(|(n, x)| with(*n, *x).is_none()));
-    // Invalid values of each of the other numbers:
+    // Invalid values of each number after the first two:
     for n in 2..6 + STATES {
         assert!(with(n, f64::NAN).is_none() && with(n, f64::INFINITY).is_none(), "{n}");
         assert!(with(n, 0.25).is_some(), "{n}");

@@ -131,7 +131,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             let (a, b) = (torque(k as f64 * step), torque((k + 1) as f64 * step));
             inputs.tau_cmd =
                 if is_pulse { Ramp::held(a) } else { Ramp { value: a, slope: (b - a) / step } };
-            // Half steps are taken, so that two events are rarely in the same step.
+            // Each communication step is divided into two steps, so that two events are rarely in the same step.
             for _ in 0..2 {
                 plant.step(&inputs, step / 2.0).unwrap();
                 inputs.tau_cmd.value = inputs.tau_cmd.value_at(step / 2.0);

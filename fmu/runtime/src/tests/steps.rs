@@ -159,15 +159,15 @@ fn an_input_that_is_the_derivative_of_another_input_changes_the_other_input() {
     instance.do_step(0.0, 0.5).unwrap();
     assert_eq!(real(&mut instance, "z"), 1.25);
     slope(&mut instance, "w", 2.0).unwrap();
-    // The derivative is that of the next step: the platform rises at w, even if w changes later.
+    // Output derivatives belong to the next step: the platform rises at w now, even if w changes later.
     assert_eq!(rate(&mut instance, "room"), Ok(-0.5));
     instance.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut instance, "w"), 1.5);
     assert_eq!(real(&mut instance, "z"), 1.25 + 0.5 * 0.5 + 0.5 * 2.0 * 0.25);
 }
 
-/// At the end of a step outputs are limits from the left, with the slopes of this step. If a value or slope of any input is
-/// set, they belong to the next step, without the old slopes.
+/// At the end of a step outputs are limits from the left, computed with the slopes of this step. After a value or slope of any
+/// input is set, the outputs belong to the next step, without the old slopes.
 #[test]
 fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     let ramped = || {
