@@ -93,8 +93,8 @@ fn an_input_follows_others_exactly_where_the_model_sets_its_slope<M: Model>() {
     }
 }
 
-/// If an input is the derivative of another input, the model itself changes the other input within a step, so
-/// that a host cannot.
+/// If an input is the derivative of another input, the model itself changes the other input within a step. Therefore a host
+/// cannot set the other input within steps.
 #[test]
 fn only_inputs_whose_slopes_the_model_sets_lack_intermediate_update() {
     an_input_follows_others_exactly_where_the_model_sets_its_slope::<HubSlosh::HubSlosh>();

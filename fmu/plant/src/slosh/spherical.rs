@@ -59,8 +59,8 @@ pub struct Spherical {
     dir: Vector2,
     dir_z: Series,
     dir_d: Vector2,
-    /// The rate p' of the slosh mass's direction times the drag coefficient, which is divided by its value at the start of
-    /// the expansion: the horizontal part with its components exchanged, and then the upward component.
+    /// The rate p' of the slosh mass's direction, multiplied by the drag coefficient, which is divided by its value at the start
+    /// of the expansion. The elements are the two horizontal components in exchanged order, and then the upward component.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,

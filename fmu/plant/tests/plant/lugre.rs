@@ -165,7 +165,7 @@ fn driven(
 
 #[test]
 fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
-    // The hub moves slowly from rest: g stays c + d, so that F = g (1 - exp(-sigma_0 x/g)).
+    // The hub moves slowly from rest, so that g stays c + d and F = g (1 - exp(-sigma_0 x/g)).
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma1 = 0.0;
     p.friction.b = 0.0;

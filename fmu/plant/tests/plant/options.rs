@@ -353,7 +353,7 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
             let calculated = weightless.calculated().damping[n];
             assert!((started / calculated - 1.0).abs() < 1e-14, "{started} {calculated}");
         }
-        // The damping ratio is also that of the motion, from the envelope over a period.
+        // The motion also decays with this damping ratio, which is measured from the envelope over a period.
         let omega = TAU * weightless.calculated().frequency[0];
         let before = plant.outputs(&inputs_with_gravity(0.0)).energy;
         plant.step(&inputs_with_gravity(0.0), 2.0 * TAU / omega).unwrap();

@@ -241,7 +241,7 @@ fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     close(ask("net[1]", "start.level[1]", 2.0).unwrap(), -1.0, 1e-11);
     close(ask("net[1]", "q[1]", 1.0).unwrap(), 1.0, 1e-11);
     close(ask("sum", "start.level[2]", 1.0).unwrap(), 1.0, 1e-11);
-    // If the known is 0, the step follows from its nominal value.
+    // If the value of the known is 0, the step of the difference follows from its nominal value.
     close(ask("room", "z", 1.0).unwrap(), -1.0, 1e-11);
     assert_eq!(ask("sum", "q[1]", 0.0), Ok(0.0));
     let known = "cannot be a known in initialization mode (allowed: inputs and parameters)";
