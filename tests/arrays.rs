@@ -411,7 +411,7 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
         let (status, text) = refusal(run.instance.set_numbers(&[tanks], &[wrong]));
         assert_eq!(status, Status::Discard);
         assert!(text.contains("tanks = ") && text.contains("(allowed: 0 to 4)"), "{text}");
-        // After the errors the instance can be used.
+        // After the refused calls the instance can still be used.
         run.instance.set_numbers(&[tanks], &[3u64]).unwrap();
         let (_, text) = refusal(run.instance.set_numbers(&[mass], &[1.0]));
         assert!(text.contains("configuration mode"), "{text}");

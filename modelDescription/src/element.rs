@@ -1,4 +1,4 @@
-//! XML elements, written with two spaces of indentation.
+//! XML elements as text, indented by two spaces per level.
 
 use std::fmt::Display;
 

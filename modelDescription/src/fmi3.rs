@@ -35,7 +35,7 @@ fn description<M: Model>(layout: Layout) -> Element {
     let used: Vec<_> = table.units().map(|unit| unit.name).collect();
     let units = UNITS.iter().filter(|unit| unit.name == TIME_UNIT || used.contains(&unit.name));
     let variables = Element::new("ModelVariables");
-    // CasADi 3.8 cannot read an entry without dependencies.
+    // CasADi 3.8 cannot read an entry of ModelStructure without dependencies.
     let all_unknowns = |list, name| {
         unknowns::<M>(list, name, "valueReference", Long::Dependencies, |s| reference(layout, s))
     };
@@ -107,7 +107,7 @@ fn array<M: Model>(v: &'static Variable<M>) -> Element {
         .filter_map(|element| v.start(&mut parameters, &mut inputs, element))
         .map(text)
         .collect();
-    // A single value applies to all elements.
+    // In FMI 3.0 a single start value applies to all elements of an array.
     if starts.iter().all(|start| *start == starts[0]) {
         starts.truncate(1);
     }

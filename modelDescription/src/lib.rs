@@ -222,7 +222,7 @@ fn real(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// Returns the state whose derivative an element of an entry is.
+/// Returns the state that belongs to an element if the entry is a derivative.
 fn state_of<M: Model>(v: &Variable<M>, element: usize) -> Option<&'static Scalar<M>> {
     match v.access {
         Access::Derivative(place) => M::table().state_at(place(element)),

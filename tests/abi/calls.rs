@@ -331,7 +331,7 @@ fn every_callback_and_the_resource_location_may_be_null() {
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();
     instance.do_step(0.0, 0.1).unwrap();
-    // An error must be reported, but there is no logger.
+    // The step is refused although there is no logger to which the error could be reported.
     assert!(instance.do_step(0.0, -0.1).is_err());
     // If fmi2Instantiate fails, there is no logger for the reason, either.
     with.guid = None;
@@ -757,7 +757,7 @@ fn the_status_of_the_last_step_can_be_queried() {
     assert_eq!(instance.status(DO_STEP_STATUS).unwrap(), 0, "fmi2OK");
     assert_eq!(instance.real_status(LAST_SUCCESSFUL_TIME).unwrap(), 0.25);
     assert!(!instance.boolean_status(TERMINATED).unwrap());
-    // No step is ever pending.
+    // These queries have no answer, for example because no step is ever pending.
     let unanswered = [
         instance.string_status(PENDING_STATUS).unwrap_err(),
         instance.integer_status(DO_STEP_STATUS).unwrap_err(),

@@ -428,7 +428,7 @@ fn rollback_is_exact_in_a_thousand_random_sequences() {
             ("friction.model", number(law)),
             ("slosh.modes", number(rng.i32(1..=4))),
             ("friction.eps", Value::Real(1e-3)),
-            // LuGre friction stays passive with every tunable Coulomb torque.
+            // Without bristle damping LuGre friction is passive with every tunable Coulomb torque.
             ("friction.sigma1", Value::Real(0.0)),
             ("init.omega", Value::Real(0.1 * rng.f64())),
             ("init.slosh_angle", Value::Real(0.2 * rng.f64())),
@@ -941,7 +941,7 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
                         // The models linear and planar start along the direction of mode 1.
                         || [2, 3].contains(&slosh_model)
                             && parameter.name() == "slosh.table.direction[1]"
-                        // The models spherical and liquid move along both axes.
+                        // The slosh models spherical and liquid move along both axes and refuse these parameters.
                         || [4, 5].contains(&slosh_model)
                             && ["slosh.table.one_axis", "slosh.table.direction"]
                                 .iter()

@@ -64,7 +64,7 @@ fn tank(bench: &mut Instance) -> Tank {
     (tank.mass[0], tank.length[0], tank.hinge[0]) =
         (get("slosh.mass[1]"), get("slosh.length[1]"), 0.02);
     tank.zeta[0] = get("slosh.damping[1]");
-    // 2 R/(xi_1^2 - 1)
+    // The wave height per slosh angle in a cylinder is 2 R/(xi_1^2 - 1).
     tank.wave[0] = get("tank.d") / (1.841_183_781_340_659_5_f64.powi(2) - 1.0);
     let [y, x] = ANGLES.map(f64::sin);
     let [y_dot, x_dot] = [0, 1].map(|i| ANGLES[i].cos() * RATES[i]);

@@ -1,4 +1,4 @@
-//! Tables of evidence in the book name only tests that exist.
+//! Tests that the tables of evidence in the book name only tests that exist.
 
 use std::fs;
 use std::path::Path;

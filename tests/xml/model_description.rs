@@ -1,4 +1,4 @@
-//! modelDescription.xml agrees with the binary, and is valid by the standard.
+//! Tests that modelDescription.xml agrees with the binary, and is valid by the standard.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -105,7 +105,7 @@ fn causality_determines_variability_initial_and_start() {
         let expected = match variable.get("causality").unwrap() {
             "input" => (moving, None, true),
             "output" | "local" => (moving, Some("calculated"), false),
-            // Friction can change during a run.
+            // Friction parameters are tunable, because friction can change during a run.
             "parameter" if name.starts_with("friction.") => ("tunable", Some("exact"), true),
             "parameter" => ("fixed", Some("exact"), true),
             "calculatedParameter" => ("fixed", Some("calculated"), false),

@@ -577,7 +577,7 @@ impl<T: Number> Contents<'_, T> {
             let turned = cross(hinge, p);
             let mut centring = l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k);
             let (mut end_rate, mut centring_d) = (zero, c(0.0));
-            // Mass flow out of the bob.
+            // Terms of the mass flow out of the bob, for a tank that drains.
             if drains {
                 let height_d = dot(e, p_d);
                 let p_perp_d = sub(p_d, scale(height_d, e));
@@ -798,7 +798,7 @@ impl Outflow<'_> {
         for t in [turn, h] {
             let liquid = self.left(liquid, t);
             let slack = 1e-12 * high;
-            // NaN is outside the range, too.
+            // NaN is outside the range, too, so that it is refused.
             if !(low - slack..=high + slack).contains(&liquid) {
                 let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
                 return Err(StepError::Model(format!(
@@ -912,7 +912,7 @@ mod tests {
         assert_eq!(passes(2.0, 0.0, 0.0, 101.5), 0.75);
         assert_eq!(passes(-2.0, 0.0, 0.0, 98.5), 0.75);
         assert_eq!(passes(0.0, 0.0, 0.0, 101.5), 10.0);
-        // Here the time follows from 4 t - t^2 = 3.
+        // With this flow the time at which the mass passes the point follows from 4 t - t^2 = 3.
         assert_eq!(passes(4.0, -2.0, 0.0, 103.0), 1.0);
         assert_eq!(passes(4.0, -2.0, 1.0, 103.0), 3.0);
     }

@@ -204,7 +204,7 @@ impl Drag {
             (constant(n, 0.5 * self.floor2) - rest) / self.divisor[0]
         };
         self.w2[n] = self.above[n] * self.inv_l + constant(n, self.k_m);
-        // (w2/w2_ref)^(q/2)
+        // The power (w2/w2_ref)^(q/2), with q from the damping law.
         let q = 0.5 * exponent(self.law);
         self.power[n] = if n == 0 {
             libm::pow(self.w2[0] / self.w2_ref, q)

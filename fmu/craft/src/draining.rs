@@ -295,7 +295,8 @@ impl Draining {
         }
         let before = self.energy(state);
         let jump = core::array::from_fn(|i| now[i] - state.flow[i]);
-        // The accelerations are linear in the slopes of the flows.
+        // The accelerations are linear in the slopes of the flows. Their difference with and without the jump as a
+        // slope is the impulse.
         let [with, without] =
             [jump, [0.0; TANKS]].map(|slope| self.rates(&state.x, &Acting::flowing(now, slope)));
         let x = &mut state.x;
@@ -393,7 +394,7 @@ impl Draining {
         if self.mount == Mount::Pivot {
             return self.solve(&whole.mass_matrix(), [force, torque], axes);
         }
-        // Translation and rotation are independent about the centre of mass c.
+        // About the centre of mass c translation and rotation are independent of each other.
         let inverse = whole.mass.at_least(SMALLEST_DIVISOR).recip();
         let c = scale(inverse, whole.moment);
         let parallel = dot(c, whole.moment);
@@ -612,7 +613,7 @@ mod tests {
             tank.position = [size(0.6), size(0.6), size(0.4)];
             tank.q = [1.0, size(0.1), size(0.1), size(0.3)];
             tank.modes = (seed as usize + i) % 4;
-            // All damping laws occur, and drag that grows with the amplitude.
+            // The tanks have all damping laws, and some have drag that grows with the amplitude.
             tank.damping_law = DampingLaw::ALL[(seed as usize + i + 1) % 3];
             tank.zeta_amplitude = [0.02 * (seed % 2) as f64; MODES];
             tank.fill.points = crate::POINTS;

@@ -842,7 +842,7 @@ impl Lump {
         if f[0] > TOUCHING || f[1] > RESTING {
             return false;
         }
-        // Magnitude of the terms of f'', for rounding.
+        // Magnitude of the terms of f'', from which their rounding error follows.
         let g = times(&self.d, self.x_0);
         let size =
             1.0 + 2.0 * largest(g) * largest(x_2) + dot(self.rho[1], times(&self.d, self.rho[1]));
@@ -1057,7 +1057,7 @@ mod tests {
         lump.squared[0] = 1.0;
         lump.state = BallState::Sliding;
         assert_eq!(next(&lump), None);
-        // Here the rate grows with time as well.
+        // Here the rate along the wall grows with time, and with it the force above which drag acts.
         lump.x_d = along_x(&[2.0, 1.0]);
         assert_eq!(lump.excess(3)[1], 36.0 - 36.0);
     }

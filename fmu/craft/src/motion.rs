@@ -169,7 +169,7 @@ pub struct CraftMotion {
     longest: f64,
     expansion: Expansion,
     start: Start,
-    /// States at the start of the step.
+    /// Continuous states at the start of the step.
     pub before: [f64; STATES],
     /// States at the start of the expansion if it starts within a step ([`Start::Within`]).
     begin: [f64; STATES],

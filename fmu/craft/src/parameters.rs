@@ -32,7 +32,7 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// Returns the matrix by rows.
+    /// Returns the inertia matrix by rows, kg m2.
     pub fn matrix(&self) -> [[f64; 3]; 3] {
         let Inertia { xx, yy, zz, xy, xz, yz } = *self;
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]

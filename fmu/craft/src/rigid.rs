@@ -203,7 +203,7 @@ impl<T: Number, const N: usize> Factors<T, N> {
     #[inline(always)]
     fn set_row(&mut self, matrix: &[[T; N]; N], j: usize) -> T {
         let Factors { l, inverse } = self;
-        // Row j of L D, then of L.
+        // Compute row j of L D, and from it row j of L.
         let mut d = matrix[j][j];
         for k in 0..j {
             let mut x = matrix[j][k];
@@ -258,7 +258,7 @@ impl<M: Copy, const N: usize> Factors<M, N> {
 /// its inverse exceeds [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
     let Factors { inverse, .. } = Factors::new(matrix);
-    // NaN is outside the range.
+    // NaN is outside the range, so that it counts as singular.
     if !inverse.iter().all(|x| (0.0..=LARGEST_INVERSE).contains(x)) {
         return 0.0;
     }

@@ -241,7 +241,7 @@ impl Spacecraft {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
             let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
-            // The equations of a draining craft give its accelerations.
+            // In a draining craft the accelerations follow from its own equations.
             let axial = first
                 .next()
                 .filter(|_| self.draining.is_none())

@@ -564,7 +564,7 @@ mod tests {
 
     fn numbers(parts: &[Part]) -> [f64; 3] {
         let Estimate { factor, interval: [low, high], interval_of_others } = estimate(parts, &[]);
-        // The interval of the other modes begins at the laminar layer.
+        // The interval of all modes but the first begins at the laminar layer.
         assert_eq!(interval_of_others[0], 1.0);
         assert!(interval_of_others[1] >= high);
         [factor, low, high]
@@ -597,7 +597,7 @@ mod tests {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);
         is_near(numbers(&[part(1.0, 3.0, 0.0)]), [1.45, 1.0, 3.9]);
         is_near(numbers(&[part(1.0, 0.8, 1.0)]), [1.45, 1.0, 1.3 * 1.45]);
-        // The factor 0.9 is half-way between 1 and 0.8.
+        // A factor of 0.9 is half-way between 1, at which the correlation is used, and 0.8, at which 1.45 replaces it.
         is_near(numbers(&[part(1.0, 0.9, 1.0)]), [1.225, 1.0, 1.3 * 1.45]);
         is_near(numbers(&[part(1.0, 3.45, 0.25)]), [1.95, 1.0, 1.3 * 3.45]);
     }

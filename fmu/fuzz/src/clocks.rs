@@ -157,7 +157,7 @@ fn compare<M: Model, V: Values>(
             let exact = if is_sampled { &even_steps } else { same_steps };
             let is_placed = is_sampled || interface == Interface::ModelExchange;
             let mut allowed = allowed(exact, n, tick, is_placed, start);
-            // This output is a time of the host's clock.
+            // This output is a simulation time, so that it is shifted by the start time of the host.
             let is_time = scalar.variable.name == "event_time";
             let begin = if is_time { start } else { 0.0 };
             allowed += if is_time { last_digits(start) } else { 0.0 };

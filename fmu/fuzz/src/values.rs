@@ -128,7 +128,7 @@ fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
         0 => min,
         1 => max,
         2 => min + share * (max - min),
-        // The logarithm is uniformly distributed.
+        // The logarithm of the value is uniformly distributed.
         3 | 4 if min > 0.0 => min * (max / min).powf(share),
         5 | 6 => quantity.nominal.unwrap_or(1.0) * (2.0 * share - 1.0),
         _ => real(data)?,

@@ -356,7 +356,7 @@ mod tests {
         p.init.slosh_rate = 2.0;
         p.init.slosh_rate_radial = 3.0;
         if p.slosh.table.is_askew(2) {
-            // The motion is along the direction of mode 1.
+            // The initial motion must be along the direction of mode 1.
             let across = libm::tan(p.slosh.table.direction[0]);
             p.init.slosh_angle_radial = across * p.init.slosh_angle;
             p.init.slosh_rate_radial = across * p.init.slosh_rate;
@@ -578,7 +578,7 @@ mod tests {
             assert_eq!(indicators[forward].min(indicators[backward]), f64::MIN_POSITIVE);
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact().2, sign as i32);
-            // A second event at the same instant changes nothing.
+            // A second call at the same instant changes nothing.
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact(), (1, 0.0, sign as i32));
         }

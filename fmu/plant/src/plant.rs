@@ -372,7 +372,7 @@ impl Plant {
             }
             state.x[x::WHEEL_SPEED] = speed;
             t = if length == h - t { h } else { t + length };
-            // At this time the wheel's torque changes its slope.
+            // At this time the slope of the wheel's torque changes, which is an event.
             if stopped.is_some() || t < h && t > passed {
                 stopped = Some(t);
                 break;

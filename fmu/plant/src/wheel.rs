@@ -71,7 +71,7 @@ impl Wheel {
             let speed = speed - torque.integral(h) / self.inertia;
             return Piece { length: h, torque, speed, passed: None };
         }
-        // The torque command passes one of its limits, or zero.
+        // The piece ends where the torque command passes a torque limit or zero.
         let (mut length, mut passed) = (h, None);
         if command.slope != 0.0 {
             for level in [-self.tau_max, 0.0, self.tau_max] {

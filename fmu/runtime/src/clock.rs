@@ -32,7 +32,7 @@ pub struct Instant {
 pub(crate) struct Clock {
     pub start: f64,
     pub stop: Option<f64>,
-    /// The host's time, s.
+    /// Present simulation time as the host states it, s.
     pub time: f64,
     /// True in Model Exchange, where the host sets `time`. False in Co-Simulation, where steps advance it.
     pub is_hosts: bool,

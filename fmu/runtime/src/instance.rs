@@ -66,7 +66,7 @@ pub struct Instance<M: Model, V: Version> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     Nothing,
-    /// Integers, enumerations and Booleans.
+    /// Only integers, enumerations and Booleans are valid.
     Discrete,
     All,
 }
@@ -1673,7 +1673,7 @@ mod tests {
         let (mut states, mut inputs) = (Vec::new(), Vec::new());
         for point in 1..9 {
             let (by_state, by_input) = moved(0.01, point, 0.5);
-            // Another share changes the displacements in proportion.
+            // If the share is doubled, the displacements are twice as large.
             let (twice, inputs_twice) = moved(0.02, point, 0.5);
             for n in 0..3 {
                 assert!((by_state[n] - twice[n]).abs() < 1e-12, "{by_state:?} {twice:?}");

@@ -328,7 +328,7 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Sets the allowed range of a real quantity.
+    /// Sets the range of allowed values of a real variable.
     pub const fn range(mut self, min: f64, max: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.min = Some(min);
@@ -343,7 +343,7 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Sets the smallest allowed value of a real quantity.
+    /// Sets the smallest allowed value of a real variable.
     pub const fn at_least(mut self, min: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.min = Some(min);
@@ -505,7 +505,7 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the smallest allowed value of a quantity.
+    /// Returns the smallest allowed value of a real variable; `None` if there is no limit.
     pub const fn min(&self) -> Option<f64> {
         match self.kind {
             Kind::Real(quantity) => quantity.min,
@@ -534,7 +534,7 @@ impl<M: Dynamics> Variable<M> {
             && (max.is_none_or(|max| change <= max) || min.is_none_or(|min| change <= -min))
     }
 
-    /// Returns the unit of a quantity; "" for other types.
+    /// Returns the unit of a real variable; "" for other types.
     pub const fn unit(&self) -> &'static str {
         match self.kind {
             Kind::Real(quantity) => quantity.unit,

@@ -485,7 +485,7 @@ impl Search {
 /// with `t`. Returns `None` if no order is high enough.
 #[inline(always)]
 fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usize> {
-    // This is 1 divided by the allowed fraction of the error.
+    // 1 divided by the fraction of the allowed error that this step may have.
     let share = if t < FULL_LENGTH { FULL_LENGTH / t } else { 1.0 };
     let mut search = Search {
         t,
@@ -825,7 +825,7 @@ mod tests {
     /// in units of the allowed error.
     #[test]
     fn a_series_ends_when_its_next_two_terms_are_negligible_or_predicted_to_be() {
-        // Both terms are computed.
+        // Two successive computed terms are at the tolerance.
         assert!(are_negligible([1.0, 1.0, 9.0, 9.0]));
         assert!(!are_negligible([1.1, 0.1, 9.0, 9.0]));
         // The predicted terms, 2 x 0.5/20 = 0.05 and 2 x 2/30, are below a quarter, and the decays are tenfold and more.
@@ -929,7 +929,7 @@ mod tests {
         let StepError::TooManySteps { time, max_steps: 3, advice: "; rest" } = error else {
             panic!("{error}");
         };
-        // Three steps are about 2 s long each.
+        // Each of the three steps is about 2 s long.
         assert!(time > 9.0 && time < 20.0, "{time}");
         let mut steps = Steps::new(5, "");
         steps.add_steps(3, 0.0).unwrap();

@@ -293,7 +293,7 @@ fn try_step<const D: usize, const S: usize>(
         let sum = &mut sum[..if weights.is_empty() { 0 } else { n }];
         combine(weights, &k, sum);
         let errors = sum.iter().zip(start.allowed).map(|(sum, allowed)| (h * sum).abs() / allowed);
-        // NaN counts as the largest error.
+        // An error that is NaN counts as the largest error.
         errors.fold(0.0, |most, off| if off <= most { most } else { f64::min(off, LARGEST_ERROR) })
     });
     let error = f64::max(error, LEAST_ERROR);

@@ -659,7 +659,7 @@ impl Simulator {
     fn state_after(&self, s: &Pair, h: f64) -> Pair {
         let inverse = self.inertia.try_inverse().unwrap();
         let arm = v(&self.p.craft.r);
-        // Velocity, acceleration, q' and w' at an instant.
+        // Returns velocity, acceleration, q' and w' of the two bodies at an instant.
         let rates = |s: &Pair| {
             let torque = self.torque - arm.cross(&self.force) - s.w.cross(&(self.inertia * s.w));
             let q_d = s.q.into_inner() * Quaternion::from_parts(0.0, s.w) * 0.5;

@@ -133,7 +133,7 @@ fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
         }
         let want = v(&out.velocity) * out.mass + turn * inner;
         let off = (v(&out.momentum) - want).norm() / want.norm();
-        // The errors are e^4/30 of the fifth derivative and 1e-16/e.
+        // The difference has the errors e^4/30 times the fifth derivative, and 1e-16/e.
         assert!(off < 1e-10, "{seed} {off:e}");
     }
 }

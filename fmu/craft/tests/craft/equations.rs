@@ -221,7 +221,7 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
         let rate = across * wave(&slope.angle_x) + along * wave(&slope.angle_y);
         assert!((out.wave_height - f64::hypot(across, along)).abs() < 1e-15);
         assert!((out.wave_height * slope.wave_height - rate).abs() < 1e-14);
-        // Derivatives along the motion itself.
+        // The following derivatives are taken along the motion itself.
         let along = |t: f64| {
             let mut moved = tank.clone();
             let dx = tank.clone().derivatives(&u);

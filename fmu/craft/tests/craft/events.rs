@@ -73,7 +73,7 @@ fn case(seed: u64) -> Case {
         torque: Ramp::held(torque),
         ..Inputs::default()
     };
-    // The simulation lasts about two to five crossings of the tank.
+    // The simulation lasts for about two to five crossings of the tank by the liquid.
     let end = random.between(2.0, 5.0) * f64::sqrt(4.0 * half / acceleration);
     Case { p, u, end }
 }

@@ -286,7 +286,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let (drag, centring) = (moved * (c * l), perp * (tank.k[n] * l));
         let phi = drag + centring;
         let at = 6 + 5 * b;
-        // Newton's law of the bob:
+        // Equations from Newton's law of the bob:
         put(&mut m, at, 0, one * mass);
         let euler = if wrong(EulerSign) { -1.0 } else { unless(EulerLeftOut) };
         put(&mut m, at, 3, -rho.cross_matrix() * (mass * euler));
@@ -295,7 +295,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
             m[(at + k, at + 3)] = shape.normal[k];
             // Second derivative of the surface's equation, which for a pendulum is |p| = 1:
             m[(at + 3, at + k)] = shape.normal[k];
-            // Force of the rod on the craft:
+            // Force of the rod on the craft, and its moment about O:
             let arm = if wrong(PullAboutTank) { rho - v(&tank.position) } else { rho };
             m[(k, at + 3)] = -shape.normal[k] * unless(NoAddedMass);
             m[(3 + k, at + 3)] = -arm.cross(&shape.normal)[k] * unless(NoAddedMass);
@@ -714,7 +714,7 @@ fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
         let turn = axes * rod.normalize().cross(&b);
         let l = p.tank.length[0];
         let at = v(&p.tank.position) + axes * hinge;
-        // Here a_P = l b and w' = p x b.
+        // For this acceleration a_P = l b and w' = p x b.
         let a = axes * b * l - turn.cross(&at);
         let equal = DVector::from_iterator(6, a.iter().chain(turn.iter()).copied());
         let left = equal.dot(&(&excess * &equal));

@@ -87,7 +87,7 @@ fn a_craft_moves_alike_for_any_reference_point_of_its_positions() {
     for seed in 0..8 {
         let (mut random, p, knots) = random_craft(seed);
         let want = run(&p, &knots);
-        // O is shifted by d, body axes.
+        // The new O is at the position d from the old O, body axes.
         let d = v(&random.vector::<3>(1.0));
         let mut moved = p;
         let less = |x: [f64; 3]| <[f64; 3]>::from(v(&x) - d);

@@ -668,7 +668,7 @@ fn the_dissipated_energy_of_a_long_step_is_the_sum_over_short_steps() {
         assert!(now > before, "{now} {before}");
         before = now;
     }
-    // The allowed difference is the tolerance of a hundred steps.
+    // The allowed difference is a hundred steps times the tolerance of a step.
     let dissipated = long.outputs(&inputs).dissipated;
     assert!((dissipated / before - 1.0).abs() < 1e-8, "{dissipated} {before}");
 }

@@ -127,7 +127,7 @@ fn a_box_at_rest_under_gravity_has_two_frequencies() {
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     for n in [0, 1] {
         let mut dx = [0.0; STATES];
-        // The test covers both directions of every bob.
+        // The change of the states has a part in each of the two directions of every bob.
         for bob in [index::bob(0, 0), index::bob(0, 1)] {
             (dx[bob], dx[bob + 1]) = (1.0, 1.0);
         }

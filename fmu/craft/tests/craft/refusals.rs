@@ -172,7 +172,7 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
     assert!(negative.len() == 1, "{negative:?}");
     assert!(negative[0].contains("the inertia matrix is -45602"), "{negative:?}");
     assert_eq!(equal(-0.49), [""; 0]);
-    // The same is true for a craft of any size.
+    // A craft with a millionth of the inertia is refused for the same reason.
     let small = with([1.0, 1.0, 1.0, -0.51, -0.51, -0.51].map(|x| 1e-6 * x));
     assert!(small.len() == 1 && small[0].contains("negative principal moment"), "{small:?}");
     let wide = with([1.0, 1.0, 2.5, 0.0, 0.0, 0.0].map(|x| 1e-6 * x));
@@ -239,7 +239,7 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     one(|t| t.liquid_0 = 190.9, "tank[1].liquid_0 = 190.9");
     assert_eq!(with(|t| t.liquid_0 = t.fill.liquid[2]), [""; 0]);
     one(|t| t.fill.mass[0][2] = 190.0, "tank[1].fill.mass at point 3 adds up to 193.9");
-    // The modal masses may be exactly the mass of the liquid.
+    // The modal masses may add up to exactly the mass of the liquid.
     let all = |t: &mut Tank| t.fill.mass[0][2] = t.fill.liquid[2] - t.fill.mass[1][2];
     let problems = with(all);
     assert!(problems.iter().all(|text| !text.contains("adds up")), "{problems:?}");

@@ -209,7 +209,7 @@ fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
         }
         let u = Inputs { force: Ramp::held([0.0, 0.0, 2450.0]), ..Inputs::default() };
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
-        // The bobs swing in opposite directions along y.
+        // In this mode of motion the bobs swing in opposite directions along y.
         let at = [index::bob(0, 0) + 1, index::bob(1, 0) + 1];
         let mut dx = [0.0; STATES];
         (dx[at[0]], dx[at[1]]) = (1.0, -1.0);

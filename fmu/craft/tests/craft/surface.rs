@@ -127,7 +127,7 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
     tank.nonlinear_stiffness[0] = 1.0;
     let u = TankInputs { a: Ramp::held([0.0, 0.0, G]), ..TankInputs::default() };
     let p = TankParameters { tank, ..TankParameters::default() };
-    // The limit follows from u (1 - u) = 0.5/7.
+    // The angle at which half of the inertia is left follows from u (1 - u) = 0.5/7.
     let sin = f64::sqrt((1.0 - f64::sqrt(1.0 - 2.0 / 7.0)) / 2.0);
     let degrees = sin.asin().to_degrees();
     let bound = format!("exceeds {:.1} degrees", (degrees * 10.0).floor() / 10.0);

@@ -88,7 +88,7 @@ impl FrictionLaw for Lugre {
             )];
         }
         let (g_min, g_max) = bounds(p);
-        // Other checks report a factor B <= 0.
+        // A factor B <= 0 is reported by other checks.
         let gives_energy = p.sigma1 * (g_max - g_min) > p.b * g_min * (1.0 + 1e-12);
         if g_min <= 0.0 || !gives_energy {
             return Vec::new();

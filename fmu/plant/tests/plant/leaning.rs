@@ -200,7 +200,7 @@ fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
         assert!(said(model, 0.71, "exceeds 1 %") && !said(model, 0.69, "exceeds 1 %"));
         assert!(!said(model, 0.02, "bench.tilt"), "{:?}", warnings(model, 0.02));
     }
-    // The difference sqrt(1 + 0.65 s^2) is 1 % at 0.176.
+    // At the slope 0.176 the two frequencies differ by 1 %, from the ratio sqrt(1 + 0.65 s^2).
     assert!(
         said(SloshModel::Spherical, 0.19, "too high") && !said(SloshModel::Spherical, 0.16, "too")
     );

@@ -203,7 +203,7 @@ fn friction_before_sliding_follows_a_closed_hysteresis_loop() {
     let dissipated: f64 = third.iter().map(|(.., power)| power * h).sum();
     assert!(area > 0.05 * amplitude * G_MAX, "{area}");
     assert!((area / dissipated - 1.0).abs() < 0.02, "{area} {dissipated}");
-    // The friction torque is always smaller than during sliding.
+    // Before sliding the friction torque is always smaller than during sliding.
     assert!(third.iter().all(|(_, friction, _)| friction.abs() < 0.8 * G_MAX));
 }
 

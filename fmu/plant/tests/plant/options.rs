@@ -440,7 +440,7 @@ fn warnings_name_breaking_parameters_without_effect() {
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
     p.slosh.breaking_steepness = 0.66;
     assert_eq!(Plant::warnings(&p, &inputs_with_gravity(9.81)), [""; 0]);
-    // It bounds the range (limited_by) without damping.
+    // Even without damping by breaking, the steepness limits the range of validity (limited_by).
     assert_eq!(p.overridden("slosh.breaking_steepness"), None);
     p.slosh.zeta_breaking = 0.04;
     assert_eq!(p.overridden("slosh.breaking_steepness"), None);

@@ -180,7 +180,7 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     };
     let none_and_third = [LimitedBy::None, LimitedBy::ThirdOrder];
     for (model, limit) in [
-        // The limits are sqrt(2 0.00085/0.429) and sqrt(2 0.00085/(0.429 - 0.125)).
+        // The limits of A are sqrt(2 0.00085/0.429) for the linear model and sqrt(2 0.00085/(0.429 - 0.125)) for a pendulum.
         (SloshModel::Linear, 3.605),
         (SloshModel::Planar, 4.28),
         (SloshModel::Spherical, 4.28),
@@ -212,7 +212,7 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     p.init.omega = 5.0;
     assert_eq!(reason(&p, 9.81), LimitedBy::None);
     p.init.omega = 0.0;
-    // The Bond number is 92.1 g.
+    // The Bond number of the tank is 92.1 s2/m times g.
     assert_eq!([1.08, 1.09].map(|g| reason(&p, g)), [LimitedBy::BondNumber, LimitedBy::None]);
     p.slosh.capillarity = true;
     assert_eq!(reason(&p, 0.5), LimitedBy::None);
@@ -246,7 +246,7 @@ fn a_table_of_modes_has_its_own_limits() {
         [44.0, 46.0].map(|degrees| liquid(0.0, degrees)),
         [LimitedBy::None, LimitedBy::ThirdOrder]
     );
-    // The limit is sqrt(2 0.00085/|3 0.7/8 - 1.4/2|) = 3.57 degrees.
+    // The limit of the slosh angle is sqrt(2 0.00085/|3 0.7/8 - 1.4/2|) = 3.57 degrees.
     let linear = [3.55, 3.6].map(|degrees| reason(SloshModel::Linear, 10.0, degrees));
     assert_eq!(linear, [LimitedBy::None, LimitedBy::ThirdOrder]);
 }

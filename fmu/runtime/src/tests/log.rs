@@ -38,7 +38,7 @@ fn failures_come_with_status_and_category() {
     log.filter = Filter::NONE;
     log.report(&Fault { severity: Severity::Fatal, text: String::new() });
     assert!(lines.take().is_empty());
-    // Without a logger of the host, nothing happens.
+    // If the host has no logger, a report has no effect.
     Log::new(None).report(&Fault { severity: Severity::Fatal, text: String::new() });
 }
 

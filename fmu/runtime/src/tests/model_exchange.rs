@@ -82,7 +82,7 @@ fn discrete_changes_happen_only_at_events() {
     assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(true)));
     assert_eq!(real(&mut instance, "level[1]"), 1.5);
     assert_eq!((instance.event_count(), instance.time()), (1, 0.0));
-    // A second call has no effect.
+    // A second call of `new_discrete_states` has no effect.
     let info = EventInfo { states_changed: false, next_time: Some(5.0) };
     assert_eq!(instance.new_discrete_states(), Ok(info));
     instance.enter_continuous_time_mode().unwrap();

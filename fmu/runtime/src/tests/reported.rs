@@ -59,7 +59,7 @@ fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     assert_eq!(host.step_to_event(0.5, 0.001, false), Ok(event));
     assert_eq!(valve_outputs(&mut host), CLOSED, "the valve has opened");
     assert!((level(&mut host) / before - 0.5).abs() < 1e-3, "half of the vessel must be spilt");
-    // The event remains until the host handles it.
+    // The event is reported again until the host handles it.
     assert_eq!(host.step_to_event(0.501, 0.5, false), Ok(event));
     host.enter_event_mode().unwrap();
     assert_eq!(valve_outputs(&mut host), CLOSED);
@@ -79,7 +79,7 @@ fn after_an_error_before_initialization_discrete_outputs_have_their_start_values
     host.after_error();
     assert_eq!(host.state(), InstanceState::Terminated);
     assert_eq!(valve_outputs(&mut host), CLOSED);
-    // Saved states distinguish discrete outputs with a value from those without.
+    // A saved state contains whether discrete outputs have a value.
     let bytes = to_bytes(&host);
     let mut other = from_bytes::<Vessels, Fmi3>(&bytes).unwrap();
     assert_eq!(valve_outputs(&mut other), CLOSED);
@@ -169,7 +169,7 @@ fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
         assert!(said.contains(&expected), "{said}");
     }
     host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(-9.9e29)).unwrap();
-    // If only a state is set, the call sets the state.
+    // An input out of its range is discarded, too.
     let said = discarded(host.set(&SET_FLOAT64, &[number("q[2]")], |_| Value::Real(11.0)));
     assert!(said.contains("q[2] = 11.0"), "{said}");
     let start = number("start.level[1]");

@@ -29,7 +29,7 @@ fn inputs_change_along_their_derivatives_within_a_step() {
     close(real(&mut instance, "level[1]"), x, 1e-15);
     close(real(&mut instance, "level[2]"), 4.0, 1e-15);
     assert_eq!(real(&mut instance, "q[1]"), 2.0);
-    // The slope was valid only for that step.
+    // The slope of q[1] was valid only for the first step.
     instance.do_step(0.5, 0.25).unwrap();
     close(real(&mut instance, "level[1]"), level(x, 2.0, 0.0, 0.25), 1e-15);
     assert_eq!((real(&mut instance, "q[1]"), instance.time()), (2.0, 0.75));
@@ -146,7 +146,7 @@ fn a_step_that_is_refused_keeps_the_slopes() {
     slope(&mut instance, "w", 2.0).unwrap();
     let why = unchanged(&mut instance, |i| i.do_step(0.0, 1.0));
     assert!(why.contains("at the end of the step w = 3.0 m/s"), "{why}");
-    // The slopes of the step before are kept as well.
+    // A refused step also keeps the slopes of the step before it.
     instance.do_step(0.0, 0.5).unwrap();
     assert!(instance.past_slopes);
     let why = unchanged(&mut instance, |i| i.do_step(0.5, f64::MAX));
@@ -187,7 +187,7 @@ fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     let why = unchanged(&mut ramped(), |i| slope(i, "q[2]", f64::NAN));
     assert!(why.contains("derivative of q[2] = NaN"), "{why}");
     assert_eq!(real(&mut sloped_anew, "trend"), 0.25);
-    // After the next step, with constant inputs, the slopes are dropped.
+    // After one more step, with constant inputs, the slopes of the first step are dropped.
     let mut held = ramped();
     held.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut held, "trend"), 0.0);

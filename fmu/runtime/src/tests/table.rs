@@ -206,7 +206,7 @@ fn the_guid_changes_with_everything_that_a_host_depends_on() {
         |v| v[5].kind = Kind::Integer { min: None, max: None },
         |v| v[7].kind = Kind::Enumeration(&OTHER_ITEMS),
         |v| v[7].kind = Kind::Enumeration(&OTHER_NAME),
-        // Other start values:
+        // The following changes alter start values:
         |v| v[12].access = v[14].access,
         |v| v.swap(0, 1),
     ];

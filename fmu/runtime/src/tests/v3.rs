@@ -156,7 +156,7 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
     unsafe {
         fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force_now, 1);
         assert_eq!(force_now, at_knot(20), "the ramp must end at the value that the host has set");
-        // If the host sets nothing, the input is constant.
+        // If the host sets no force in the intermediate update, the input is constant.
         host.lock().unwrap().force = None;
         assert_eq!(step(instance, 20.0 * 0.1, 0.1).0, fmi3OK);
         fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force_now, 1);

@@ -1,4 +1,4 @@
-//! Reading and setting variables.
+//! Tests of reading and setting variables.
 
 use super::*;
 use crate::call::InstanceState;
@@ -104,7 +104,7 @@ fn setting_several_values_succeeds_or_fails_as_a_whole() {
     assert_eq!(why, "fmi2SetReal: q[2] = 11.0 m/s (allowed: 1.0 m/s to 10.0 m/s)");
     instance.set(&SET_REAL, &both, |n| Real([5.0, 6.0][n])).unwrap();
     assert_eq!((real(&mut instance, "q[1]"), real(&mut instance, "q[2]")), (5.0, 6.0));
-    // A single input is refused, too.
+    // A single input that is out of its range is refused, too.
     assert!(unchanged(&mut instance, |i| set(i, "q[1]", 0.9)).contains("q[1] = 0.9"));
     assert!(unchanged(&mut instance, |i| set(i, "z", f64::NAN)).contains("z = NaN"));
     set(&mut instance, "q[1]", 10.0).unwrap();
