@@ -22,8 +22,8 @@ fn pytest(arguments: &mut Command, sentence: &str) {
             // Each test process uses one thread, because the other processors run other tests, with which NumPy's
             // threads would only compete.
             .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"].map(|name| (name, "1")))
-            // Python must not write bytecode into the source tree. All processes share it, so that no process
-            // compiles a package again.
+            // Python must not write bytecode into the source tree. All processes share one folder for it, so that
+            // no process compiles a package again.
             .env("PYTHONPYCACHEPREFIX", target().join("python").join("bytecode")),
         sentence,
     );

@@ -40,8 +40,8 @@ fn results_do_not_depend_on_the_communication_step() {
     }
 }
 
-/// The results are compared with runs at a tolerance of 1e-13, for a record in which the liquid swings by 60 degrees and a
-/// record with all kinds of inputs.
+/// The results of four records are compared with runs at a tolerance of 1e-13. In the first record the liquid swings by 60
+/// degrees, and the second record has all kinds of inputs.
 #[test]
 fn errors_stay_within_the_solver_tolerance() {
     for name in ["conical", "four_tanks", "wheels", "rotary"] {
