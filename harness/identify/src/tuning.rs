@@ -129,9 +129,9 @@ pub const COMPARED_STEPS: usize = 1000;
 pub const COMPARED_TOLERANCE: f64 = 1e-8;
 /// Ratio of the tolerance in the checking run to the tolerance that is used or that the FMU suggests.
 pub const COMPARED_FACTOR: f64 = 1e-2;
-/// Number of steps from row to row in which a linear input is held constant, for an FMU that takes no slopes. Held at its
-/// value in the middle of each step, it differs from the line by a sawtooth of an eighth of the change from row to row,
-/// and is not delayed.
+/// Number of steps from row to row in which a linear input is held constant if the FMU takes no slopes. The held value is the
+/// value in the middle of a step: the input then differs from the line by a sawtooth of an eighth of the change from row to row,
+/// and has no delay.
 pub const HELD_STEPS: usize = 4;
 /// Communication step sizes, s, with which the effect of an input's slope on the outputs is tested.
 pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];

@@ -58,7 +58,7 @@ const WARM: f64 = 0.3;
 const AIR: f64 = 0.02;
 /// Time constant of the actuator's lag or of the gyro's filter, s.
 const LAG: f64 = 0.03;
-/// Number of steps from row to row in which the lagging torque is computed.
+/// Number of substeps in each row of the recording in which the torque of an actuator with a lag is computed.
 const LAG_PARTS: usize = 8;
 const WARMING: f64 = 600.0;
 
@@ -163,7 +163,8 @@ impl Twin {
         let is = |effect: Unmodelled| self.unmodelled.contains(&effect);
         let lags = is(Unmodelled::ActuatorLag) || is(Unmodelled::GyroLag);
         let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time)? } else { heard };
-        // steps that end at the knots, or are short against the period of a smooth torque
+        // substeps from one row to the next, which end at the knots of the torque, or are short against the period
+        // of a smooth torque
         let parts = match (self.intersample, late == 0.0) {
             (Hold::BandLimited, _) => (step / 1e-3).ceil() as usize,
             (_, true) => 1,
@@ -269,7 +270,8 @@ impl Lag {
     }
 }
 
-/// Returns the torque of an actuator that lags the command `torque`, at [`LAG_PARTS`] instants from row to row.
+/// Returns the torque of an actuator that lags behind its command `torque`, at [`LAG_PARTS`] instants in each
+/// row of the recording.
 fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     let mut lag = Lag::default();
     let (mut time, mut tau) = (vec![rows[0]], vec![0.0]);

@@ -138,7 +138,8 @@ enum Contact {
     Smooth,
 }
 
-/// Computed motion of the hub at the rows: angle (rad), rate (rad/s), the number of stops, and the largest slosh angle (rad).
+/// Computed motion of the hub at the requested instants: angle (rad), rate (rad/s), the number of stops, and the
+/// largest slosh angle (rad).
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     pub angle: Vec<f64>,
@@ -390,7 +391,7 @@ fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -
                 let driving = now.rates(t, y).driving;
                 driving.abs() - now.holds(driving)
             };
-            // the torque may have changed in a step
+            // a jump of the torque may exceed the static friction at once
             if over(t, &y) > TOUCH {
                 now.contact = Contact::Slips(now.rates(t, &y).driving.signum());
                 return (t, y);
@@ -413,7 +414,7 @@ fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -
                 last = (sign * now.integrate(t, least, &y)[1] < -REST).then_some(least);
             }
             let Some(last) = last else { return (end, there) };
-            // from rest the hub moves on before it turns back
+            // a hub that starts from rest reaches its largest rate before the rate crosses zero
             let most = |s: f64| slope(s, &now.integrate(t, s, &y));
             let first =
                 if y[1] == 0.0 && slope(t, &y) > 0.0 { crossing(t, last, &most) } else { t };
@@ -423,7 +424,7 @@ fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -
             let before = now.contact;
             now.contact = now.after_rest(rest, &y);
             if now.contact == before {
-                // it broke away and stopped again within rounding errors
+                // the hub broke away and stopped again within rounding errors
                 now.contact = Contact::Sticks;
             }
             *stops += 1;

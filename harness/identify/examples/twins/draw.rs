@@ -83,7 +83,7 @@ impl Twin {
             bearing,
             ..nominal
         };
-        // values that the fit assumes to be known are wrong within their tolerances
+        // true values of quantities that the fit assumes to be known differ from the assumed values within their tolerances
         let Tolerances { torque, clock, gravity, arm, density } = Tolerances::default();
         let mut about = |part: f64| 1.0 + part * random.normal();
         let (torque_scale, clock) = (about(torque), about(clock));

@@ -37,8 +37,8 @@ pub struct Bound {
 }
 
 /// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at the start values. `noise` is
-/// the standard deviation of one sample of each output. Values with a tolerance in the question are unknowns with a prior.
-/// `warn` receives the FMU's warnings.
+/// the standard deviation of one sample of each output. Known values to which the question gives a tolerance are unknowns
+/// with a prior. `warn` receives the FMU's warnings.
 ///
 /// # Errors
 /// If the question has a fault (the message lists all), or the FMU refuses a call.

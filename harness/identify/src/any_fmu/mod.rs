@@ -34,7 +34,7 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
-/// Distance, in standard deviations, by which the minimum may lie beyond a bound by chance.
+/// Largest distance of the unconstrained minimum beyond a bound, in standard deviations, that chance may explain.
 const PRESSED: f64 = 3.0;
 /// A second difference of a simulated output counts as a jump if it exceeds the first number times the standard deviation of the
 /// output's noise, and the second number times the median of all second differences.
@@ -143,8 +143,9 @@ pub fn identify(
     }
 }
 
-/// Leaves out the rows next to jumps of the model's outputs and returns their number. When an event moves past a row during the
-/// search, the sum of squares jumps, and its derivatives do not show how far the event has to move.
+/// Leaves out the rows next to jumps of the model's outputs and returns the number of these rows. A jump comes from an event:
+/// when the event moves past a row during the search, the sum of squares jumps, and its derivatives do not show how far the
+/// event has to move.
 fn leave_out_jumps(
     signals: &mut [Signal],
     records: &[Record],
@@ -207,8 +208,8 @@ struct Numbers {
     intervals: Vec<Interval>,
     inseparable: Vec<Inseparable>,
     decided: Vec<bool>,
-    /// Indices of the unknowns at a bound. `pressed` are those of them whose minimum lies beyond the bound by more
-    /// than [`PRESSED`] standard deviations.
+    /// Indices of the unknowns at a bound. `pressed` is the subset of them whose unconstrained minimum lies beyond the bound by
+    /// more than [`PRESSED`] standard deviations.
     held: Vec<usize>,
     pressed: Vec<usize>,
     solver: SolverError,
@@ -489,7 +490,7 @@ fn conclude(
     Ok(found)
 }
 
-/// Returns the name of known value `j` with its tolerance, for example `tank.r 0.40 %`.
+/// Returns the name of known value `j` followed by its relative or absolute tolerance, for example `tank.r 0.40 %`.
 fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
     let Unknown { name, unit, prior, .. } = &unknowns[j];
     let (mean, std) = prior.unwrap_or_default();

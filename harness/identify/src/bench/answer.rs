@@ -29,7 +29,7 @@ use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::RATE;
 
-/// Fit of the rates, %, below which a minimum counts as a wrong one.
+/// Fit of the rates, %, below which the search is assumed to have ended in a local minimum far from the true values.
 const POOR_FIT: f64 = 90.0;
 
 pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
@@ -211,7 +211,7 @@ fn estimated(
     // an asymmetric interval has the standard deviation of its longer side
     let mut ends = interval;
     if !interval[1].is_finite() {
-        // up to the end of the profile
+        // an open interval counts up to the largest draw, at the end of the profile
         ends[1] = full.columns[k].iter().copied().fold(value, f64::max);
     }
     let reach = ends.map(|end| (end - value).abs() / Z);
@@ -370,8 +370,8 @@ fn regime(model: &str, angle: f64) -> Option<String> {
     ))
 }
 
-/// Adds those known values to `parameters` that the recordings determine better than their tolerances. Returns
-/// a sentence about each.
+/// Adds a known value to `parameters` if the recordings determine it better than its tolerance does. Returns a sentence
+/// about each added value.
 fn shown(
     system: &BenchSystem,
     solution: &Solution,

@@ -28,7 +28,7 @@ pub struct Braking {
     pub rows: usize,
     /// Number of stretches from which the coefficients were computed. A stretch is one revolution of the hub within one decay.
     pub stretches: usize,
-    /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
+    /// Angle (rad) of each row, and its acceleration corrected to the speed `speed` (rad/s²).
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
     /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).

@@ -153,14 +153,14 @@ pub fn system<'a>(
         }
     }
     if dry && !is_set(friction::OMEGA_S) {
-        // the bearing's usual speed, if the recorded rates stay below it: they do not show ω_s and must not determine it
+        // starts at the usual Stribeck speed of the bearing if all recorded rates are lower: such rates do not determine ω_s
         let start = first.omega_s.max(nominal.start.omega_s);
         let unknown = list.parameter(friction::OMEGA_S, start).with_prior(start.ln(), SPEED.0);
         let bounds = (start / SPEED.1, start * SPEED.1);
         list.add_parameter(Unknown { bounds, bent: !is_set(friction::D), ..unknown });
     }
     if law == FrictionModel::Lugre.name() && !is_set(friction::SIGMA0) {
-        // stiffer bristles deflect less than 1/100 of the angle that such a gyro resolves
+        // bristles that are stiffer than the upper bound deflect by less than 1/100 of the angle that the gyro resolves
         let unknown = list.parameter(friction::SIGMA0, 100.0);
         list.add_parameter(Unknown { bounds: (0.1, 1000.0), ..unknown });
     }
@@ -249,7 +249,8 @@ pub fn system<'a>(
             list.add(Target::Initial(k, (*name).into()), state.with_prior(start.0, *std));
         }
     }
-    // an encoder shows the scale of the rate; nonlinear slosh shows it too, and without it the residual would not be noise
+    // the gyro's scale is free only if the recording determines it, as an encoder or nonlinear slosh does; a fixed scale would
+    // then leave a residual that is more than noise
     let nonlinear = !frozen && model != SloshModel::Linear.name();
     if options.gyro_scale > 0.0 {
         let std = options.gyro_scale;

@@ -175,7 +175,7 @@ impl Setup {
             Read::States => &outputs[..2],
         };
         let mut motion = Motion::default();
-        // `row` is read next; the signals run from `knot` to the next knot
+        // `row` is the next row to be read; the signals are linear from `knot` to the next knot
         let (mut row, mut knot) = (0, 0);
         inputs.drive(&mut instance, time[0], |instance, t, course| {
             let target = loop {

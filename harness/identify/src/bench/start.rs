@@ -74,7 +74,7 @@ pub fn from_data(
     nominal: &Nominal,
 ) -> Result<(Option<Response>, Vec<Start>)> {
     let bench = nominal.bench;
-    // a recording that excites little has no response; the others suffice
+    // a recording that excites few frequencies gives no frequency response; the other recordings suffice
     let (measured, failed): (Vec<_>, Vec<_>) =
         recordings.iter().map(response).partition(Result::is_ok);
     if measured.is_empty() {
@@ -83,7 +83,7 @@ pub fn from_data(
     let both = |m: FrequencyResponse| [translate(&m, bench), from_features(&m, bench)];
     let mut responses: Vec<Response> =
         measured.into_iter().flatten().flat_map(both).flatten().collect();
-    // a response by chance, as from a step, has an implausible inertia and comes last
+    // a response that is only noise, for example of a step, has an implausible inertia and comes last
     let key = |r: &Response| (!plausible::is_size(r.inertia, nominal.inertia), -r.fit);
     responses.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
     let rough = friction(recordings);

@@ -64,7 +64,8 @@ fn scores(fit: &mut Fit, minimum: &Minimum, candidates: &[usize]) -> Result<Vec<
     let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
     let one = |&unknown: &usize| -> Option<Score> {
         let mut z = base.z.clone();
-        // a plausible size of the effect, because an infinitesimal lag acts like a delay, and an infinitesimal limit not at all
+        // a plausible size of the effect, because an infinitesimal lag has the same effect as a delay, and an infinitesimal
+        // limit has no effect
         let step = unknowns[unknown].reach;
         z[unknown] += step;
         let there = fit.at(&z).ok()?;

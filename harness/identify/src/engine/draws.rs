@@ -1,9 +1,9 @@
 //! Intervals as quantiles of random draws.
 //!
 //! A point of the profile is drawn with the weight exp(−Δ/2), where Δ is the rise of −2 ln L at this point. The other unknowns
-//! are drawn from the normal distribution about their minimum at this point, together with the known values that have tolerances:
-//! their priors and one derivative each give their part. Draws outside the bounds are rejected, and draws with impossible values,
-//! too. The quantities that users ask for are computed from each draw. Therefore the intervals are valid in a bent valley of the
+//! are drawn from the normal distribution about their minimum at this point. Known values with tolerances are drawn from their
+//! priors, and shift the unknowns by their derivatives. Draws outside the bounds and draws with impossible values are rejected.
+//! The quantities that users ask for are computed from each draw. Therefore the intervals are valid in a bent valley of the
 //! likelihood, and no interval contains impossible values.
 
 use analysis::random::Random;
@@ -210,7 +210,7 @@ impl Solution<'_> {
             None => found.columns.iter().map(median).collect(),
         };
         if let (Some(j), [first, .., last]) = (bent, all) {
-            // a quantity that only its prior determines has no open end
+            // the interval of a quantity that only its prior determines has no open end
             let known =
                 |at: f64| unknowns[j].prior.map_or(0.0, |(mean, std)| ((at - mean) / std).powi(2));
             let least = known(all[lowest].at);

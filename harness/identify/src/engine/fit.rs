@@ -26,7 +26,8 @@ pub struct Fit<'p> {
     pub ends: Vec<(f64, f64)>,
     /// The unknown whose profile is followed, if the likelihood along it was found not to be a parabola.
     pub bent: Option<usize>,
-    /// Step of each unknown's finite difference, and the smallest step whose effect exceeds the errors of the solver.
+    /// For each unknown, the step of its finite difference, and the smallest step whose effect on the outputs exceeds the
+    /// errors of the solver.
     pub(super) steps: Vec<(f64, f64)>,
     filters: Vec<Whitening>,
     driven: AtomicUsize,
@@ -44,7 +45,8 @@ pub struct Point {
 
 #[derive(Clone, Debug)]
 pub struct Derivatives {
-    /// Jacobian of `Point::e` with a column for each unknown; the columns of unknowns that were not asked for are 0.
+    /// Jacobian of `Point::e` with a column for each unknown. The column is 0 if the derivative by this
+    /// unknown was not requested.
     pub matrix: DMatrix<f64>,
     pub means: DMatrix<f64>,
 }
@@ -262,7 +264,7 @@ impl<'p> Fit<'p> {
         loop {
             let is_first = step == self.steps[j].0;
             let (mut pieces, mut bend) = self.difference(at, j, step)?;
-            // a wider step makes the solver's errors matter less, and curvature more
+            // a wider step reduces the influence of the solver's errors, and increases the influence of curvature
             let mut wider = step * WIDER;
             while self.problem.rough && bend > BEND && wider <= STEPS.1 * reach {
                 match self.difference(at, j, wider) {

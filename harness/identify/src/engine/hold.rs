@@ -18,7 +18,7 @@ const EARLIEST: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub struct Rival {
     pub hold: Hold,
-    /// Sum of squares minus the sum of squares with the chosen intersample behaviour.
+    /// Sum of squares at this minimum minus the sum of squares with the chosen intersample behaviour.
     pub more: f64,
     /// Coordinates of its minimum minus the coordinates of the minimum with the chosen intersample behaviour.
     pub shift: Vec<f64>,

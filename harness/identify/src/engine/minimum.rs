@@ -25,10 +25,10 @@ pub struct End {
     pub sets: usize,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
-    /// Sum of squares above which a minimum is useless. The search is given up if it cannot get below.
+    /// Sum of squares above which a minimum is of no use, so that the search is given up.
     pub above: f64,
-    /// Smallest decrease of the sum of squares by one Jacobian. The search ends below it, because in a bent valley every Jacobian
-    /// gains a little and the search would not end.
+    /// Smallest decrease of the sum of squares that the search expects from one Jacobian. The search ends if the decrease is
+    /// smaller, because in a bent valley every Jacobian gains a little and the search would not end.
     pub gain: f64,
     /// True if a decrement from an updated (Broyden) Jacobian may end the search, after at least one Jacobian
     /// was computed from differences.
@@ -282,7 +282,7 @@ impl Fit<'_> {
                     |j: usize| !(self.ends[j].0..=self.ends[j].1).contains(&(point.z[j] + step[j]));
                 let keep: Vec<usize> = all.iter().copied().filter(|k| !hits(which[*k])).collect();
                 if !keep.is_empty() && keep.len() < all.len() {
-                    // a step that was cut at a bound is solved again without the unknowns that hit it
+                    // if a bound cut the step, it is computed again without the unknowns that reached the bound
                     let mut cut = vec![0.0; n];
                     for &j in which.iter().filter(|j| hits(**j)) {
                         let (low, high) = self.ends[j];

@@ -142,7 +142,8 @@ impl Fit<'_> {
         let curvature = Curvature::new(&jacobian, places(&self.free));
         let covariance = curvature.with_flat(!self.problem.rough).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
-        // an unknown that compensates the bent one along the valley is a positive size, not an error about 0
+        // the unknown that compensates the bent one along the valley is a positive quantity, and not an error whose
+        // expected value is 0
         let partner = |i: &usize| {
             let correlation = covariance[(*i, j)] / (std(*i) * std(j));
             !unknowns[*i].log

@@ -33,8 +33,8 @@ const FAR: f64 = 3.0;
 /// Ratio of the square root of the likelihood's rise to the square root of a parabola's rise at the distance `FAR`. Below this
 /// ratio the likelihood has a kink.
 const KINKED: f64 = 0.8;
-/// Fraction of the recordings, and a factor: if a search over more than this fraction has a sum of squares of more than this
-/// factor times that of the best search, its start is given up.
+/// If a search over more than a fraction (first number) of the recordings has a sum of squares above a multiple (second number)
+/// of the sum of squares of the best search, its start is given up.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
 /// Limits of the noise while a misfit is examined: largest white noise relative to the noise between neighbouring rows, largest
 /// relative size of the drift, and smallest correlation time of the drift, s.
@@ -371,7 +371,7 @@ impl Fit<'_> {
                 }
                 let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
                 minimum = self.minimise_from(&minimum.point, end)?;
-                // the minimum was found with the noise of the point before, which matters if this noise is next to nothing
+                // the minimum belongs to the noise estimated before it, which matters if the new noise is next to nothing
                 if minimum.point.cost > SETTLED * rows as f64 {
                     break;
                 }
@@ -541,7 +541,7 @@ impl Fit<'_> {
             }
             for &part in parts {
                 self.set(noise.clone(), part);
-                // a second model that fits as well as the first has its minimum near the first one's
+                // if a second model fits as well as the first one, its minimum is near the minimum of the first one
                 let sets = if parts.len() > 1 { SETS } else { SETS / 2 };
                 let end = End { gain: ALIKE, ..End::new(sets, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;

@@ -61,7 +61,7 @@ impl Fit<'_> {
                 weights.into_iter().zip(motions.iter().map(Vec::as_slice)).collect();
             self.change(&at.z, &pairs)
         };
-        // squares of the weights: 70 for the fourth difference, 10 for the third
+        // sums of the squared weights: 70 for the fourth difference, 10 for the third
         let noise = combined([1.0, -4.0, 6.0, -4.0, 1.0]) / 70.0_f64.sqrt();
         let third = combined([-1.0, 2.0, 0.0, -2.0, 1.0]).norm_squared();
         let third = third - 10.0 * noise.norm_squared();

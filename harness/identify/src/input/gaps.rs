@@ -65,7 +65,7 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
             filled.len()
         ));
     }
-    // the recording is cut at a gap if the parts are long enough, or if the gap is too long for a straight line
+    // the recording is cut at a gap if the parts on both sides are long enough, or if the gap is too long for a straight line
     let mut cuts = Vec::new();
     let few = left.len() <= FEW_GAPS;
     let end = time[time.len() - 1];
@@ -91,8 +91,8 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     with_rows(all, &knots, filled, cuts)
 }
 
-/// Returns at most [`GAP_SIDE`] samples of the torque before gap `n`, but none before the preceding gap; `after` returns the
-/// samples on the other side.
+/// Returns at most [`GAP_SIDE`] samples of the torque before gap `n`, and no sample from before the preceding gap. The function
+/// `after` returns the samples behind the gap.
 fn before<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     let from = gaps.iter().filter(|gap| **gap < n).max().map_or(0, |gap| gap + 1);
     &values[from.max((n + 1).saturating_sub(GAP_SIDE))..=n]
@@ -156,7 +156,7 @@ fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     let mut normal = regressors.tr_mul(&regressors);
     (0..order).for_each(|i| normal[(i, i)] += weight);
     let a = normal.cholesky()?.solve(&regressors.tr_mul(&target));
-    // forward and backward equations that contain lost samples, in which they are linear
+    // forward and backward equations that contain lost samples; they are linear in the lost samples
     let (n, p) = (lost, order);
     let known = [&left[left.len() - p..], &vec![0.0; n], &right[..p]].concat();
     let mut matrix = DMatrix::<f64>::zeros(2 * (n + p), n);

@@ -11,7 +11,7 @@ use analysis::statistics::{deviation, mean, median, noise_level};
 /// Returns true if an estimated inertia differs from the nominal one by less than a factor of 8. A larger factor means that a
 /// column has a wrong unit.
 pub fn is_size(inertia: f64, nominal: f64) -> bool {
-    // the smallest factor of a wrong unit is 9.5, of revolutions per minute
+    // the smallest factor that a wrong unit causes is 9.5 (revolutions per minute)
     (0.125..8.0).contains(&(nominal / inertia))
 }
 
@@ -84,7 +84,8 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
 
 struct Actuator {
     inertia: f64,
-    /// First time at which the wheel's speed does not follow the torque, and total duration of all these times, s.
+    /// First time at which the wheel's speed does not follow the torque, s, and total duration of all windows in which
+    /// it does not, s.
     missing: Option<(f64, f64)>,
 }
 

@@ -143,7 +143,7 @@ pub fn read_decay(
     );
     all.check()?;
     let seconds = all.duration();
-    // the last row also lasts one step
+    // the last row also counts as one step long
     ensure!(
         seconds + all.step() >= SHORTEST_RECORDING * (1.0 - 1e-9),
         "{name}: {seconds:.2} s are too few (allowed: at least {SHORTEST_RECORDING} s)"
@@ -256,7 +256,7 @@ pub fn prepare(
 fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     let rows = part.time.len();
     let Recording { name, time, torque, rate, angle, fresh, angle_fresh, .. } = part;
-    // a hub without torque at the beginning is at rest
+    // a hub whose first recorded torque is zero is at rest, so that its first rate is the gyro's bias
     let rest = (torque[0] == 0.0).then_some(rate[0]);
     let sensors = [
         ("omega", Some(rate), fresh, Rest::Rate(rest)),
@@ -362,7 +362,7 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
 fn starts_at_rest(part: &Recording) -> bool {
     let rate = part.first_rate();
     let moves = deviation(&part.rate);
-    // motion besides the bias: more than 3 % of the signal plus 5 times the noise
+    // motion, other than the bias, that still counts as rest: 3 % of the signal plus 5 times the noise
     let is_slow = |rate: f64| rate.abs() < 5.0 * part.rate_noise() + 0.03 * moves;
     let bias = mean_reading(part);
     // a hub that begins at its mean rate is at rest, unless this mean exceeds the changes of the rate
@@ -394,7 +394,7 @@ fn check_signals(part: &Recording) -> Result<()> {
     let inner = |x: &[f64]| x[1..x.len() - 1].to_vec();
     let leading = correlation(&inner(&torque), &slope(&rate));
     if leading < -0.3 {
-        // the smoother signal is the integral of the other: the ratio of rate to torque falls with frequency
+        // of the two signals, the smoother one is the integral of the other: the ratio of rate to torque falls with frequency
         let rough = |x: &[f64]| deviation(&slope(x)) / deviation(x);
         let swapped = rough(&torque) < rough(&rate);
         let fault = if swapped {
@@ -453,7 +453,7 @@ mod tests {
     fn a_constant_rate_is_a_bias_and_a_hub_that_turns_is_not_at_rest() {
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
-        // friction removes the mean rate that the first torque causes
+        // friction stops the mean rate that the first torque causes
         let first = rigid().rate[0];
         let from_rest = |offset: f64| {
             let mut all = rigid();
@@ -520,7 +520,7 @@ mod tests {
             let expected: Vec<f64> = x.windows(width).map(mean).collect();
             let found = running_mean(&x, width);
             assert_eq!(found.len(), expected.len());
-            // sums of 50 integers are exact
+            // sums of 50 integers have no rounding error
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{width}");
         }
     }

@@ -65,7 +65,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     });
     let jumps = [0, 1].map(|i| leaves(values, &held[i], rest));
     let steps = |jump: &Option<f64>| jump.is_some_and(|jump| jump > FAULT_STEPS * resolution);
-    // a hub can be at rest at only one of the two extreme rates
+    // a hub can be at rest at one of the two extreme rates, but not at both
     let both = rest != Rest::Angle && jumps.iter().all(steps);
     for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
         if !both && jump.is_none_or(|jump| jump <= LIMIT * noise) {
@@ -122,7 +122,7 @@ fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
     let beside = |v: &&f64| (end - CLIPPED_INSIDE * noise..end).contains(&(sign * **v));
-    // expected number of equal values, from the values just inside the end
+    // expected number of equal values at the end of the range, estimated from the values just inside the range
     let share = (resolution / (CLIPPED_INSIDE * noise)).min(1.0);
     let usual = share * values.iter().filter(beside).count() as f64;
     let is_run = |k: &&usize| {
@@ -151,9 +151,9 @@ fn resolution(values: &[f64]) -> f64 {
 }
 
 /// Returns the first and last rows of the runs of equal values in which the sensor is frozen. Such a run is too long to be
-/// chance. In addition, its value is away from the mean (the value of a hub at rest is the gyro's bias, which is near the mean), and
-/// it ends in a jump. After one run with both signs, one of the two is enough for the other runs, because a rate may freeze near
-/// its mean, or come back near the frozen value.
+/// chance. In addition, its value is away from the mean (the value of a hub at rest is the gyro's bias, which is near the mean),
+/// and it ends in a jump. Once a run has both properties, one of the two is enough for the other runs, because a rate may freeze
+/// near its mean, or come back near the frozen value.
 fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let runs = runs(values);
     let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= FROZEN_RUN;
@@ -305,7 +305,7 @@ mod tests {
         let clipped: Vec<f64> = rate.iter().map(|w| w.clamp(-0.06, 0.06)).collect();
         let (rows, said) = words(&time, &clipped);
         assert!(said.contains("omega is clipped") && said.contains("the upper end"), "{said}");
-        // 42 % of the rows from 120 s on, and one neighbour on each side of 320 runs
+        // 42 % of the rows from 120 s on are clipped, and one neighbour on each side of 320 runs is left out, too
         assert!((2250..2450).contains(&rows), "{rows}");
         // at 100 Hz the gyro leaves both ends of its range by less than five standard deviations of its noise
         let half: Vec<f64> = clipped.iter().map(|w| 0.2 * w.clamp(-0.04, 0.04)).collect();
@@ -330,8 +330,8 @@ mod tests {
             "{said}"
         );
         assert_eq!(rows, 58);
-        // frozen a third time near the mean, and a last time for a whole cycle, after which the motion is back
-        // near the frozen value
+        // the gyro freezes a third time near the mean, and a last time for a whole cycle, after which the rate is near
+        // the frozen value again
         let is_near_mean = |k: &usize| rate[*k].abs() < 1e-3 && rate[*k + 30].abs() > 0.01;
         let is_met = |k: &usize| (rate[*k] - rate[*k + 25]).abs() < 1e-3 && rate[*k].abs() > 0.01;
         let near_mean = (4000..4900).find(is_near_mean).unwrap();

@@ -52,11 +52,11 @@ pub fn find(
     }
     let residuals: Vec<f64> =
         differences_from_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
-    // the median of |r| is 0.6745 σ for noise, and larger if friction causes kinks in many rows
+    // for noise, the median of |r| is 0.6745 σ; it is larger if friction causes kinks in many rows
     let typical = |residuals: &[f64]| median(residuals).map_or(0.0, |m| m / 0.6745);
     let around: Vec<f64> = residuals.chunks(SPIKE_AROUND).map(typical).collect();
     let usual = typical(&residuals).max(gain() * noise_level(&y));
-    // one of 10¹⁴ recordings with 135,000 rows of noise exceeds ten standard deviations
+    // of 10¹⁴ recordings with 135,000 rows of noise, one contains a value beyond ten standard deviations
     let limit = |k: usize| {
         let chunk = (k.max(2) - 2) / SPIKE_AROUND;
         let near = chunk.saturating_sub(1)..(chunk + 2).min(around.len());
@@ -154,7 +154,8 @@ mod tests {
         let spikes = [(300, 0.02), (4000, -0.5), (4001, -0.4), (9000, 3.0), (9002, 0.01)];
         let found = found(&spikes);
         assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), spikes.map(|s| s.0));
-        // within 4 standard deviations of the cubic through noise, plus its fourth-order error, 5 % of 20 mrad/s
+        // noise differs from the cubic by less than 4 standard deviations; the fourth-order error of the cubic is 5
+        // % of 20 mrad/s
         let [_, _, clean] = with(&[]);
         found.iter().for_each(|(k, y)| assert!((y - clean[*k]).abs() < 3.3e-3, "{k} {y}"));
     }

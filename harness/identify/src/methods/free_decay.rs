@@ -93,7 +93,7 @@ fn problem<'a>(
     };
     let size = starts.iter().map(|start| start.amplitude).fold(0.0, f64::max);
     let longest = starts.iter().map(|start| start.periods).fold(0.0, f64::max);
-    // smallest visible change over a recording: a fraction of a turn of the phase, or of the amplitude
+    // smallest change that is visible over a recording: a fraction of a turn of the phase, or a fraction of the amplitude
     let small = 0.1 / longest;
     let all = Role::Run(None);
     let linear = |name: &str, unit: &str, role, start: (f64, f64)| {

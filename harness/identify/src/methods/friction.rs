@@ -312,7 +312,7 @@ fn friction_curve(found: &Identification) -> Markup {
         ];
         let label = "friction torque, N·m";
         let mut chart = axis_chart(title, "rate, rad/s", label, lines, false);
-        // headroom, because the curve rises into the corner with the legend
+        // space above the curve, because the curve rises into the corner with the legend
         let torques = || within.iter().map(|p| p.torque);
         let top = 1.6 * torques().fold(0.0, f64::max);
         chart.y = Axis::linear(label, torques().chain([top]), 0.0, 5);
@@ -375,7 +375,7 @@ mod tests {
             .collect()
     }
 
-    /// Returns true if the difference between the two directions leaves its 95 % band at any angle.
+    /// Returns true if the difference between the friction in the two directions leaves its 95 % band at any angle.
     fn differ(seed: u64, cosine: f64) -> bool {
         let mut random = analysis::random::Random::new(seed, 0);
         let all = [decays(&mut random, 1.0, cosine), decays(&mut random, -1.0, 0.0)].concat();
@@ -390,7 +390,8 @@ mod tests {
     #[test]
     fn noise_shows_no_preferential_direction_and_a_variation_of_10_per_cent_does() {
         let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
-        // the 95 % band holds for the whole curve: 5 of 100 are expected, and 12 are three standard deviations more
+        // the 95 % band holds for the whole curve: on average 5 of 100 simulations leave it, and 12 are
+        // three standard deviations more
         assert!(of(0.0) <= 12, "{}", of(0.0));
         assert!(of(0.1) >= 95, "{}", of(0.1));
     }

@@ -141,7 +141,7 @@ fn identify_whole(
         doubts.extend(found);
     }
     let (response, starts) = start::from_data(recordings, &nominal)?;
-    // there is a response only if the data show a hub with slosh
+    // the result contains a frequency response only if the data show a hub with slosh
     if let (Some(found), true) = (&response, options.models.iter().any(|m| *m != Frozen.name())) {
         plausible::check_size(found.inertia, nominal.inertia)?;
     }

@@ -252,7 +252,8 @@ impl Setup {
         if reads(&mut instance)? != without {
             return Ok(true);
         }
-        // FMI 3.0 takes slopes only during a step: a direct dependence does not shrink with the step
+        // in FMI 3.0 a slope has an effect only during a step, so that steps of several sizes are compared: a direct dependence
+        // on the slope does not shrink with the step
         let after = |step: f64, slope: f64| -> Result<Vec<f64>> {
             let mut instance = begun()?;
             let mut values = vec![0.0; self.inputs.len()];
@@ -423,8 +424,8 @@ impl Setup {
         Ok(())
     }
 
-    /// Applies the delays of sensors: the reading in a row is the output of the row that is earlier by the delay, and 0 as long
-    /// as this row would be before the recording.
+    /// Applies the delays of sensors: the reading in a row is the output of an earlier row, at a distance of the delay. The
+    /// reading is 0 if this row would be before the beginning of the recording.
     fn late(&self, record: &Record, mut read: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
         for (number, (output, column)) in self.outputs.iter().zip(&mut read).enumerate() {
             let Some(sensor) = output.sensor.as_ref().filter(|s| s.errors().delay > 0.0) else {

@@ -223,7 +223,7 @@ fn bode(signals: &Residual) -> Option<[Chart; 2]> {
         let mut last = None;
         let values = response.frequency.iter().zip(&response.response).map(|(f, h)| {
             let now = h.arg().to_degrees();
-            // unwrapped
+            // continuous over ±180°
             let phase = last.map_or(now, |last: f64| now + 360.0 * ((last - now) / 360.0).round());
             last = Some(phase);
             (*f, phase)

@@ -44,7 +44,7 @@ pub fn record(seed: u64, start: f64, bias: f64) -> Record {
         record.outputs[0].push(rate + bias + NOISE * random.normal());
         rate = keep * rate + torque / b * (1.0 - keep);
     }
-    // a lost value
+    // a row in which the sensor has lost its value
     record.outputs[0][100] = f64::NAN;
     record
 }
@@ -92,11 +92,11 @@ fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
     ];
     for (name, truth) in truth {
         let e = found.parameters.get(name).or_else(|| found.measurement.get(name)).unwrap();
-        // exceeded with a probability of 6e-5 for each of six values
+        // a correct estimate exceeds this limit with a probability of 6e-5 for each of six values
         assert!((e.value - truth).abs() < 4.0 * e.std, "{name}: {e:?}");
         assert!(e.interval[0] < e.value && e.value < e.interval[1], "{name}: {e:?}");
     }
-    // 2400 rows with a signal of a hundred times the noise determine I to a thousandth
+    // 2400 rows with a signal of a hundred times the noise determine I to a thousandth of its value
     assert!(found.parameters["hub.I"].std < 1e-3 * TRUTH.0);
     let noise = found.details.outputs[0].noise_white;
     // expected error of the noise: 1/√(2 N) = 2 %
@@ -219,8 +219,8 @@ fn parameters_of_an_fmi_3_fmu_with_state_events_are_estimated() {
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [("hub.I", TRUTH.0), ("friction.b", TRUTH.1), ("friction.c", c)] {
         let e = &found.parameters[name];
-        // exceeded with a probability of 6e-5 for each of three values; a standard deviation above 2 % would mean that the
-        // fit has learnt nothing
+        // a correct estimate exceeds the limit with a probability of 6e-5 for each of three values; a standard deviation above 2
+        // % would mean that the recording did not determine the parameter
         assert!((e.value - truth).abs() < 4.0 * e.std && e.std < 0.02 * truth, "{name}: {e:?}");
     }
 }
@@ -228,7 +228,7 @@ fn parameters_of_an_fmi_3_fmu_with_state_events_are_estimated() {
 /// A parameter of a friction law that is not in use has no effect, and the true value of the inertia is beyond its bound.
 #[test]
 fn parameters_without_effect_are_not_determined_and_a_reached_bound_is_reported() {
-    // the stiffness belongs to a law that is not chosen; the true inertia is beyond its upper bound
+    // the bristle stiffness has no effect in the chosen friction law; the true inertia is beyond its upper bound
     let asked =
         ["hub.I=0.2:0.1:0.3", "friction.b=0.02:0:1", "init.omega@each=0", "friction.sigma0=1e3"];
     let found = found(&question(&asked));
@@ -260,7 +260,7 @@ fn predicted_standard_deviations_equal_those_of_the_fit() {
     let found = identify(&model, &question, &records, &mut |_| {}).unwrap();
     for bound in bounds.iter().filter(|bound| bound.is_parameter) {
         let stated = found.parameters[&bound.name].std;
-        // the noise is estimated to 2 %, and one value of the recordings is lost
+        // the noise is estimated with an error of 2 %, and one value of the recordings is lost
         assert!((stated / bound.std - 1.0).abs() < 0.1, "{}: {stated} {}", bound.name, bound.std);
     }
 }
@@ -276,7 +276,7 @@ fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
             found.parameters.get(name).or_else(|| found.measurement.get(name)).unwrap().value
         })
         .collect();
-    // along a column of the covariance, in which the other unknowns follow, k σ increases the deviance by k²
+    // k σ along a column of the covariance, with the other unknowns changed accordingly, increases the deviance by k²
     let covariance = &found.details.covariance;
     let moved = |j: usize, k: f64| -> Vec<f64> {
         let std = covariance[j][j].sqrt();

@@ -210,7 +210,7 @@ fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)
 fn holds(tank: &Tank, result: &Identification) {
     assert_eq!(result.fits, Some(true), "{:#?}", result.verdict);
     for (name, [low, high], truth) in compared(tank, result) {
-        // twice the width of the interval, which is 4 standard deviations on each side
+        // half of the room is twice the half-width of the 95 % interval, which is 4 standard deviations
         let room = 0.5 * (high - low) + 1e-9;
         assert!(low - room < truth && truth < high + room, "{name}: {low} to {high}, not {truth}");
     }

@@ -100,7 +100,7 @@ fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
         let p = found.parameters.get(name).unwrap_or_else(|| &found.measurement[name]);
         let off = (p.value - truth) / p.std;
         println!("{}, {seed}: {name} {:.4e} ± {:.1e}, {off:+.2} σ", set.name, p.value, p.std);
-        // exceeded by chance in one of 370 values
+        // a correct estimate exceeds this limit by chance in one of 370 cases
         wrong.extend(
             (off.abs() >= 3.0).then(|| format!("{}, {seed}: {name} {off:+.1} σ", set.name)),
         );
@@ -169,7 +169,7 @@ fn the_tank_counts_as_empty_unless_the_settings_state_its_liquid() {
     let fast: Vec<_> = points.iter().filter(|p| p.rate.abs() > 0.3 && p.rows > 20).collect();
     assert!(fast.len() > 3, "{points:?}");
     for p in fast {
-        // the asymmetry changes the friction by 15 % of c
+        // the asymmetry changes the friction by 15 % of the dry friction c
         assert!((p.torque / law(p.rate) - 1.0).abs() < 0.15, "{p:?} {}", law(p.rate));
     }
 }
@@ -222,7 +222,7 @@ fn a_zero_order_hold_of_the_torque_is_recognised() {
     let found = fit(&recordings, &options()).unwrap();
     for (name, truth) in [("hub.I", 0.322414), ("friction.b", 0.03793)] {
         let p = &found.parameters[name];
-        // exceeded in one of 16,000 draws
+        // a correct estimate exceeds this limit in one of 16,000 draws of the noise
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
     assert_eq!(found.fits, Some(true), "{:?}", found.verdict);
@@ -265,6 +265,6 @@ fn the_dependence_of_friction_on_direction_and_angle_is_estimated_from_free_deca
     one.angle = Some(setup.run(&fmu, &[], &one, 0.0).unwrap().angle);
     let found = friction::identify(&fmu, &[one], &options(), &mut |_| {}).unwrap();
     let [ahead, back] = &found.details.braking[..] else { panic!("{:?}", found.details.braking) };
-    // friction is larger forwards, so that the preferential direction is backwards
+    // dry friction is larger forwards, so that the preferential direction of rotation is backwards
     assert!(-ahead.coefficients[0] > back.coefficients[0], "{ahead:?} {back:?}");
 }

@@ -70,7 +70,7 @@ fn no_method_hangs_or_panics_on_values_out_of_range() {
         let method = OutputError { options: Options::default() };
         assert!(method.identify(&task, &mut |_| {}).is_err(), "{words}");
     }
-    // accepted sizes: some results are strange, but each method returns
+    // the methods accept values of these sizes: some results are strange, but each method returns
     let sizes: [Change; 6] = [
         |r, _| r.rate.iter_mut().for_each(|w| *w *= 1e90),
         |r, _| r.rate.iter_mut().for_each(|w| *w *= 1e-200),

@@ -78,7 +78,7 @@ fn check_estimates_from(sensor: &str, column: &str, noise: f64) {
     assert!(found.converged && found.fits == Some(true), "{column}: {:?}", found.verdict);
     for (name, truth) in TRUTH {
         let e = &found.parameters[name];
-        // exceeded with a probability of 6e-5 for each of three values
+        // a correct estimate exceeds this limit with a probability of 6e-5 for each of three values
         assert!((e.value - truth).abs() < 4.0 * e.std, "{column}: {name}: {e:?}");
         assert!(e.std < 0.05 * truth, "{column}: {name} is determined: {e:?}");
     }

@@ -152,7 +152,7 @@ fn found(fmu: &Adaptive, question: &Question, seed: u64, scale: f64) -> Identifi
     identify(&model, question, &[record(seed, scale)], &mut |_| {}).unwrap()
 }
 
-/// Returns the number of intervals that contain the true value, and the number of all intervals.
+/// Returns the number of 95 % intervals that contain the true value, and the number of all intervals.
 fn held(found: &Identification) -> (usize, usize) {
     let given = TRUTH.iter().filter(|(name, _)| found.parameters[*name].determined);
     let holds = |(name, truth): &&(&str, f64)| {
@@ -185,8 +185,8 @@ fn check_refusal(found: &Identification, remedy: &str) {
 }
 
 /// The fit once took differences so small that the solver's noise dominated them, and did not compare the solver with a more
-/// accurate one. The true values were then up to 50,000 standard deviations outside in the first case, 20 in the second and 17 in
-/// the third, although the verdict was that the model fits.
+/// accurate one. In the three cases of this test the true values were then up to 50,000, 20 and 17 standard deviations from the
+/// estimates, although the verdict was that the model fits.
 #[test]
 fn no_interval_is_given_if_solver_errors_exceed_the_noise() {
     for (definitions, scale) in [
@@ -237,7 +237,8 @@ fn a_finer_tolerance_and_the_hosts_solver_give_the_same_estimates() {
     let (own, host) =
         (found(&fmu, &fine, 1, 1.0), found(&fmu, &question(Solver::Host(1e-8)), 1, 1.0));
     for (name, e) in &host.parameters {
-        // solver errors whose effect is not added to the intervals are below 0.05 standard deviations, all others below 0.3
+        // the intervals do not include effects of the solver's errors below 0.05 standard deviations, and all
+        // effects are below 0.3
         assert!((own.parameters[name].value - e.value).abs() < 0.3 * e.std, "{name}");
     }
 }
@@ -257,7 +258,7 @@ fn predicted_standard_deviations_are_nan_if_solver_errors_dominate_the_derivativ
     }
     let stated = found(&fmu, &question(Solver::Host(1e-8)), 1, 1.0);
     for bound in bounds(Solver::Host(1e-8)) {
-        // the fit estimates the noise to 1/√(2 · 800)
+        // the fit estimates the noise with a relative error of 1/√(2 · 800)
         let stated = stated.parameters[&bound.name].std;
         assert!((bound.std / stated - 1.0).abs() < 0.1, "{bound:?} {stated}");
     }
@@ -437,7 +438,7 @@ fn coverage_with_adaptive_solvers() {
                 );
                 // with an accurate solver every fit gets a verdict
                 assert!(tolerance > 1e-6 || judged == 20, "{judged}");
-                // fewer than 0.88 of 100 have a probability of 0.4 %
+                // with 95 % intervals, fewer than 88 of 100 would contain the true value with a probability of 0.4 %
                 assert!(f64::from(inside as u32) >= 0.88 * f64::from(given as u32));
             }
         }

@@ -26,7 +26,7 @@ use crate::fmu_twin::{self, SensorErrors, Twin, Unmodelled};
 use crate::friction::{is_one_way, push};
 
 const LONG: &str = "lin-sweep:amplitude=0.1";
-/// A faster sweep than the thesis's, for tests that only look for large errors.
+/// A sweep that is faster than the sweep of the thesis, for tests that only look for large errors.
 const SHORT: &str = "lin-sweep:amplitude=0.1,duration=300,f0=1.8,f1=3";
 
 fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
@@ -37,7 +37,7 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
         .unwrap()
 }
 
-/// Returns options of a fit with the torque linear between rows, as in the simulation.
+/// Returns options of a fit that assumes a torque linear between rows, as in the simulation.
 fn options() -> Options {
     Options {
         models: vec!["linear".into()],
@@ -68,10 +68,11 @@ fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() 
         ("friction.c", 0.003498),
     ] {
         let p = &found.parameters[name];
-        // four standard deviations: one false alarm in 3000 draws, and the seed is fixed
+        // limit of four standard deviations: a correct estimate exceeds it in one of 3000 draws of the noise, and
+        // the seed is fixed
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
-    // a parameter of the tank that is not known to a thousandth would mean that the fit has learnt nothing
+    // a diameter that is not known to a thousandth would mean that the fit has not determined it
     assert!(found.parameters["tank.d"].std < 1e-3 * 0.163);
     let sum =
         found.details.combinations.iter().find(|c| c.name == "friction.c + friction.d").unwrap();
@@ -119,7 +120,7 @@ fn damping_of_breaking_waves_is_recovered() {
         // Four standard deviations as above; the standard deviation must be below a quarter of the value.
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.25 * truth, "{name}: {p:?}");
     }
-    // equally large waves of a liquid that does not break
+    // equally large waves of a liquid in which no waves break
     let without = of(&[], false);
     assert!(
         without.verdict.iter().any(|line| line.contains("--also breaking")),
@@ -200,9 +201,9 @@ fn the_cause_of_a_misfit_is_named_with_the_option_that_estimates_it() {
     assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
 }
 
-/// The fill is stated 50 % too high, first as an exact value, then with a standard deviation of 1 %. Before, the verdict named "an
-/// actuator that lags" as the cause in the first case, and in the second case said that the model fits, although the estimate was
-/// 40 standard deviations from the stated value.
+/// The stated fill is 50 % too high, once as an exact value and once with a standard deviation of 1 %. The verdict once named "an
+/// actuator that lags" as the cause of the misfit of the exact value. With the standard deviation it said that the model fits,
+/// although the estimate was 40 standard deviations from the stated value.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_fill_that_is_stated_wrong_is_a_misfit_and_no_other_effect_is_named() {
@@ -238,7 +239,7 @@ fn a_misfit_that_no_candidate_explains_has_no_cause() {
     let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
     let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
     assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
-    // an effect whose score is far beyond chance, but which leaves more than noise
+    // the candidate effect with a score far beyond chance leaves a residual that is more than noise
     let explains = found.done.iter().any(|line| line.contains("more than noise is left"));
     assert!(
         explains && found.details.cause.is_none(),
@@ -279,7 +280,7 @@ fn an_arm_that_is_wrong_within_its_tolerance_is_estimated_from_nonlinear_slosh()
         let p = &found.parameters[name];
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
-    // ten times smaller than the tolerance
+    // the standard deviation is ten times smaller than the tolerance
     assert!(found.parameters["tank.r"].std < 1e-3 * 0.2295, "{:?}", found.parameters["tank.r"]);
     let is_reported = found.verdict.iter().any(|line| line.starts_with("tank.r is estimated"));
     assert!(is_reported, "{:?}", found.verdict);
@@ -354,7 +355,7 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
 
 /// A held torque acts half a row late, and without an estimated delay nothing can compensate for this. The fit therefore
 /// distinguishes smooth from linear torque long before the minimum is known accurately. A search whose sum of squares is clearly
-/// too large ends early: the sweep of 2700 s takes nine simulations in all, and one at the end.
+/// too large ends early: for the sweep of 2700 s, the impossible behaviours take nine simulations in all, and one at the end.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn impossible_intersample_behaviours_cost_few_simulations() {
@@ -364,7 +365,7 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
     let [told, found] = [options(), of_any_torque()]
         .map(|options| identify(&fmu, &recordings, &perfect(options), &mut |_| {}).unwrap());
     let more = found.details.fit.simulations - told.details.fit.simulations;
-    // two more minima, each with Jacobians of its own
+    // the two other intersample behaviours have minima of their own, which need Jacobians of their own
     assert!(more < 250.0, "{more}");
     let said = found.verdict.iter().find(|line| line.starts_with("The torque is taken")).unwrap();
     assert!(
@@ -373,7 +374,8 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
     );
     assert!(said.contains("held from row to row (zero-order hold) was given up with"), "{said}");
     for (name, estimated) in &told.parameters {
-        // both searches end a fiftieth of a standard deviation from the minimum, and farther along the valley of the friction
+        // both searches end a fiftieth of a standard deviation from the minimum, but at a larger distance along the
+        // valley of the friction
         let off = (estimated.value - found.parameters[name].value).abs() / estimated.std;
         assert!(off < 0.1, "{name}: {off} standard deviations");
     }
@@ -399,7 +401,7 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     assert!(fit.newton_decrement < 0.1, "{} standard deviations away", fit.newton_decrement);
     let scale = &found.measurement["gyro_scale"];
-    // more accurate than the prior; otherwise the search did not have to follow the valley
+    // the estimate must be more accurate than the prior; otherwise the search did not have to follow the valley
     assert!((scale.value - 1.02).abs() < 4.0 * scale.std && scale.std < 0.01, "{scale:?}");
 }
 
@@ -507,7 +509,7 @@ fn starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[])];
     let own = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
-    // all errors change the slosh frequency in the same direction
+    // all errors of the start values shift the slosh frequency in the same direction
     let far = [("tank.d", 1.4), ("tank.h", 0.6), ("slosh.zeta", 0.6), ("hub.I", 1.4)];
     let truth = |name: &str| own.parameters[name].value;
     let starts = far.map(|(name, off)| (name.to_string(), off * truth(name))).to_vec();
@@ -537,7 +539,8 @@ fn a_bench_of_another_size_is_estimated_only_if_its_inertia_is_stated() {
     let found = identify(&fmu, &recordings, &told, &mut |_| {}).unwrap();
     for (name, truth) in [("tank.d", 0.4), ("tank.h", 0.3), ("hub.I", 5.0)] {
         let p = &found.parameters[name];
-        // four standard deviations: one false alarm in 3000 draws, and the seed is fixed
+        // limit of four standard deviations: a correct estimate exceeds it in one of 3000 draws of the noise, and
+        // the seed is fixed
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
 }
@@ -576,7 +579,7 @@ fn an_encoder_determines_the_scale_error_of_the_gyro() {
     let options = Options { gyro_scale: 0.05, ..options() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let scale = &found.measurement["gyro_scale"];
-    // without the encoder the standard deviation would be 5 %
+    // without the encoder the standard deviation of the scale would be 5 %
     assert!(scale.std < 0.002, "{scale:?}");
     assert!((scale.value - 1.01).abs() < 4.0 * scale.std, "{scale:?}");
 }
@@ -666,7 +669,7 @@ fn a_simulation_that_would_take_too_long_is_refused() {
     let stiff = [lugre, ("friction.sigma0", "1e9"), ("init.omega", "100")];
     let said = says(&stiff, 0.0);
     assert!(said.contains("solver.max_steps = 600 internal steps"), "{said}");
-    // the limit that the user sets is kept
+    // a limit of internal steps that the user sets is not replaced
     let own = [&stiff[..], &[("solver.max_steps", "50")]].concat();
     let said = says(&own, 0.0);
     assert!(said.contains("solver.max_steps = 50 internal steps"), "{said}");
@@ -825,7 +828,7 @@ fn a_delay_of_half_a_row_is_not_reported_if_the_torque_between_rows_is_found() {
     let delay = &found.measurement["delay"];
     assert!((delay.value - 0.01).abs() < 4.0 * delay.std && delay.std < 1e-3, "{delay:?}");
     let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
-    // a held torque is excluded; smooth and linear give the same delay of 10 ms
+    // a held torque is excluded; a smooth and a linear torque give the same delay of 10 ms
     assert!(says("linear between rows") && !says("half a row"), "{:?}", found.verdict);
 }
 
@@ -843,7 +846,7 @@ fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
     let asymmetry = &found.parameters["friction.asymmetry"];
     assert!(asymmetry.std > 0.3, "{asymmetry:?}");
     for name in ["friction.c", "friction.d"] {
-        // the friction in each direction has an upper bound, and so has their sum
+        // the friction in each direction has an upper bound, and so has the sum c + d
         assert!(found.parameters[name].interval[1] < 0.1, "{:?}", found.parameters[name]);
         let combination = format!("{name} (1");
         let of = found.details.combinations.iter().find(|c| c.name.starts_with(&combination));

@@ -18,7 +18,7 @@ fn check_twin(seed: u64, held: &[&str]) {
     for (name, truth) in twin.truths() {
         let Some(p) = found.parameters.get(name).or(found.measurement.get(name)) else { continue };
         known += 1;
-        // exceeded for one of 12 parameters in one of 150,000 recordings
+        // a correct estimate exceeds this limit for one of 12 parameters in one of 150,000 recordings
         assert!((p.value - truth).abs() < 5.0 * p.std, "{name} is {truth}, found {p:?}");
         let is_in = (p.interval[0]..=p.interval[1]).contains(&truth);
         assert!(is_in || !held.contains(&name), "{name} is {truth}, found {p:?}");
@@ -102,7 +102,7 @@ fn a_profile_point_in_another_minimum_does_not_shorten_the_interval() {
     let found = twin.identify(&fmu, twin.models(), &|_| {}).unwrap();
     let speed = &found.parameters["friction.omega_s"];
     let truth = twin.truths().into_iter().find(|(name, _)| *name == "friction.omega_s").unwrap().1;
-    // exceeded in 3 of 1000 recordings
+    // a correct estimate exceeds this limit in 3 of 1000 recordings
     assert!((speed.value - truth).abs() < 3.0 * speed.std, "{truth}, found {speed:?}");
 }
 
@@ -128,6 +128,6 @@ fn recordings_as_loggers_write_them_are_identified() {
             inside += usize::from((p.interval[0]..=p.interval[1]).contains(&truth));
         }
     }
-    // fewer than 180 of 200 intervals have a probability of 0.1 %
+    // fewer than 180 of 200 intervals would contain the true value with a probability of 0.1 %
     assert!(10 * inside > 9 * all, "{inside} of {all}");
 }
