@@ -1,5 +1,6 @@
-//! Measures accuracy and time for every tank of `tests/tanks.json`: deviation from the reference over five modes,
-//! stated error, and the shortest computing time of several repetitions on one core.
+//! Measures accuracy and time for every tank of `tests/tanks.json`: largest deviation of five modes from the
+//! reference values, the error that the solver states, and the shortest computing time of several
+//! repetitions on one core.
 //!
 //! `cargo run --release -p hubslosh-tank --features studies --example accuracy [REPETITIONS [NAME]]`
 

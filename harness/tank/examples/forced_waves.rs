@@ -5,13 +5,13 @@
 //! cargo run --release -p hubslosh-tank --features studies --example forced_waves -- sphere circle 9 4 0.2 0.4 0.6
 //! ```
 //!
-//! prints one row for each wave in a tank that moves on a line (`line`) or on a circle (`circle`): the fill; the
-//! frequency divided by that of small waves; the acceleration over g; and the wave's largest slosh angle, phase
-//! (degrees) and force over the weight of the slosh mass. Then follow the errors of the third-order slosh mass, and
-//! those of the slosh mass with the wave's energy where its coefficients are known: angle (%), phase (degrees) and
-//! force (%). In the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills
-//! follow. With `swirl` the tank moves on a line while its liquid rotates; each row then has angle and phase along the
-//! line and across it. A fill takes about a minute.
+//! prints one row for each wave in a tank that moves on a line (`line`) or on a circle (`circle`): the fill; the frequency
+//! divided by that of small waves; the acceleration over g; and the wave's largest slosh angle, phase (degrees) and force
+//! over the weight of the slosh mass. Then follow the errors of the third-order slosh mass in angle (%), phase (degrees)
+//! and force (%), and the same errors of the slosh mass with the wave's energy, if its coefficients are known. In the
+//! command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills follow. With `swirl`
+//! the tank moves on a line while its liquid rotates; each row then has angle and phase along the line and across it. A
+//! fill takes about a minute.
 use std::f64::consts::{PI, TAU};
 
 use formulas::energy_terms::EnergyTerms;
@@ -206,8 +206,8 @@ impl Filled {
         }
     }
 
-    /// Prints rotary waves, which start from a wave of the last slosh mass at a stroke of 0.0082 R and at 1.01 times
-    /// the frequency.
+    /// Prints rotary waves of potential flow. Their computation starts from a rotary wave of the slosh mass with the wave's
+    /// energy, at a stroke of 0.0082 R and at 1.01 times the frequency of small waves.
     fn swirl(&self, resolution: [usize; 2]) {
         let (ratio, bob) = (1.01, self.bobs[self.bobs.len() - 1]);
         let push = 0.0082 * self.lambda * f64::powi(ratio, 2);

@@ -114,9 +114,9 @@ pub enum LimitSource {
     PotentialFlow,
     /// The frequency of the equivalent mass was compared with free waves of fully nonlinear potential flow in this tank.
     FreeWaves,
-    /// Nothing was compared. The limit is a share of the angle at which the second-order wave is half of the
-    /// first-order wave: the smallest share found in upright cylinders and spheres. It is at most the largest angle
-    /// found in upright cylinders.
+    /// No computed waves were available for comparison. The limit is a fraction of the slosh angle at which the
+    /// second-order wave is half of the first-order wave: the smallest fraction found in upright cylinders and spheres.
+    /// The limit is at most the largest one found in upright cylinders.
     Estimate,
 }
 

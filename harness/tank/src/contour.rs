@@ -402,7 +402,7 @@ impl Contour {
 
     fn contact_lines(&self, z: f64, fill: f64) -> Result<(Option<Crossing>, Crossing), Problems> {
         let crossings = self.crossings(z);
-        // The end of an inner wall limits nothing: only a horizontal part of the wall there makes a fill invalid.
+        // At the end of an inner wall only a horizontal part of the wall makes a fill invalid.
         let start = self.segments[0].start();
         let level = LEVEL * self.size;
         if start[1] < z - level && start[0] > level {

@@ -1,30 +1,33 @@
 //! Dependence of the first mode's frequency on its amplitude, for a body of revolution of any contour: potential flow
 //! to third order, by a variational method.
 //!
-//! The surface is z = z_F + zeta(rho, theta, t) at r = r(rho, z). Lines of constant rho begin at the radius rho
-//! of the surface at rest and run inside the tank. The outermost one is the wall, r(R, z) = R(z). With
-//! the volume element w rho drho dtheta dz, w = r r_rho/rho, harmonic functions u_j, phi = sum c_j(t) u_j
-//! and Q(t) the liquid, Luke's variational principle (J. Fluid Mech. 27 (1967) 395) reads
+//! The coordinates follow the wall. A point of the liquid is (rho, theta, z) with the radius r = r(rho, z): a line of
+//! constant rho and theta begins at the radius rho of the surface at rest, z = z_F, and runs inside the tank. The
+//! outermost line, rho = R, is the wall. The volume element is w rho drho dtheta dz with w = r r_rho/rho. The surface
+//! is at z = z_F + zeta(rho, theta, t). The potential is phi = sum c_j(t) u_j with harmonic functions u_j. Q(t) is the
+//! liquid, and Q0 the liquid at rest. Luke's variational principle (J. Fluid Mech. 27 (1967) 395) reads
 //!
 //! ```text
 //! L = sum c_j d/dt int_Q u_j dV - (1/2) int_Q |grad phi|^2 dV - g int_Q (z - z_F) dV
-//! int_Q F dV = int_Q0 F dV + int [F w zeta + (F w)_z zeta^2/2 + (F w)_zz zeta^3/6 + ...] rho drho dtheta
+//! int_Q B dV = int_Q0 B dV + int [B w zeta + (B w)_z zeta^2/2 + (B w)_zz zeta^3/6 + ...] rho drho dtheta
 //! ```
 //!
-//! where the derivatives are taken along the lines, at the surface at rest, so that only slope and curvature of the
-//! wall at the contact line enter. Every elevation zeta is allowed, because the lines do not leave the tank. Miles
-//! (1976) and Lukovsky use this principle for vertical walls and for cones. To first order zeta = a f E and phi =
-//! -omega a U S, with
+//! where B is any function of the point, and the derivatives are taken along the lines, at the surface at rest, so that
+//! only slope and curvature of the wall at the contact line enter. Every elevation zeta is allowed, because the lines
+//! do not leave the tank. Miles (1976) and Lukovsky use this principle for vertical walls and for cones. A wave with
+//! the amplitude a and the frequency omega (w in wt) has, to first order, zeta = a f(rho) E and phi = -omega a U(r, z)
+//! S, where f and U are the shapes of the first mode and
 //!
 //! ```text
 //! planar     E = cos theta cos wt,    S = cos theta sin wt
 //! circular   E = cos(wt - theta),     S = sin(wt - theta)
 //! ```
 //!
-//! The second order adds p P + r Z to zeta and d F to phi. P is constant in time, Z and F have the frequency 2 omega;
-//! their azimuthal numbers are 0 and 2. L averaged over a period is stationary with respect to p, r and d, with
-//! constant volume as a constraint. The remaining L_2 a^2 + L_4 a^4 is stationary with respect to a, as in
-//! `third_order.rs`. Fields of the third order do not contribute, because L is stationary at the first order.
+//! The second order adds p P + r Z to zeta and d F to phi, with the coefficients p, r and d. The shape P is constant in
+//! time, Z and F have the frequency 2 omega; their azimuthal numbers are 0 and 2. L averaged over a period is
+//! stationary with respect to p, r and d, with constant volume as a constraint. The remaining L_2 a^2 + L_4 a^4 is
+//! stationary with respect to a, as in `third_order.rs`. Fields of the third order do not contribute, because L is
+//! stationary at the first order.
 //!
 //! The u_j are the solid harmonics r^m, z r^m, ... about a point on the axis; zeta is a sum of polynomials in rho. Both
 //! are complete in a liquid without holes. The result does not depend on the choice of the lines, and tests check this.
@@ -45,10 +48,11 @@ const DEEP: f64 = 3.0;
 /// combination of harmonics) is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
 const NOISE: f64 = 1e-13;
 
-/// Periodic waves of the first mode, with lengths divided by the radius of the surface. The fields are lambda_1 =
-/// omega_1^2/g; the relative shifts of omega^2 per squared slosh angle in planar and in circular motion; the
-/// second-order elevation at the wall per squared slosh angle, in planar motion at its largest elevation; and the modes
-/// that the square of the first mode excites, each with its azimuthal number, its number from 1, and its lambda.
+/// Periodic waves of the first mode, with lengths divided by the radius of the surface. The fields are, in this
+/// order: lambda_1 = omega_1^2/g; the relative shifts of omega^2 per squared slosh angle in planar and in circular
+/// motion; the second-order elevation at the wall per squared slosh angle, at the instant of largest elevation in
+/// planar motion; and the modes that the square of the first mode excites, each with its azimuthal number, its number
+/// from 1, and its lambda.
 #[derive(Clone, Debug)]
 pub(crate) struct Waves {
     pub lambda: f64,
@@ -84,7 +88,7 @@ impl Fields {
                     - (n + m) as f64 * (r * r + z * z) * u[n - 1])
                     / (n + 1 - m) as f64;
             }
-            // d/dz lowers the degree; r d/dr + z d/dz multiplies by it
+            // d/dz of a harmonic has the next lower degree; r d/dr + z d/dz multiplies a harmonic by its degree
             let lower = |n: usize| if n > m { (n + m) as f64 * u[n - 1] } else { 0.0 };
             for n in first..=degree {
                 let j = n - first;
@@ -304,7 +308,7 @@ fn motions() -> [Motion; 2] {
     [planar, circular]
 }
 
-/// Returns the mean of `f` over azimuth and phase, exact for trigonometric polynomials of degree 11.
+/// Returns the mean of `f` over azimuth and phase. It is exact for trigonometric polynomials up to degree 11.
 fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     let angle = |i: i32| TAU * f64::from(i) / 12.0;
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
@@ -702,7 +706,8 @@ mod tests {
                         sum += weight / 144.0 * value;
                     }
                 }
-                // the energy below the surface at rest: the combinations are orthonormal
+                // energy of the liquid below the surface at rest: the sum of the squares of the coefficients, because
+                // the combinations are orthonormal
                 sum -= 0.5 * lambda * a * a * c.norm_squared() * average(|h, t| s(h, t).powi(2));
                 for (shape, _, _, second) in &second {
                     if let Some([_, potential, _]) = shape.double {
@@ -712,7 +717,7 @@ mod tests {
                 }
                 sum
             };
-            // Two amplitudes eliminate the sixth order.
+            // A combination of two amplitudes eliminates the term of sixth order.
             let [large, small] = [0.04, 0.02].map(|a| functional(a) / f64::powi(a, 4));
             let l_4 = (4.0 * small - large) / 3.0;
             let square = average(|h, t| e(h, t).powi(2));

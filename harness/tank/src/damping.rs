@@ -1,7 +1,8 @@
 //! Damping: one function for every tank and mode ([`tank_damping`], with the correlations of `formulas::damping`).
 //!
-//! In this module Re = nu/sqrt(g R^3) (an inverse Reynolds number), x = h/R is the fill, and zeta is the logarithmic
-//! decrement divided by 2 pi. Measured damping scatters by about 30 % around any of these correlations.
+//! In this module Re = nu/sqrt(g R^3) (an inverse Reynolds number) with the kinematic viscosity nu, the specific force
+//! g and the tank radius R; x = h/R is the fill with the liquid's height h; and zeta, the damping ratio, is the
+//! logarithmic decrement divided by 2 pi. Measured damping scatters by about 30 % around any of these correlations.
 
 use formulas::damping as formula;
 
@@ -33,7 +34,7 @@ pub fn tank_damping(
     sigma: Option<f64>,
 ) -> Result<Damping, Problems> {
     let recognised = data.wall.as_ref().and_then(|wall| shape::recognise(wall, data.fill));
-    // For a drawn wall that has a measured shape, the modes are those of a tank that is given by the shape's dimensions.
+    // If a drawn wall has a measured shape, the modes of a tank that is given by the dimensions of this shape are used.
     let is_given = |found: &Recognised| {
         let Geometry::Revolution { shape: Some(given), .. } = &tank.geometry else { return false };
         core::mem::discriminant(given) == core::mem::discriminant(&found.shape)
@@ -83,7 +84,7 @@ pub fn tank_damping(
     let [parts, close] = [&found, &near].map(|of| of.iter().map(|n| n.part).collect::<Vec<_>>());
     let estimate = formula::estimate(&parts, &close);
     let correlation = measured.correlation(nu, effective).map(|correlation| correlation.zeta);
-    // The correlation is used directly, because (correlation/layer) * layer would round.
+    // The correlation itself is returned, because the product (correlation/layer) * layer would have a rounding error.
     let exact = correlation.filter(|_| found.iter().all(Nearest::is_measured));
     let mut warnings: Vec<String> =
         outside(measured, nu, effective).into_iter().map(|why| format!("damping: {why}")).collect();
@@ -276,7 +277,7 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
 
 fn solve_shape(found: Recognised, modes: usize) -> Option<ModalData> {
     let whole = match found.shape {
-        // The cone must be open above the fill.
+        // The shape is made higher than the fill, because the tank must be open above its surface.
         Shape::Cone { half_angle, height } => Shape::Cone { half_angle, height: 1.5 * height },
         Shape::Cylinder { radius, height } => Shape::Cylinder { radius, height: 1.5 * height },
         shape => shape,

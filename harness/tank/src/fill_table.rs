@@ -300,7 +300,7 @@ pub fn parameters(
         let (at, rest) = (i + 1, row.rest(modes));
         real(&fill::LIQUID.element([at]), row.m_liq);
         real(&fill::H_0.element([at]), rest.height);
-        // With the largest number of modes rounding can make it negative.
+        // With the largest number of modes, rounding errors can make I_0 negative.
         real(&fill::I_0.element([at]), rest.inertia.max(0.0));
         real(&fill::I_Z.element([at]), row.i_eff_axis.unwrap_or(0.0));
         for n in 0..modes {
@@ -339,7 +339,7 @@ fn third_order(
     between: Vec<AtFill>,
 ) -> Vec<(usize, Result<Columns, TooFewFills>)> {
     let numbers = points.iter().flat_map(|at| at.set.third_order.iter().map(|(n, _)| *n));
-    // Mode 1 is listed even if it is known at no fill, so that its reason is reported.
+    // Mode 1 is listed even if its coefficients are known at no fill, so that the reason is reported.
     let most = numbers.max().unwrap_or(1);
     (1..=most).map(|n| (n, fill_amplitude::columns(n, &points, &between))).collect()
 }

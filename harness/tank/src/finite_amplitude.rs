@@ -34,8 +34,8 @@ const SAME: f64 = 1e-6;
 const ROUNDING: f64 = 1e-7;
 const COUNTS: [usize; 2] = [10, 20];
 const DEGREES: [usize; 2] = [18, 24];
-/// Relative difference of a box's two lengths below which the first modes along both directions
-/// exchange energy, so that the coefficients of one direction are not valid.
+/// Relative difference of a box's two lengths below which the first modes along both directions exchange energy, so that
+/// coefficients for motion in one direction are not valid.
 const NEARLY_SQUARE: f64 = 0.1;
 /// Largest tanh kh, the ratio of lambda to the wave number, of a ring of liquid between vertical walls.
 const DEEP: f64 = 0.999;
@@ -292,7 +292,7 @@ fn large_waves(
     }
     let fit = large_waves::Side::new(contour, wall).and_then(|side| large_waves::fit(wall, &side));
     let fit = fit.ok_or(NoEnergy::NoWaves)?;
-    // Another method computed the third-order shifts, with which the waves are compared.
+    // The third-order shifts with which the computed waves are compared come from another method.
     let exact = [third.planar, third.circular.unwrap_or(fit.shifts[1])];
     let off = (0..2).map(|i| (fit.shifts[i] - exact[i]).abs()).fold(0.0, f64::max);
     if off > LARGEST_SHIFT_ERROR {
@@ -554,7 +554,7 @@ fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<
         second: waves.second_wave * radius,
     });
     let mut known = Coefficients::new(found, wave);
-    // The harmonics' own error shows in lambda, which the boundary integral equation gives to ten digits.
+    // The error of the harmonics shows in their lambda, because the boundary integral equation gives lambda to ten digits.
     known.error = known.error.max(2.0 * (fine.lambda / (lambda * radius) - 1.0).abs());
     let detuned_by = |lambda: f64| ((4.0 * fine.lambda / lambda).sqrt() - 1.0).abs();
     let excited = fine.excited.iter().find(|(_, lambda)| detuned_by(*lambda) < DETUNING);

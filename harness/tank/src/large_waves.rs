@@ -481,7 +481,7 @@ impl<'a> Solver<'a> {
         let [u, u_r, u_z, u_h] = &at.values;
         let [phi, phi_r, phi_z, phi_h] = at.values.each_ref().map(|u| u * &c);
 
-        // derivatives with respect to z along lines of constant rho
+        // derivatives along the lines of constant rho
         let mut along = DMatrix::zeros(rows, nc);
         let mut kinetic = DMatrix::zeros(rows, nc);
         // coefficients of the diagonal blocks
@@ -680,16 +680,16 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Degrees of the harmonics in the truncated expansions. The median over these truncations is used, because in each
-/// of them a few waves are wrong: a multiple of the wave's frequency happens to equal the frequency of a high mode
-/// of the truncated liquid.
+/// Degrees of the solid harmonics in the truncated expansions of the potential. Each wave is the median over these
+/// truncations, because in each truncation a few waves are wrong: a multiple of the wave's frequency happens to equal the
+/// frequency of a high mode of the truncated liquid.
 const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
 /// Largest azimuthal number, which is also the largest multiple of the frequency.
 const ORDER: usize = 4;
 /// Slosh angles at which waves are computed, degrees.
 const ANGLES: [f64; 9] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
-/// Largest scatter of the frequencies at one slosh angle: median of the deviations of the truncations from their
-/// median, relative.
+/// Largest relative scatter of the frequencies at one slosh angle, measured by the median absolute
+/// deviation of the truncations.
 const SCATTER: f64 = 2e-4;
 
 fn median(values: &mut [f64]) -> f64 {
@@ -701,8 +701,9 @@ fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// Returns periodic waves of the liquid above `wall`, each the median of several truncations, up to the slosh angle at
-/// which the truncations scatter by more than [`SCATTER`]. The list is empty for a liquid with a hole.
+/// Returns periodic waves of the liquid above `wall`, each the median over the truncations of [`DEGREES`], up to the
+/// slosh angle at which the frequencies of the truncations scatter by more than [`SCATTER`]. The list is empty for a
+/// liquid with a hole.
 fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     let angles = ANGLES.map(f64::to_radians);
     let truncation = &|degree: usize| {
@@ -882,7 +883,7 @@ fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
     if planar.len().min(circular.len()) < 3 {
         return None;
     }
-    // Both motions are used up to the same angle.
+    // Planar and circular motion are used up to the same slosh angle.
     let largest = planar[planar.len() - 1].angle.min(circular[circular.len() - 1].angle);
     let upto = |waves: &[LargeWave]| -> Vec<LargeWave> {
         waves.iter().filter(|wave| wave.angle < 1.05 * largest).copied().collect()
@@ -1067,8 +1068,8 @@ mod tests {
         }
     }
 
-    /// The medians over several truncations are compared with one finer truncation, whose largest multiple of
-    /// the frequency is 5.
+    /// The frequencies of the waves, each the median over the degrees of harmonics in [`DEGREES`], are compared with the
+    /// frequencies from one finer expansion, whose largest multiple of the wave's frequency is 5 instead of [`ORDER`].
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn waves_in_a_sphere_do_not_depend_on_the_resolution() {
@@ -1093,7 +1094,7 @@ mod tests {
                 let (near, found) = (shift(near.unwrap()), shift(wave));
                 close += usize::from((0..2).all(|i| (near[i] - found[i]).abs() < 0.02));
             }
-            // At most one wave of the finer truncation may be off, because this truncation has a resonance there.
+            // At most one wave of the finer expansion may be wrong, because this expansion has a resonance at its slosh angle.
             assert!(close >= 4 && fine.len() == 5, "{motion:?} {close} {fine:?} {coarse:?}");
         }
     }
@@ -1116,7 +1117,8 @@ mod tests {
         );
     }
 
-    /// At a corner of the wall the side ends. A wall drawn in several smooth segments gives the same waves as one segment.
+    /// At a corner of the wall the smooth side of the wall ends. A wall that is drawn in several smooth segments gives the
+    /// same waves as a wall of one segment.
     #[test]
     fn a_side_ends_at_corners_and_goes_on_over_smooth_joints() {
         let joined = Contour::new(vec![

@@ -370,7 +370,7 @@ impl ModalData {
             (None, Some(x), Some(y)) => 0.5 * x.min(y),
             (r, ..) => r.unwrap_or(0.0),
         };
-        // a full tank has neither fixed mass nor R
+        // a full tank has neither a fixed mass nor a radius R of the free surface
         let lever = if highest > 0.0 { highest / r } else { 0.0 };
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
@@ -426,8 +426,8 @@ struct Approximation {
     i_eff: f64,
 }
 
-/// Returns the orders of the discretisations that are compared; the first order serves only to estimate the error. With
-/// `panels` panels the discretisation of the largest order has at most about 800 unknowns.
+/// Returns the orders (numbers of Gauss points per panel) of the discretisations that are compared; the first order serves
+/// only to estimate the error. With `panels` panels the discretisation of the largest order has at most about 800 unknowns.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -656,9 +656,9 @@ mod tests {
         assert!((found.error / expected - 1.0).abs() < 1e-6, "{:e} {expected:e}", found.error);
     }
 
-    /// Solves random contours of lines, splines and ellipses, with corners, at random fills and numbers of modes. The
-    /// reference is the result on panels of half the length, which have no point in common with the tested panels.
-    /// Contours that the halved panels do not resolve are skipped.
+    /// Solves random contours of lines, splines and ellipses, with corners, at random fills and numbers of modes. Returns
+    /// the true errors divided by the stated errors. The true values come from panels of half the length, which have no
+    /// point in common with the tested panels. Contours that the halved panels do not resolve are skipped.
     fn errors_over_stated_ones(seeds: core::ops::Range<u64>) -> Vec<f64> {
         seeds.filter_map(error_over_stated_one).collect()
     }
@@ -721,8 +721,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// If the stated error were only twice the last difference, the true error would be 0.74 (seed 7) and 0.99 (seed
-    /// 114) of it, which leaves no margin.
+    /// If only twice the last difference between discretisations were stated as the error, the true error would be 0.74
+    /// (seed 7) and 0.99 (seed 114) of the stated error, which leaves no margin.
     #[test]
     fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -167,7 +167,7 @@ impl Boundary {
     /// from another part of the boundary, or with its neighbours. The panels resolve `modes` modes. `fine` gives
     /// shorter panels, for contours with details that the usual panels do not resolve.
     pub(crate) fn panels(&self, modes: usize, fine: bool) -> Vec<Panel> {
-        // In a thin layer or a cusp this would take too many panels, so that longer panels are allowed there.
+        // In a thin layer or a cusp, short panels would be too many, so that longer panels are allowed.
         let (width, many) = if fine { (0.6 * WIDTH, 2 * MANY) } else { (WIDTH, MANY) };
         let gaps = if fine { [1.0, 4.0, 16.0] } else { [2.5, 10.0, 40.0] };
         for gap in gaps {
@@ -183,9 +183,9 @@ impl Boundary {
         let halves = |panel: &Panel| {
             let length = 0.5 * panel.length;
             let inner = Panel { length, ..*panel };
-            // Only the half at the corner is graded.
+            // Only the half of the panel at the corner is graded.
             let outer = Panel { s0: panel.s0 + length, gamma: 1.0, nu: 1.0, ..inner };
-            // in the order along the contour
+            // the two halves in the order along the contour
             if panel.end { [outer, inner] } else { [inner, outer] }
         };
         panels.iter().flat_map(halves).collect()
@@ -491,7 +491,7 @@ mod tests {
                 let panels = boundary.panels(3, fine);
                 let length = |panel: &Panel| {
                     let [a, b] = [1e-300, 1.0].map(|v| boundary.point(panel, v).p);
-                    // ratio of chord to arc of 60 degrees at most
+                    // a chord divided by its arc, for an arc of at most 60 degrees
                     (norm(sub(a, b)), norm(sub(a, b)) * (PI / 6.0) / 0.5)
                 };
                 let mut pairs: Vec<_> = panels.windows(2).map(|p| [p[0], p[1]]).collect();

@@ -26,7 +26,7 @@ const MOST_CAPILLARY: f64 = 0.1;
 /// the largest of common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
 const LARGEST_TENSION: f64 = 7.3e-5;
 
-/// The FMU that the parameters are for. HubSlosh gets a table of modes (`slosh.source = table`) and keeps the
+/// The FMU for which the parameters are written. HubSlosh gets a table of modes (`slosh.source = table`) and keeps the
 /// tank's position on the hub, `tank.r`; in Spacecraft the tank has a number from 1 to 4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
@@ -346,7 +346,7 @@ impl ParameterSet {
             Geometry::Box { length_x: x, length_y: y } if x != y => Some([x, y]),
             _ => None,
         };
-        // A box with unequal sides has modes along both sides, other tanks along the first axis only.
+        // A box with unequal sides has modes along both sides; every other tank has modes along the first axis only.
         let both = data.axes.as_ref().filter(|_| sides.is_some());
         let count = match (both, target) {
             (Some(_), Target::HubSlosh) => data.modes.len().min(most / 2),
@@ -488,7 +488,7 @@ impl ParameterSet {
         } else {
             set.notes.extend(found.warnings);
         }
-        // Every FMU has the same parameters of its modes; only the prefix with the tank's name differs.
+        // The parameters of a mode have the same names in every FMU, after a prefix with the tank's name.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
             let mut real = |n: usize, what: &str, value: f64| {
                 values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
@@ -541,7 +541,7 @@ impl ParameterSet {
                     real(slosh::table::G_REF.into(), liquid.gravity);
                 }
                 real(hubslosh::fluid::RHO.into(), data.rho);
-                // For a box, the width of the free surface along its first length.
+                // For a box, the width is the width of the free surface along its first length.
                 real(
                     hubslosh::tank::D.into(),
                     2.0 * data.r_surface.unwrap_or(data.length_x.unwrap_or(0.0) / 2.0),
@@ -577,7 +577,7 @@ impl ParameterSet {
                 };
                 real(target.name(M_0), rest.m_0);
                 real(target.name(H_0), rest.height);
-                // With the largest number of modes rounding can make it negative.
+                // With the largest number of modes, rounding errors can make I_0 negative.
                 let least = if both.is_some() { f64::NEG_INFINITY } else { 0.0 };
                 real(target.name(I_0), rest.inertia.max(least));
                 match &data.spin {

@@ -319,7 +319,7 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     let section = section(tank, last);
     let margin = 0.05 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
     let mut frame = tank_frame(&section, 80.0, 70.0, [320.0, 420.0], margin);
-    // Charts next to a low tank are drawn higher than the tank.
+    // Next to a low tank the charts are higher than the tank, so that they can be read.
     let scale = (300.0 / frame.height).max(1.0);
     let chart_height = frame.height * scale;
     frame.top += 0.5 * (chart_height - frame.height);

@@ -72,8 +72,8 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sample_points(wall, places);
     let mut found: Vec<Part> =
         KINDS.into_iter().filter_map(|kind| kind.part(&points, fill)).collect();
-    // A shallow wall can be similar to several shapes. Their shares are weighted so that the ratio of each share to the
-    // remainder stays as if only this shape were considered; a share of 1 leaves nothing for the other shapes.
+    // A wall of shallow liquid can be similar to several shapes. Their shares are weighted so that each share has the same
+    // ratio to the remainder as if only its shape were considered; a share of 1 leaves nothing for the other shapes.
     let beyond = |skip: usize| -> f64 {
         found
             .iter()
@@ -97,8 +97,8 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sample_points(wall, PLACES);
     let Some(cut) = Cut::from_whole_wall(&points, fill) else { return Vec::new() };
     let widest = points.iter().fold(0.0, |widest: f64, p| widest.max(p[0]));
-    // The radius of a flat pool or the height of a thin pipe would be too large a size: every shape would be similar
-    // to every other one.
+    // The height of a flat pool and the radius of a thin pipe are small, so that the smaller of both is the size: relative
+    // to the larger one, every shape would be similar to every other shape.
     let size = fill.min(widest);
     let of_kind = |kind: Kind| {
         let shape = kind.shape_through(cut)?;
@@ -220,7 +220,7 @@ impl Kind {
             let share = if level + 1 == points.len() { 1.0 } else { share };
             let [size, ring] = dimensions(&shape);
             let values = [share, share * size, share * ring, share * cut.depth];
-            // The wall below a lower level counts at least as much as the larger wall that contains it.
+            // The wall below a lower level has at least the weight of the larger wall that contains it.
             if here > weight {
                 let from = above.unwrap_or(values);
                 for ((sum, a), b) in sums.iter_mut().zip(from).zip(values) {

@@ -9,7 +9,8 @@
 //! I_cg = I_axis/2 + int z^2 dm - m z_cg^2
 //! ```
 //!
-//! The first equation gives c. Lids, dry floors and weightlessness are covered by the same equations.
+//! The first equation, with the known mass m, gives the constant c. The same equations hold with a lid, a dry
+//! floor and without gravity.
 //!
 //! Seen from a rotating tank, the first mode of an upright cylinder runs around the axis against the spin (l > 0) and
 //! with the spin (l < 0) at

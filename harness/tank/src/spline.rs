@@ -80,7 +80,7 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
             continue;
         }
         if count == 3 {
-            // three points: a parabola, whose second derivatives at both ends of the interval agree
+            // with three points the curve is a parabola, whose second derivatives at both ends of the interval agree
             matrix[(row, row)] = 1.0;
             matrix[(row, inner)] = 1.0;
             for axis in 0..2 {

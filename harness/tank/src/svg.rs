@@ -209,8 +209,8 @@ mod tests {
         }
     }
 
-    /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it does; it is then half
-    /// an ellipse about the middle of the two points.
+    /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it connects them. The
+    /// arc is then half an ellipse about the middle of the two points.
     #[test]
     fn an_arc_that_is_too_small_grows() {
         let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);

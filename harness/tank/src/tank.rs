@@ -113,7 +113,7 @@ impl Shape {
                 );
                 above(0.0, &[("radius - knuckle_radius", radius - knuckle_radius)]);
                 above(radius, &[("crown_radius", crown_radius)]);
-                // Crown and knuckle touch on the line through their centres.
+                // Crown and knuckle touch on the straight line through the centres of their circles.
                 let (crown, knuckle) = (crown_radius, knuckle_radius);
                 let rise = ((crown - knuckle).powi(2) - (radius - knuckle).powi(2)).sqrt();
                 let depth = crown - rise;

@@ -194,7 +194,7 @@ impl Overlaps {
                 *l_4 += weight[0] * mean + weight[1] * double;
             }
         }
-        // a (omega^2/T - 1)/2 + 4 L_4 a^3 = 0; circular motion has twice this.
+        // a is stationary: a (omega^2/T - 1)/2 + 4 L_4 a^3 = 0; in circular motion both terms are doubled.
         let amplitude2 = self.amplitude * self.amplitude;
         [-8.0 * l_4[0] * amplitude2, -4.0 * l_4[1] * amplitude2]
     }
@@ -371,7 +371,7 @@ pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64
         let [linear, constant] = [front * (twice + 2.0) * twice, -front * nu * nu];
         let before = n * (n + nu) * (twice + 2.0) / ((n + 1.0) * (n + nu + 1.0) * twice);
         p = (p.1, (linear * y + constant) * p.1 - before * p.0);
-        // derivatives with respect to y; p.0 is the polynomial of the previous degree
+        // derivatives with respect to y by the recurrence; p.0 is the polynomial of the previous degree
         slope = (slope.1, linear * p.0 + (linear * y + constant) * slope.1 - before * slope.0);
     }
     all

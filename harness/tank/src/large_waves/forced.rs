@@ -20,8 +20,8 @@ use crate::contour::Wall;
 use crate::gauss::Gauss;
 use crate::tank::{Geometry, Tank};
 
-/// Allowed motions of the liquid: in a plane (`Plane`), in space (`All`), and steadily on a circle, where azimuth and
-/// phase occur only as tau - theta (`Circle`).
+/// Allowed motions of the liquid: in a plane (`Plane`), in space (`All`), and steadily on a circle (`Circle`). In the last
+/// one, azimuth theta and phase tau occur only as tau - theta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     Plane,
@@ -92,8 +92,8 @@ impl Function {
         }
     }
 
-    /// Returns pairs (azimuth, phase) at which the wave determines it everywhere, by the symmetry (theta + pi, tau +
-    /// pi) and, in plane motion, by the symmetry -theta.
+    /// Returns pairs (azimuth, phase) at which the elevation determines the wave everywhere, because the wave has the symmetry
+    /// (theta + pi, tau + pi) and, in plane motion, the symmetry -theta.
     pub(super) fn grid(self, count: usize) -> Vec<[f64; 2]> {
         let half = |n: usize| PI * (n as f64 + 0.5) / count as f64;
         let [thetas, taus] = match self.space {

@@ -93,7 +93,7 @@ fn at_the_angle_limit_the_model_s_frequency_departs_from_nonlinear_potential_flo
         let fold = limits::swirl_fold(fill).map_or(f64::INFINITY, f64::to_degrees);
         let rotary = end(&rows, 1, &third, limits::FREQUENCY).unwrap_or(f64::INFINITY);
         assert!(rotary > limit.min(fold) - 0.5, "h/R {fill}: {limit} {fold} {rotary}");
-        // A forced response becomes wrong at a smaller angle.
+        // The error of a forced response reaches its limit at a smaller angle than the error of the frequency.
         let found = end(&rows, 0, &third, limits::FORCED);
         assert!(
             found.is_none_or(|found| known.forced.to_degrees() < found),

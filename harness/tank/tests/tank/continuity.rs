@@ -52,9 +52,10 @@ const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ),
 ];
 
-/// Returns the largest relative changes between neighbours of `count` + 1 fills that are 0.1 % of the tank's height
-/// apart: of the damping ratio; and, divided by the damping of the laminar layer, which changes with the fill by
-/// itself, of the damping ratio and of both ends of the interval.
+/// Returns the largest relative changes between neighbouring fills, which are 0.1 % of the tank's height apart; there
+/// are `count` + 1 fills. The first number is the change of the damping ratio. The other three are changes of the
+/// damping ratio and of both ends of its interval, each divided by the damping of the laminar layer, because this
+/// damping changes with the fill, too.
 fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64; 4] {
     let depth = tank.depth().unwrap_or(1.0);
     let numbers = |i: usize| {
@@ -85,9 +86,9 @@ fn the_damping_ratio_has_no_step_at_500_fills() {
     }
 }
 
-/// Covers each place where a wall stops being a measured shape: tangent point, shoulder, corner, knuckle. Also
-/// covers the ends of the measured ranges of sphere, cylinder and torus, and the torus where its correlation falls
-/// below the laminar layer.
+/// Covers each place where a wall stops being a measured shape: tangent point, shoulder, corner, knuckle. Also covers
+/// the ends of the measured ranges of sphere, cylinder and torus, and the fill of a torus at which its correlation
+/// falls below the damping of the laminar layer.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn damping_has_no_step_where_a_wall_leaves_a_shape() {
@@ -122,7 +123,8 @@ fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
         let mode = damping_at(&tank, fill, liquid).modes[0];
         mode.zeta / mode.laminar
     };
-    // 3.16 times the damping of the laminar layer at the tangent point, without a fall to 1.45 times
+    // the damping above the tangent point stays 3.16 times the damping of the laminar layer, and does not
+    // fall to 1.45 times
     assert!((ratio(0.3001) / ratio(0.3) - 1.0).abs() < 2e-3);
     let full = damping_at(&tank, 0.7, liquid);
     let [part] = &full.parts[..] else { panic!("{full:?}") };

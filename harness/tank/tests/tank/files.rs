@@ -26,7 +26,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 0.5, 1] }, { line = [0.5, 1, 0.5, -0.5] }]",
             "crosses itself near (0.5",
         ),
-        // crossings of the first line and the last line, and of a line by a corner at its height or at its radius
+        // the first line crosses the last line, and a line meets a corner at the corner's height or at its radius
         (
             "profile = [{ line = [0.5, 1, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 0.4, 0.5] }]",
             "crosses itself near (0.500000, 0.583333) m (segments 1 and 4)",
@@ -232,7 +232,7 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
         let surface = |off: f64| contour.cut(c * (0.5 + off)).unwrap().z_surface;
         assert_eq!([-0.9e-9, 0.9e-9].map(surface), [0.5 * c; 2]);
         assert!([-1.1e-9, 1.1e-9].iter().all(|off| surface(*off) != 0.5 * c), "{c}");
-        // relative to the size of 2 m
+        // the limit is relative to the tank's size of 2 m
         assert!(parsed(1.9e-6).is_ok());
         assert!(parsed(2.1e-6).unwrap_err().to_string().contains("open"), "{c}");
         let Geometry::Revolution { contour, .. } = parsed(0.0).unwrap().geometry else { panic!() };
@@ -483,7 +483,7 @@ fn a_contour_is_read_from_an_svg_drawing() {
         let data = tank.solve(1.2, 3).unwrap();
         for (a, b) in data.modes.iter().zip(&capsule.modes) {
             assert!((a.lambda / b.lambda - 1.0).abs() < 1e-9, "{} {}", a.lambda, b.lambda);
-            // the drawing's zero is at its top
+            // the drawing's zero is at the top of the tank
             assert!((a.hinge.unwrap() + 2.0 - b.hinge.unwrap()).abs() < 1e-8);
         }
         assert!((tank.solve(1.8, 1).unwrap().modes[0].lambda / 5.445_194 - 1.0).abs() < 2e-3);
@@ -667,7 +667,7 @@ fn modes_are_numbered_from_1() {
         }
         let rest: Vec<_> = data.rest.iter().map(|rest| rest.modes).collect();
         assert_eq!(rest, [1, 2, 3], "{text}");
-        // An inner wall has a wave, too.
+        // A mode of a tank with an inner wall has a wave at this wall, too.
         let inner = data.modes.iter().all(|mode| mode.wave_inner.is_some());
         let none = data.modes.iter().all(|mode| mode.wave_inner.is_none());
         assert_eq!((inner, none), (text.contains("annulus"), !text.contains("annulus")), "{text}");

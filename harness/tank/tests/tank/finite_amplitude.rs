@@ -31,8 +31,8 @@ fn assert_unknown(text: &str, fill: f64, why: &str) {
 }
 
 /// Compares with fully nonlinear potential flow in the bench's tank of radius 81.5 mm, with 10 and 5 cm of liquid. Each
-/// pair is a slosh angle in degrees and the frequency divided by the frequency of small waves. The potential flow was
-/// computed without expansion in the steepness; at 8 degrees terms of the fifth order contribute 3e-4.
+/// pair has a slosh angle, degrees, and the frequency at this angle divided by the frequency of small waves. The potential
+/// flow was computed without expansion in the steepness; at 8 degrees terms of the fifth order contribute 3e-4.
 #[test]
 fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     for (fill, planar, circular) in [
@@ -273,7 +273,7 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
             let (limit, has_coefficients) = angle_limit(text, share, WATER);
             println!("{text} {share:.2}: {limit:.2} {has_coefficients}");
             assert!(limit > 0.0 && limit < 15.01, "{text} {share}: {limit}");
-            // The largest limit of a pendulum in any cylinder is 6.3 degrees.
+            // The largest limit of a pendulum in a cylinder of any depth is 6.3 degrees.
             assert!(has_coefficients || limit < 6.3, "{text} {share}: {limit}");
             pendulums += usize::from(!has_coefficients);
         }
@@ -454,7 +454,8 @@ fn a_missing_surface_tension_gives_a_warning_at_low_bond_numbers() {
     }
 }
 
-/// A rectangular box has the planar shifts of the frequency with s = 1; a square box also has circular motion.
+/// A rectangular box has s = 1 and the kappa that gives the planar shift of the frequency; a square box also has circular
+/// motion, which determines s.
 #[test]
 fn boxes_have_third_order_coefficients_for_each_length() {
     let long = amplitude_dependence_at("box = [0.8, 0.5]", 0.4);
@@ -574,8 +575,8 @@ fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
     })
 }
 
-/// The file has s and kappa at each point of the fill table, with their errors in its notes, and no pair that is
-/// used for all fills.
+/// The parameter file has s and kappa at each point of the fill table, and the errors of both in its notes. It has no
+/// single pair of s and kappa for all fills.
 #[test]
 fn a_draining_tank_has_the_coefficients_of_every_fill() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -645,13 +646,15 @@ fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     }
 }
 
-/// The errors of a placed table that its notes state equal the errors at further fills between its points.
+/// The notes of a fill table state the errors of the coefficients between its points. They equal the
+/// errors at further fills.
 #[test]
 fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
     compare_placed_tables(&[("cylinder = { radius = 0.5, height = 1.5 }", 0.7, 1.4)]);
 }
 
-/// The same for shapes whose modes are computed by the boundary integral equation, not in closed form.
+/// Stated errors between the points of a fill table equal the errors at further fills, for shapes whose modes are computed
+/// by the boundary integral equation and not in closed form.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn a_placed_table_of_a_cone_and_of_a_sphere_states_the_error_of_the_coefficients() {

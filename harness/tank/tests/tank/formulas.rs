@@ -77,7 +77,7 @@ fn damping_of_cone_and_torus_equals_values_computed_by_hand() {
     let cone = damping::cone(0.5, 30.0, 1e-6, 9.81);
     let by_hand = 4.964 / core::f64::consts::TAU * 1.3817 / 0.638f64.sqrt() * 9.0305e-7f64.sqrt();
     assert!((cone / by_hand - 1.0).abs() < 1e-5);
-    // the measured tank itself, half full: at y = 0.5 the formula is the fit without a correction
+    // the torus whose damping was measured, half full: at y = 0.5 the formula is the fit without a correction
     let torus = damping::torus(0.0635, 0.0635, 3.3e-6, 9.81);
     let fit = 1.6629 / 16.0 - 3.7955 / 8.0 + 3.5583 / 4.0 - 1.6759 / 2.0 + 0.3865;
     assert!((torus * core::f64::consts::TAU / fit - 1.0).abs() < 1e-12);
@@ -218,7 +218,7 @@ fn the_frequency_with_a_curved_meniscus_is_smooth_between_the_values_of_the_tabl
         let flat = xi * bond + xi.powi(3);
         assert!((low_gravity::cylinder_omega2(bond, 90.0) / flat - 1.0).abs() < 1e-15);
     }
-    // -6.76 cos at Bo = 3000
+    // the shift should approach -6.76 cos(angle), here at Bo = 3000
     let shift = low_gravity::cylinder_omega2(3000.0, 0.0) - xi * 3000.0 - xi.powi(3);
     assert!((shift + 6.76).abs() < 0.02, "{shift}");
     let mut before = 0.0;
@@ -251,7 +251,7 @@ fn the_frequency_with_a_curved_meniscus_is_smooth_between_the_values_of_the_tabl
     }
     let mode = &solve(BENCH, 0.2, 1).modes[0];
     let fluid = Fluid { rho: 997.0, sigma: 0.072, g: 0.0 };
-    // Gravity and the spring together give the frequency, under any meniscus.
+    // Under any meniscus, gravity and the centring spring together give the frequency.
     for (angle, g) in [(90.0, 9.81), (60.0, 0.1), (30.0, 0.01), (5.0, 0.0)] {
         let found = low_gravity::cylinder(mode, 0.0815, 0.2, angle, Fluid { g, ..fluid });
         let together = g * mode.lambda + found.spring / mode.m;
@@ -294,8 +294,8 @@ fn damped(
     .unwrap()
 }
 
-/// The same tank has the same damping if it is drawn in one piece or in three, shifted along its axis, drawn as an ellipse
-/// with equal axes, or as the wetted part of a larger tank.
+/// A tank has the same damping if it is drawn in one piece or in three pieces, shifted along its axis, drawn as an ellipse with
+/// equal axes, or as the wetted part of a larger tank.
 #[test]
 fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
     let half = 1.0 / 2.0_f64.sqrt();

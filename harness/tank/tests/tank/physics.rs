@@ -14,8 +14,8 @@ fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
         for mode in data.modes.iter().filter(|m| m.m_ratio > 1e-4) {
             assert!((mode.hinge.unwrap() - 1.0).abs() < 1e-8, "{fill}: {:?}", mode.hinge);
         }
-        // With all modes, m_liq z_cg = - sum m_n l_n and, about the centre of the sphere, I_eff = sum m_n l_n^2. With
-        // five modes the remainders must have the right sign.
+        // With all modes, m_liq z_cg = - sum m_n l_n and, about the centre of the sphere, I_eff = sum m_n l_n^2. With only
+        // five modes, the remainder of each sum has a known sign.
         let first: f64 = data.modes.iter().map(|m| m.m * m.l).sum();
         let second: f64 = data.modes.iter().map(|m| m.m * m.l * m.l).sum();
         let lever = data.z_cg - 1.0;
@@ -51,7 +51,8 @@ fn spheres_have_the_known_frequencies_and_masses() {
 }
 
 /// Nearly empty, the sphere is a shallow paraboloid: lambda_n R tends to 2 n^2 - 1, with corrections of the order of h/R
-/// times n^4. Nearly full, it is the ice-fishing problem, whose eigenvalue is 2.7547 relative to the radius of the surface.
+/// times n^4. Nearly full, it is the ice-fishing problem (a small circular opening in a plane lid), in which lambda_1 times
+/// the radius of the surface is 2.7547.
 #[test]
 fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     let data = solve("shape = { sphere = { radius = 1.0 } }", 1e-3, 3);
@@ -99,7 +100,7 @@ fn closed_forms_have_their_stated_error_in_shallow_liquid() {
         let off = data.i_eff_cg / data.m_liq - exact;
         assert!(off.abs() < data.error * 0.25, "box {h}: {off}");
     }
-    // the boundary integral equation loses 3e-14 R/h to rounding
+    // rounding errors of the boundary integral equation are 3e-14 R/h
     let h = 1e-2;
     let ring = format!(
         "profile = [{{ line = [0.5, {h}, 0.5, 0] }}, {{ line = [0.5, 0, 1, 0] }}, {{ line = [1, 0, 1, {h}] }}]"
@@ -205,8 +206,8 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
     }
 }
 
-/// The known sums are the sum of all modal masses and the limits of the inertia. The sum of 1/(xi^2 - 1) is 1/2; from 400
-/// zeros the remainder is 1/(400 pi^2).
+/// The known sums are the sum of all modal masses and the limits of the inertia. The sum of 1/(xi^2 - 1) is 1/2; after the
+/// first 400 zeros xi the remainder is 1/(400 pi^2).
 #[test]
 fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     let xi = closed_form::zeros_of_j1_slope(400);
@@ -218,12 +219,13 @@ fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     assert!((sum - 0.5 + 1.0 / (400.0 * 9.87)).abs() < 1e-6);
     let sum: f64 = xi.iter().map(|x| 1.0 / (x * x * (x * x - 1.0))).sum();
     assert!((sum - 0.125).abs() < 1e-9);
-    // A thin disc rotates with its tank: m R^2/4; so does a long rod: m h^2/12.
+    // The liquid of a thin disc rotates with its tank, with the inertia m R^2/4; so does the liquid of a long
+    // rod, with m h^2/12.
     let disc = closed_form::cylinder(1.0, 1e-3, 1.0, 1);
     assert!((disc.i_eff_cg / (0.25 * disc.m_liq) - 1.0).abs() < 1e-2);
     let rod = closed_form::cylinder(1.0, 500.0, 1.0, 1);
     assert!((rod.i_eff_cg / (rod.m_liq * 500.0 * 500.0 / 12.0) - 1.0).abs() < 1e-4);
-    // A square box takes 0.1565 of the rigid inertia about the vertical axis along with it.
+    // A square box takes along 0.1565 of the rigid liquid's inertia about the vertical axis.
     let yaw = closed_form::box_yaw_inertia(1.0, 1.0, 0.3, 1000.0) / (300.0 / 6.0);
     assert!((yaw - 0.1565).abs() < 5e-5, "{yaw}");
     assert!(
@@ -323,7 +325,7 @@ fn compare_hinges_of_spheres(fills: &[f64]) {
         let data = solve("shape = { sphere = { radius = 1.0 } }", fill, 5);
         let r = data.r_surface.unwrap();
         for mode in &data.modes {
-            // m (hinge - 1) is 0. The error of l is relative to l.
+            // m (hinge - 1) is 0, because the hinge is at the sphere's centre. The error of l is relative to l.
             let moment =
                 (mode.m * (data.z_cg + mode.l - 1.0) + mode.m_h) / (data.m_liq * r.max(mode.l));
             assert!(moment.abs() < data.error, "{fill}: {moment:e} {:e}", data.error);
@@ -344,9 +346,9 @@ fn a_full_tank_s_error_does_not_depend_on_its_size() {
     assert_eq!([error(0.0625), error(16.0)], [error(1.0); 2]);
 }
 
-/// Thin liquids and small details are solved as accurately as others. In a lens and in a needle two discretisations
-/// differ by 2e-7, so that a third, finer one is used. A knuckle of 2 % of the radius gets panels as short as the gap
-/// to its other end. A shelf 2 cm thick, 2 cm above the floor, needs shorter panels for an error of 1e-6.
+/// Thin liquids and small details are solved as accurately as other tanks. For a lens and a needle, two discretisations
+/// differ by 2e-7, so that a third, finer one is used. A knuckle of 2 % of the radius gets panels that are as short as the
+/// gap between its ends. A shelf 2 cm thick, 2 cm above the floor, needs shorter panels for an error of 1e-6.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn thin_liquids_and_small_details_are_solved_as_well_as_others() {
@@ -402,12 +404,12 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     for size in [1e-3, 0.3, 7.0, 1e3] {
         let found = closed_form::annular_wave_numbers(0.4 * size, size, 5);
         for (k, one) in found.iter().zip(&ones) {
-            // Zeros of functions of size 1 with an error of some 1e-15.
+            // The wave numbers are zeros of functions of size 1, which have an error of some 1e-15.
             assert!((k * size / one - 1.0).abs() < 1e-12, "{size} {k} {one}");
         }
     }
     let thin = closed_form::annular_wave_numbers(0.99, 1.0, 3);
-    // half of the gap, relative to the radius
+    // the mean radius of the thin annulus is smaller than the outer radius by half of the gap
     assert!((thin[0] * 0.995 - 1.0).abs() < 1e-3, "{}", thin[0]);
     for (n, k) in thin[1..].iter().enumerate() {
         let plane = (n + 1) as f64 * core::f64::consts::PI / 0.01;

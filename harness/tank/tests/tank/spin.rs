@@ -106,8 +106,8 @@ fn a_slow_spin_changes_nothing() {
     }
 }
 
-/// The expected frequencies come from a solution that is valid for any spin rate. They are seen from the tank, in units
-/// of sqrt(g/R), for waves that run against the spin and with the spin.
+/// The expected frequencies come from a solution that is valid for any spin rate. They are the frequencies in the rotating frame
+/// of the tank, in units of sqrt(g/R), for waves that run against the spin and with the spin.
 #[test]
 fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liquid() {
     let rows = [
@@ -149,8 +149,8 @@ fn a_spinner_beyond_the_model_is_out_of_range() {
     assert!(sphere.in_range && sphere.warnings[0].contains("pendulum"), "{:?}", sphere.warnings);
 }
 
-/// The expected mass of the spinning liquid is computed by an independent integral over the radius, 2 pi int r (z_surface -
-/// z_floor) dr.
+/// The expected mass of the spinning liquid is computed by an independent integral over the radius, 2 pi rho int r
+/// (z_surface - z_floor) dr.
 #[test]
 fn an_annulus_bares_its_floor_at_the_inner_wall() {
     let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };

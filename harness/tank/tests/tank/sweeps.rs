@@ -9,8 +9,8 @@ fn fills(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
 }
 
-/// Without liquid, and without a free surface, there are no modes and no NaN. A liquid that fills a sphere does not
-/// rotate with it: I_eff is 0, while the rigid liquid would have 2/5 m R^2.
+/// Without liquid, and without a free surface, there are no modes and no NaN. Liquid that fills a sphere does not
+/// rotate with the sphere: I_eff is 0, while rigid liquid would have 2/5 m R^2.
 #[test]
 fn empty_and_full_tanks_have_no_modes() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -25,7 +25,7 @@ fn empty_and_full_tanks_have_no_modes() {
     assert!((full.m_liq / (4000.0 / 3.0 * core::f64::consts::PI) - 1.0).abs() < 1e-12);
     assert!(full.i_eff_cg.abs() < 1e-9 * full.i_frozen_cg, "{}", full.i_eff_cg);
     assert!((full.rest(0).height - 1.0).abs() < 1e-12);
-    // the limit of decreasing free surfaces
+    // a nearly full sphere has the limit of ever smaller free surfaces
     let nearly = sphere.solve(1.9999, 1).unwrap();
     assert!(nearly.i_eff_cg < 1e-6 * nearly.i_frozen_cg);
     let csv = table.to_csv();

@@ -23,8 +23,8 @@ fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     }
 }
 
-/// The depth h/R at which planar motion begins to harden. With one excited mode of each azimuthal number it is 0.5058,
-/// which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
+/// The height h/R above which planar motion softens and below which it hardens. With one excited mode of each azimuthal
+/// number it is 0.5058, which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
 #[test]
 fn planar_hardening_begins_at_a_lower_depth_with_more_excited_modes() {
     let begins = |count: usize| {
@@ -52,7 +52,7 @@ fn secondary_resonances_occur_at_the_predicted_depths() {
     for ((depth, _), known) in found.iter().zip([0.152_267, 0.831_377, 1.009_701]) {
         assert!((depth - known).abs() < 1e-6, "{found:?}");
     }
-    // The third order has poles there.
+    // The third-order theory has poles at these depths.
     let all = Overlaps::new(5);
     assert!(all.equivalent(1.00975)[0].abs() > 50.0 && all.equivalent(1.2)[0].abs() < 2.0);
     assert_eq!(all.secondary_resonance(1.00975), Some([0, 2]));
@@ -110,7 +110,7 @@ fn annular_tanks_have_the_limits_of_a_circle_and_of_a_channel() {
     let ring = Overlaps::round(0.999, 1.0, 4);
     let channel = Overlaps::rectangle(std::f64::consts::PI);
     for depth in [0.3_f64, 1.0, 3.0] {
-        // psi^2 r dr has the integral 1, so that psi at the wall is 1/sqrt(0.001) per unit of a
+        // the integral of psi^2 r dr is 1, so that psi at the wall is 1/sqrt(0.001)
         let per_wave = |overlaps: &Overlaps, wave: f64| {
             overlaps.shifts(depth).map(|shift| shift / (overlaps.amplitude * wave).powi(2))
         };
