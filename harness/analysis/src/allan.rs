@@ -158,7 +158,7 @@ impl Noise {
 
 /// Returns the Allan variance of a Gauss–Markov process divided by its variance, at `x` correlation times.
 fn markov(x: f64) -> f64 {
-    // exp_m1 avoids cancellation: for small x only (2/3) x³ is left
+    // exp_m1 avoids cancellation: for small x, only (2/3) x³ remains of the terms
     (2.0 * x + 4.0 * (-x).exp_m1() - (-2.0 * x).exp_m1()) / (x * x)
 }
 
@@ -190,7 +190,7 @@ mod tests {
         assert!(points.len() > 40 && (points.last().unwrap().tau - 200.0).abs() < 30.0);
         for point in points {
             let expected = 0.25 * point.tau / 2f64.sqrt();
-            // sums of 2e4 numbers up to 5e2 have a rounding error of 1e-9
+            // sums of 20,000 numbers up to 500 have a relative rounding error of 1e-9
             assert!((point.variance.sqrt() / expected - 1.0).abs() < 1e-7, "{point:?}");
         }
     }
@@ -212,11 +212,11 @@ mod tests {
         let deviation = |tau: f64| noise.variance(tau).sqrt();
         let times = (0..10_000).map(|k| f64::from(k) * 0.1 + 1.0);
         let peak = times.max_by(|a, b| deviation(*a).total_cmp(&deviation(*b))).unwrap();
-        // 1.8926 and 0.61737 by setting the derivative to zero: x from 3 − x − (4 + 2x) e^−x
-        // + (1 + x) e^−2x = 0
+        // 1.8926 and 0.61737 are the position and the value of the maximum, where the derivative is zero: 3 − x −
+        // (4 + 2x) e^−x + (1 + x) e^−2x = 0
         assert!((peak / 100.0 - 1.8926).abs() < 1e-3, "{peak}");
         assert!((deviation(peak) - 0.61737).abs() < 1e-4, "{}", deviation(peak));
-        // for small and large x: sqrt(2x/3) and sqrt(2/x)
+        // limits of the deviation for small and for large x: sqrt(2x/3) and sqrt(2/x)
         assert!((deviation(0.01) / (2.0 * 1e-4 / 3.0f64).sqrt() - 1.0).abs() < 1e-3);
         assert!((deviation(1e6) / 2e-4f64.sqrt() - 1.0).abs() < 1e-3);
     }

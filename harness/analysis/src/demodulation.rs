@@ -32,9 +32,9 @@ pub fn cycles(sweep: &Sweep, frequency: f64) -> f64 {
     slow.clamp(LEAST_CYCLES, CYCLES)
 }
 
-/// Frequency responses, one for each output, with the data from which their uncertainty follows.
-/// `noise_gain` is the variance of H for a noise of unit power spectral density in the output, Σ|w|²/(h
-/// |U|²), at the responses' frequencies.
+/// Frequency responses, one for each output, with the data from which their uncertainty follows. `noise_gain`
+/// is the variance of H if the output has noise of unit power spectral density: Σ|w|²/(h |U|²) at the
+/// responses' frequencies, with the time h between samples.
 pub struct Demodulated<const N: usize> {
     pub responses: [FrequencyResponse; N],
     pub noise_gain: Vec<f64>,
@@ -52,8 +52,9 @@ pub fn deviation(
     each.map(|((h, v), gain)| (v * gain / 2.0).sqrt() / h.norm()).collect()
 }
 
-/// Returns the rate of change of the response's error along the frequency, relative to the error, 1/Hz. It is
-/// the root of ∫w'²/∫w², which is 2π/√3 divided by the length of a Hann window, divided by the sweep's rate.
+/// Returns how fast the error of the response changes with the frequency, relative to the error,
+/// 1/Hz. It is the root of ∫w'²/∫w², which is 2π/√3 divided by the length of a Hann window, divided
+/// by the sweep's rate, Hz/s.
 pub fn slope(sweep: &Sweep, frequency: f64) -> f64 {
     let window = cycles(sweep, frequency) / frequency;
     std::f64::consts::TAU / 3f64.sqrt() / (window * sweep.rate_at(frequency).abs())

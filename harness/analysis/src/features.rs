@@ -22,8 +22,8 @@ pub struct Deviations {
 impl Features {
     /// Returns the standard deviations of the features, by adding simulated errors to the response. `relative` is the
     /// relative standard deviation of the response at each frequency, and `slope` the rate of change of its error along the
-    /// frequency relative to the error, 1/Hz. With other simulated errors, 95 % of the shifts of a feature are below 1.96
-    /// of its standard deviations.
+    /// frequency relative to the error, 1/Hz. In a check with other simulated errors, 95 % of the shifts of a feature were
+    /// below 1.96 of its standard deviations.
     ///
     /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are normal numbers with
     /// the standard deviation s, the slope, so that errors at frequencies Δf apart have the correlation exp(−s²Δf²/2) of a
@@ -178,7 +178,7 @@ mod tests {
             Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
         let clean = Features::find(&response);
         for (f, h) in response.frequency.iter().zip(&mut response.response) {
-            // a minimum, due to a beat, 60 mHz above the resonance and 5 dB lower than the antiresonance
+            // a minimum that a beat causes, 60 mHz above the resonance and 5 dB lower than the antiresonance
             *h *= 1.0 - 0.994 * (-((f - 2.52) / 0.004_f64).powi(2)).exp();
         }
         let level = response.decibels();
@@ -192,7 +192,7 @@ mod tests {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::find(&hub.frequency_response(&grid)), Features::default());
-        // up to 2.4 Hz the band contains the antiresonance, but not the resonance
+        // a band that ends at 2.4 Hz contains the antiresonance, but not the resonance
         let early = logarithmic_grid((1.25, 2.4), 2000);
         let features = Features::find(&Linear::bench_10_cm(0.003).frequency_response(&early));
         assert!(features.f_dip.is_some() && features.f_res.is_none(), "{features:?}");

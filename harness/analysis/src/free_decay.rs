@@ -44,8 +44,8 @@ pub fn amplitude(t: f64, start: f64, [frequency, zeta, zeta_a]: [f64; 3]) -> f64
     start * (-zeta * s).exp() / (1.0 + zeta_a * start * g)
 }
 
-/// Evaluates the model with frequency (Hz), ζ, ζ_A and κ at the times of a record. `own` contains the amplitude, phase, offset
-/// and slope at `time[0]`.
+/// Evaluates the model with frequency (Hz), ζ, ζ_A and κ at the times of a record. `own` contains the values that differ from
+/// record to record: amplitude, phase, offset and slope at `time[0]`.
 pub fn model(time: &[f64], [frequency, zeta, zeta_a, kappa]: [f64; 4], own: [f64; 4]) -> Vec<f64> {
     let omega = TAU * frequency;
     let damped = (1.0 - zeta * zeta).max(0.0).sqrt();
@@ -66,15 +66,15 @@ pub fn model(time: &[f64], [frequency, zeta, zeta_a, kappa]: [f64; 4], own: [f64
 
 const LINES: usize = 400;
 
-/// Returns frequency, Hz, and amplitude of the largest other oscillation, in the residual of a fit of an oscillation
-/// with this `frequency`, Hz.
+/// Returns frequency, Hz, and amplitude of the largest other oscillation. It is searched in the residual of a fit of an
+/// oscillation with this `frequency`, Hz.
 pub fn largest_other(time: &[f64], residual: &[f64], frequency: f64) -> (f64, f64) {
     let (n, seconds) = (time.len() as f64, time[time.len() - 1] - time[0]);
     let amplitude = |f: f64| {
         let turns = time.iter().map(|t| Complex64::cis(-TAU * f * (t - time[0])));
         2.0 * turns.zip(residual).map(|(z, r)| z * r).sum::<Complex64>().norm() / n
     };
-    // up to the Nyquist frequency of the mean step, and to ten times f
+    // the search ends at the Nyquist frequency of the mean step, or at ten times f if that is lower
     let top = (0.5 * n / seconds).min(10.0 * frequency);
     let low = (0.5 * frequency).min(0.5 * top);
     let line = |k: usize| low + (top - low) * (k as f64 + 0.5) / LINES as f64;
@@ -97,8 +97,8 @@ pub struct Start {
 }
 
 const FINE: usize = 4;
-/// Smallest amplitude of the phasor, relative to its largest amplitude in the record, that is used. Smaller ones
-/// are dominated by noise.
+/// Smallest amplitude of the phasor that is used, relative to its largest amplitude in the record.
+/// Noise dominates smaller amplitudes.
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
@@ -217,7 +217,8 @@ mod tests {
 
     #[test]
     fn a_free_decay_of_100000_uneven_rows_is_fitted_with_a_single_fourier_transform() {
-        // the spacing is 0.6 to 1.4 times the mean step; a search with one sum per frequency took minutes
+        // the spacing is 0.6 to 1.4 times the mean step; a direct sum at every frequency, instead of
+        // one transform, took minutes
         let mut random = Random::new(5, 0);
         let mut time = vec![0.0];
         for _ in 1..100_000 {

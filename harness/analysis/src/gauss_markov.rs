@@ -38,7 +38,7 @@ impl Noise {
         let mut log_variance = 0.0;
         let mut rows = Vec::with_capacity(time.len());
         let (mut last_step, mut keep) = (0.0, 1.0);
-        // The gains of a settled filter are constant.
+        // After some rows of equal spacing the filter has settled, and its gains are constant.
         let (mut last_innovation, mut settled) = (f64::NEG_INFINITY, ([1.0, 0.0, 1.0], 0.0));
         for k in 0..time.len() {
             if k > 0 {

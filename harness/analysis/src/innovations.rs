@@ -8,8 +8,8 @@
 //! * cross-correlation with the torque and with its square: a correlation shows that the model lacks an
 //!   effect of the input.
 //!
-//! With many rows each test is sensitive to negligible effects, so that the result also contains the
-//! size of the excess.
+//! With many rows each test also rejects negligible effects. Therefore the result contains the size
+//! of the excess, too.
 
 use fourier::Forward;
 use serde::Serialize;
@@ -113,7 +113,7 @@ fn normal(chi_squared: f64, n: f64) -> f64 {
 /// rare for every n.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
-    // The median of χ² is below its mean, which is used here.
+    // The mean of χ² is needed, which is larger than its median by this factor.
     let middle = median(&values).unwrap_or(0.0) / (1.0 - 2.0 / (9.0 * n)).powi(3);
     levels
         .iter()
@@ -179,7 +179,7 @@ mod tests {
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
         let tests = Tests::run(&time, &[&torque], &white, 1.0);
         assert!(tests.passed(), "{tests:?}");
-        // a tenth of the noise, in the frequency band of the torque only
+        // the torque contributes a tenth of the noise, in its frequency band only
         let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
         let tests = Tests::run(&time, &[&torque], &leaking, 1.0);
         assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");

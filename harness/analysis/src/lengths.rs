@@ -1,6 +1,7 @@
-//! Lengths of windows, lags and segments. They follow from the frequency band and the duration of the torque, so that
-//! slosh with a period of 20 s in a spacecraft is resolved as well as slosh with 0.4 s on a bench. For the thesis's sweep,
-//! 1.25 to 3.5 Hz in 2700 s, a window has 24 cycles, the longest lag is 200 s, and a segment has 20 s.
+//! Lengths of the windows, lags and segments with which the frequency response is estimated. They follow from the
+//! frequency band and the duration of the torque, so that slosh with a period of 20 s in a spacecraft is resolved as well
+//! as slosh with a period of 0.4 s on a bench. For the thesis's sweep, 1.25 to 3.5 Hz in 2700 s, a window has 24 cycles,
+//! the longest lag is 200 s, and a segment has 20 s.
 
 use crate::response::BAND;
 use crate::sweep::Sweep;
@@ -11,12 +12,12 @@ use crate::{spa, welch};
 const SAMPLES: f64 = 14.0;
 const MOST_LAG: f64 = 0.5;
 
-/// Lengths for estimates from a whole record, s.
+/// Longest lag, length of the segments, and decimation for estimates from a whole record; times in s.
 ///
-/// - `lag`: longest lag of [`spa`], with the same number of cycles at the band's centre as 200 s of the
-///   thesis's sweep, and at most half of the record. Its resolution is 1/lag.
-/// - `segment`: length of the segments for coherence. For a sweep, six half-overlapping segments cover each
-///   frequency, L = sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the thesis's sweep.
+/// - `lag`: longest lag of [`spa`], with the same number of cycles at the band's centre as 200 s of the thesis's sweep,
+///   and at most half of the record. Its resolution is 1/lag.
+/// - `segment`: length of the segments for coherence. For a sweep, six half-overlapping segments cover each frequency, L =
+///   sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the thesis's sweep.
 /// - `decimation`: number of samples that are averaged to one, in torque and rate alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lengths {
@@ -26,8 +27,8 @@ pub struct Lengths {
 }
 
 impl Lengths {
-    /// Returns the lengths for a record of `duration` s, sampled every `step` s. `band` (Hz) contains the
-    /// power of the torque, and `sweep` is the torque if it is a sweep.
+    /// Returns the longest lag, the length of the segments and the decimation for a record of `duration` s, sampled every
+    /// `step` s. `band` (Hz) contains the power of the torque, and `sweep` is the torque if it is a sweep.
     pub fn for_record(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
         let middle = |(from, to): (f64, f64)| (from * to).sqrt();
         let slower = middle(BAND) / middle(band);
@@ -58,8 +59,8 @@ mod tests {
         }
     }
 
-    /// The window of a sweep from 0.01 to 0.3 Hz is proportional to the mean period. If the sweep takes only 2700 s, the
-    /// window is half of the record.
+    /// The length of the demodulation window for a sweep from 0.01 to 0.3 Hz is proportional to the mean period. If the
+    /// sweep takes only 2700 s, the window is half of the record.
     #[test]
     fn a_slow_spacecraft_has_longer_windows_and_a_fast_sweep_fewer_cycles() {
         let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };

@@ -180,7 +180,8 @@ mod tests {
     use crate::{demodulation, spa};
     use std::f64::consts::TAU;
 
-    /// Each sample of a torque with jumps is held. The rate of the free hub equals the integral of the torque.
+    /// A torque that jumps from sample to sample is held between them. The rate of the free hub equals the
+    /// integral of this torque.
     #[test]
     fn a_torque_jump_is_not_taken_for_a_slope() {
         // a free hub: 0.2 N·m for 1 s, 0 for 1 s, -0.2 N·m for 1 s; the jumps are between samples 0.1 s apart
@@ -197,7 +198,7 @@ mod tests {
         for (k, expected) in [(5, 0.25), (10, 0.5), (20, 0.5), (25, 0.25), (30, 0.0), (39, 0.0)] {
             assert!((rates[k] - expected).abs() < 1e-14, "{k}: {}", rates[k]);
         }
-        // steps of any length, also across the jumps: 0.2 N·m for 0.25 s
+        // steps of other lengths, also across the jumps: 0.2 N·m for 0.25 s
         let rates =
             hub.simulate_ramps(&[0.0, 0.05, 0.25, 1.0], &[0.2, 0.2, 0.0, 0.0], &[0.0; 4], 0.0);
         for (rate, expected) in rates.iter().zip([0.0, 0.025, 0.125, 0.125]) {
@@ -277,10 +278,11 @@ mod tests {
             // the estimate from the whole record does not depend on the direction: same limits as for the upward sweep
             assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
             assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{law:?}: {spa:?}");
-            // the resonance was passed 125 s before the antiresonance, and still oscillates with exp(-0.0525 * 125) of
-            // its 2.2 (rad/s)/(N.m); near the antiresonance |H| grows by 1.5 per hertz, so that the shift is 2 mHz
+            // the sweep passed the resonance 125 s before the antiresonance, where its oscillation still has
+            // exp(-0.0525 * 125) of its 2.2 (rad/s)/(N.m); near the antiresonance |H| grows by 1.5 per hertz, so that
+            // the shift is 2 mHz
             assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-3, "{law:?}: {lock_in:?}");
-            // same shift as in the upward sweep, in the opposite direction
+            // the shift of the resonance is as large as in the upward sweep, in the opposite direction
             let shift = f_res - lock_in.f_res.unwrap();
             assert!((0.014..0.020).contains(&shift), "{law:?}: {lock_in:?}");
         }

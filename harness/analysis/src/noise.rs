@@ -115,14 +115,15 @@ mod tests {
         rate.iter_mut().for_each(|rate| *rate += (density / STEP).sqrt() * random.normal());
         let noisy = power(STEP, &torque, &rate, &grid);
         let mean = noisy.iter().sum::<f64>() / noisy.len() as f64;
-        // 200 of 2,700 lines with six degrees of freedom each determine the mean to 4 %, and less accurately
-        // because neighbours share lines
+        // 200 of 2,700 spectral lines with six degrees of freedom each determine the mean to 4 %, or less
+        // accurately, because the residuals of neighbouring frequencies share lines
         assert!((mean / density - 1.0).abs() < 0.15, "{mean:e}");
     }
 
     #[test]
     fn the_predicted_standard_deviation_of_the_features_equals_their_scatter_over_24_noise_seeds() {
-        // one of the thesis's smaller torques, with which the gyro's noise matters; 24 seeds of the noise
+        // a torque amplitude of the thesis that is small enough for the gyro's noise to matter; 24
+        // seeds of the noise
         let (sweep, torque, rate) = sweep(0.05);
         let near = logarithmic_grid((2.25, 2.6), 300);
         let lag = lengths::Lengths::for_record(BAND, Some(&sweep), 2700.0, STEP).lag;
@@ -160,7 +161,7 @@ mod tests {
             let stated = stated.iter().sum::<f64>() / 24.0;
             ratios.push(stated / scatter);
         }
-        // 24 seeds determine a standard deviation to 15 %; three times that is allowed
+        // 24 seeds determine a standard deviation to 15 %; the limits allow more than three times this error
         assert!(ratios.iter().all(|ratio| (0.6..1.7).contains(ratio)), "{ratios:?}");
     }
 }

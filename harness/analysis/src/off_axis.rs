@@ -131,14 +131,14 @@ mod tests {
             off_axis_from_rates(&none, &rate, &[(&none, &x), (&none, &y)]).1.unwrap()
         };
         let without = found([0.0; 3]);
-        // 2 * 0.05² divided by the sum over all three axes
+        // 2 · 0.05² divided by the sum of the squares over all three axes
         assert!((without.energy - 0.005 / 1.005).abs() < 1e-4, "{}", without.energy);
         for axis in 0..3 {
             for bias in [-5.0, 0.1, 1.0, 5.0] {
                 let mut biases = [0.0; 3];
                 biases[axis] = bias;
                 let with = found(biases);
-                // rounding of a bias that is 17 times the rate: 1e-14
+                // the bias is 17 times the rate, so that rounding errors are 1e-14
                 assert!((with.energy / without.energy - 1.0).abs() < 1e-9, "{biases:?}: {with:?}");
                 assert!((with.median / without.median - 1.0).abs() < 1e-9, "{biases:?}: {with:?}");
             }

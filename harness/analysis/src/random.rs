@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_random_numbers_on_every_machine() {
-        // the same numbers were computed from PCG's definition with Python's integers
+        // the expected numbers were computed from PCG's definition with Python's integers
         let mut random = Random::new(1, 2);
         let bits = [random.uniform(), random.normal()].map(f64::to_bits);
         assert_eq!(bits, [4607160018058674131, 13828960616544136822]);

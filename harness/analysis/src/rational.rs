@@ -7,9 +7,9 @@
 //! A(s) Y = B(s) U + T(s),   s = jω, T of the degree of B
 //! ```
 //!
-//! for any sweep rate and any duration of ringing. For a linear plant the fit therefore separates
-//! an antiresonance and a resonance that are closer than the record's resolution. Least squares is
-//! relative to |Y|, weighted with the last denominator (Sanathanan and Koerner).
+//! for any sweep rate and any duration of ringing. For a linear plant the fit therefore separates an
+//! antiresonance and a resonance that are closer than the record's resolution. The squared residuals are
+//! relative to |Y|, and weighted with the denominator of the preceding iteration (Sanathanan and Koerner).
 
 use std::f64::consts::TAU;
 
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_short_record_still_separates_antiresonance_from_resonance() {
-        // a craft of 800 kg m2: its poles are given as zeros and poles of the transfer function
+        // a craft of 800 kg m2, given as zeros and poles of its transfer function
         let tf = TransferFunction {
             numerator: [1.0 / 800.0, 2.0 * 0.004 * 0.2752 / 800.0, 0.2752 * 0.2752 / 800.0],
             real_pole: 1e-4,
@@ -156,8 +156,8 @@ mod tests {
         let found = Rational::fit(step, &torque, &rate, band).unwrap();
         let features = Features::find(&found.frequency_response(&logarithmic_grid(band, 2000)));
         let (antiresonance, resonance) = (0.2752 / TAU, 0.2827 / TAU);
-        // the separation of 1.1 mHz is little more than one period in the record; sampling causes an error of
-        // a thousandth of the frequency
+        // the separation of 1.1 mHz is hardly larger than the record's resolution; sampling causes an error
+        // of a thousandth of the frequency
         assert!((features.f_dip.unwrap() / antiresonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!((features.f_res.unwrap() / resonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!(found.misfit < 0.2, "{}", found.misfit);

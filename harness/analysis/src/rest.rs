@@ -1,6 +1,6 @@
-//! Statistics of a gyro's record at rest: Allan variances, and checks whether the noise is normal, white and stationary, as
-//! they assume (thesis 5.5.3). The checks are quantiles, histogram and Kolmogorov–Smirnov distance compared with the normal
-//! distribution, autocorrelation, and statistics of chunks.
+//! Statistics of a gyro's record at rest: Allan variances, and checks whether the noise is normal, white and stationary, which
+//! Allan variances assume (thesis 5.5.3). The checks are quantiles, histogram and Kolmogorov–Smirnov distance compared with
+//! the normal distribution, autocorrelation, and statistics of chunks.
 
 use fourier::{Forward, Inverse};
 
@@ -49,7 +49,7 @@ pub struct Chunk {
     pub mean: f64,
     pub variance: f64,
     /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance, multiplied by √n
-    /// − 0.01 + 0.85/√n (Stephens). Quantisation with the step Δ alone makes it Δ √n/(2σ√(2π)).
+    /// − 0.01 + 0.85/√n (Stephens). For normal readings, quantisation with the step Δ makes it Δ √n/(2σ√(2π)).
     pub kolmogorov: f64,
     /// Kolmogorov–Smirnov distance evaluated only midway between the levels of the readings, where quantisation has no
     /// effect. The variance of the readings is reduced by the variance of the quantisation error, Δ²/12 (Sheppard).
@@ -123,8 +123,9 @@ impl Rest {
         12.0 * (self.deviation / self.quantum).powi(2)
     }
 
-    /// Returns how many chunks are not normal, because their distance exceeds [`KOLMOGOROV`]: first with the distance at the
-    /// readings, then with the distance between their levels.
+    /// Returns two counts of chunks whose readings are not normal, because their Kolmogorov–Smirnov distance
+    /// exceeds [`KOLMOGOROV`]: the first count uses the distance at the readings, the second the distance between
+    /// the levels of the readings.
     pub fn not_normal(&self) -> [usize; 2] {
         let count =
             |of: fn(&Chunk) -> f64| self.chunks.iter().filter(|c| of(c) > KOLMOGOROV).count();
@@ -256,7 +257,7 @@ mod tests {
         assert!((rest.deviation / 4e-4 - 1.0).abs() < 0.01);
         assert!(rest.skewness.abs() < 0.03 && rest.kurtosis.abs() < 0.06);
         assert_eq!((rest.chunks.len(), rest.autocorrelation.len()), (20, 501));
-        // 5 % of 500 lags are outside, ± 1 %
+        // on average 5 % of the 500 lags are outside, with a standard deviation of 1 %
         assert!(rest.outside() < 0.09, "{}", rest.outside());
         // with 20 chunks a standard deviation is known to 1/√40 = 16 %
         let scatter = rest.scatter(rest.chunk_length());
@@ -266,8 +267,8 @@ mod tests {
         assert!(off.fold(0.0, f64::max) < 0.03);
     }
 
-    /// The noise of the thesis's gyro is normal, with a standard deviation of 0.4 mrad/s, but the readings have steps of 0.15
-    /// mrad/s and are not.
+    /// The noise of the thesis's gyro is normal, with a standard deviation of 0.4 mrad/s. Its readings are not normal, because
+    /// they have steps of 0.15 mrad/s; between these levels they are.
     #[test]
     fn quantised_normal_noise_is_normal_between_its_levels() {
         let mut random = Random::new(3, 0);
@@ -276,7 +277,7 @@ mod tests {
             (0..90_000).map(|_| (4.066e-4 * random.normal() / step).round() * step).collect();
         let rest = Rest::analyse(0.02, &samples, 180.0, 1.0);
         assert!((rest.quantum / step - 1.0).abs() < 1e-9);
-        // (σ² + Δ²/12)/(Δ²/12), known to √(2/n) = 0.5 %
+        // (σ² + Δ²/12)/(Δ²/12); the simulated noise determines it to √(2/n) = 0.5 %
         let expected = 1.0 + 12.0 * (4.066e-4_f64 / step).powi(2);
         assert!((rest.quantisation_ratio() / expected - 1.0).abs() < 0.02);
         // of 10 chunks with normal noise, at most 1 exceeds the limit with a probability of 0.91, and at most 3 with 0.999
@@ -302,7 +303,7 @@ mod tests {
         let white: Vec<f64> = (0..50_001).map(|_| random.normal()).collect();
         let sums: Vec<f64> = white.windows(2).map(|x| x[0] + x[1]).collect();
         let rest = Rest::analyse(1.0, &sums, 100.0, 3.0);
-        // standard error 1/√5e4 = 4.5e-3
+        // the standard error of an autocorrelation is 1/√5e4 = 4.5e-3
         assert!(
             (rest.autocorrelation[1] - 0.5).abs() < 0.02 && rest.autocorrelation[2].abs() < 0.03
         );

@@ -131,7 +131,7 @@ mod tests {
         assert!((circle.swirl - 1.0).abs() < 1e-3, "{circle:?}");
         assert!((circle.time - 22.0 * 218.0 * step).abs() < 1e-9, "{circle:?}");
         let flat = run(0.02, -0.2);
-        // 2ab/(a² + b²), negative because the motion is clockwise
+        // the swirl number of an ellipse is 2ab/(a² + b²), negative because the motion is clockwise
         assert!((flat.swirl + 0.198).abs() < 1e-3, "{flat:?}");
         assert_eq!((flat.time, flat.from), (0.0, None));
         assert_eq!(run(0.01, 0.01).swirl, 0.0, "too small");

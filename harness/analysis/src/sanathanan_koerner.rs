@@ -110,7 +110,7 @@ mod tests {
             let parts = |c: Coefficients| c.numerator.into_iter().chain(c.denominator);
             parts(found).zip(parts(plant)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
-        // exact data: the error is rounding times a condition number of some hundred
+        // for exact data the error is the rounding error times a condition number of some hundred
         assert!(error(0.0, false) < 1e-12 && error(0.3, true) < 1e-12);
         assert!(error(0.3, false) > 1e-3, "a transient that is left out spoils the fit");
         assert!(fit(&lines(0.0)[..8], true, 10, solve).is_none());

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_spectral_estimate_equals_its_definition() {
-        // noise through a short filter; 40 samples with lags up to 9 samples, and the sum of the definition
+        // noise through a short filter: 40 samples with lags up to 9 samples, compared with the sums of the definition
         let step = 0.1;
         let u: Vec<f64> = (0..40u32).map(|k| f64::from(k * k * 7919 % 101) / 50.0 - 1.0).collect();
         let y: Vec<f64> =

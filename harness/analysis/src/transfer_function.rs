@@ -81,7 +81,8 @@ impl TransferFunction {
             (found.cost.is_finite() && fitted.pole_omega.is_finite())
                 .then_some((found.cost, fitted))
         });
-        // Of two equally good fits the first one is returned, so that rounding errors do not decide.
+        // Of two almost equally good fits the first one is returned, so that rounding errors do
+        // not decide between them.
         let best = fitted.reduce(|a, b| if b.0 < 0.999 * a.0 { b } else { a });
         best.map(|(_, fitted)| fitted)
     }
@@ -144,8 +145,8 @@ impl TransferFunction {
         let answers = || {
             let (mut slow, mut pair) = (1.0, Complex64::ONE);
             (0..signal.len()).map(move |k| {
-                // If the pair does not oscillate, its second response is t e^(−decay t); a pair of real
-                // poles is treated in the same way.
+                // If the pole pair does not oscillate, the second free response is t e^(−decay t); a pair of real
+                // poles is treated in this way, too.
                 let second = if turn > 0.0 { pair.im } else { k as f64 * step * pair.re };
                 let row = Vector3::new(slow, pair.re, second);
                 slow *= slower;
@@ -173,8 +174,9 @@ pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     100.0 * (1.0 - (miss / spread).sqrt())
 }
 
-/// Returns a start with lightly damped poles at the measured resonance, and the zeros that fit best with these poles.
-/// It is needed because the weights of the other start may hide a narrow resonance.
+/// Returns a start with lightly damped poles at the measured resonance, and the zeros that fit best with these
+/// poles. It is needed because the weights in Sanathanan and Koerner's iteration, which gives the other start, may
+/// hide a narrow resonance.
 fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let pole_omega = TAU * Features::find(measured).f_res?;
     let (real_pole, pole_damping) = (0.01 * pole_omega, 0.01);
@@ -248,7 +250,8 @@ fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     (root.is_finite() && w.is_finite()).then_some((root.abs().max(least), w, damping))
 }
 
-/// The variables of the search: b2, b1, b0 in units of `unit`, which is the ω of the start, then ln p, ln ω, ln ζ.
+/// The variables of the search: b2, b1 and b0 divided by powers of `unit`, which is the ω of the start, and then ln p,
+/// ln ω and ln ζ.
 impl TransferFunction {
     fn from_unknowns(x: &[f64], unit: f64) -> Self {
         TransferFunction {
@@ -349,7 +352,7 @@ mod tests {
 
     #[test]
     fn a_fit_recovers_a_free_response_from_the_whole_signal() {
-        // 2700 s: a slowly rotating pole pair with a slow real pole, and a pair of equal real poles
+        // records of 2700 s: a slowly rotating pole pair with a slow real pole, and a pair of equal real poles
         for (pole_damping, real_pole) in [(2e-5, 1e-4), (1.0, 0.1)] {
             let tf = TransferFunction {
                 numerator: [1.0, 2.0, 3.0],
@@ -366,7 +369,7 @@ mod tests {
                     + (-decay * t).exp() * (0.5 * (turn * t).cos() - 0.2 * second)
             };
             let signal: Vec<f64> = (0..135_001).map(free).collect();
-            // 135,000 rounding errors of 1e-16 in the same direction
+            // the limit is 135,000 rounding errors of 1e-16, all in the same direction
             for (found, given) in tf.free_answer(0.02, &signal).iter().zip(&signal) {
                 assert!((found - given).abs() < 2e-11, "{found} instead of {given}");
             }

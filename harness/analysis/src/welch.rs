@@ -159,8 +159,8 @@ mod tests {
         let through = Spectra::estimate(0.02, &u, &gained, RESPONSE);
         assert!((through.mean_coherence(1.0, 20.0) - 1.0).abs() < 1e-12);
         assert!((through.h1((5.0, 5.1)).response[0].re + 3.0).abs() < 1e-9);
-        // The mean coherence of K averages of independent spectra is 1/K; half-overlapping Hamming segments are
-        // equivalent to about 7 of 8 averages.
+        // The mean coherence of two unrelated signals is 1/K for K averages of independent spectra; half-overlapping
+        // Hamming segments are equivalent to about 7 of 8 averages.
         let strangers = Spectra::estimate(0.02, &u, &v, RESPONSE).mean_coherence(1.0, 20.0);
         assert!((0.11..0.17).contains(&strangers), "{strangers}");
     }
@@ -173,7 +173,7 @@ mod tests {
         let snr = spectra.snr_db();
         let bins = (1..200).map(|k| spectra.value_at(&snr, k as f64 * 0.1));
         let mean = bins.sum::<f64>() / 199.0;
-        // 20 dB; the mean of the logarithm of few averages is wrong by about 0.7 dB
+        // the exact ratio is 20 dB; the logarithm of few averages has a mean error of about 0.7 dB
         assert!((mean - 20.0).abs() < 1.5, "{mean}");
     }
 
@@ -187,7 +187,8 @@ mod tests {
             time.map(|t| (std::f64::consts::TAU * turns(t)).sin()).collect()
         };
         let sweep = sine(|t| t + t * t / 2400.0);
-        // its phase advances by half a turn every 10 s against the other sweep, so that the two have nothing in common
+        // the phase of this sweep advances by half a turn every 10 s against the other sweep, so that
+        // the two are unrelated
         let other = sine(|t| 1.05 * t + t * t / 2400.0);
         let mean =
             |segments| Spectra::estimate(0.02, &sweep, &other, segments).mean_coherence(1.2, 1.8);

@@ -12,8 +12,8 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 pub use realfft::num_complex::Complex64;
 
-/// Returns the planner, which caches what it prepares for each length, because preparing a transform takes
-/// longer than computing it.
+/// Returns the planner of transforms. It caches the tables for each length, because preparing a transform
+/// takes longer than computing it.
 fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
     static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Default::default);
     PLANNER.lock().unwrap_or_else(PoisonError::into_inner)

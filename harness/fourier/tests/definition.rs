@@ -13,7 +13,7 @@ fn a_fourier_transform_equals_its_definition_and_is_inverted() {
         for (k, line) in spectrum.iter().enumerate() {
             let turn = |n: usize| Complex64::cis(-TAU * (k * n) as f64 / f64::from(length));
             let sum: Complex64 = signal.iter().enumerate().map(|(n, x)| x * turn(n)).sum();
-            // the sum has fifteen terms below 7, each rounded twice
+            // the sum has fifteen terms below 7, each with two rounding errors
             assert!((line - sum).norm() < 1e-13, "line {k}: {line} instead of {sum}");
         }
         let back = Inverse::new(length as usize).transform(spectrum);

@@ -1,7 +1,6 @@
-//! Names of the variables of this project's FMUs, the items of their enumerations, and the sizes of their
-//! arrays.
-//! The harness does not link the models. Instead model-description writes one module for each FMU from its variable
-//! table, so that a name that is misspelt, or no longer exists, does not compile.
+//! Names of the variables of this project's FMUs, the items of their enumerations, and the sizes of their arrays.
+//! The harness does not link the models. Instead, the program model-description writes one module for each FMU from
+//! its variable table, so that a name that is misspelt, or no longer exists, does not compile.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Array<const D: usize>(&'static str);
@@ -22,9 +21,9 @@ impl<const D: usize> Array<D> {
     }
 }
 
-/// A parameter that determines the number of elements of arrays that are used. `most` is its largest value.
-/// `has_indicators` is true if each element has its own event indicators. `arrays` lists the arrays whose size it
-/// determines, each with the position of this dimension among the array's indices.
+/// A parameter that determines how many elements of arrays are in use. `most` is its largest value.
+/// `has_indicators` is true if each element has its own event indicators. `arrays` lists these arrays, each with
+/// the position of this dimension among the array's indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub parameter: &'static str,

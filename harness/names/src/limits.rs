@@ -52,7 +52,7 @@ fn reasons(time: &[f64], numbers: &[f64]) -> Vec<(LimitedBy, f64, f64)> {
     let end = time.len();
     let span = match (time.first(), time.last()) {
         (Some(first), Some(last)) if last > first => last - first,
-        // a table with a single row
+        // a table with a single row has no duration
         _ => 0.0,
     };
     let lasts = |i: usize| match span > 0.0 {
@@ -87,8 +87,8 @@ fn percent(share: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The share of the time and the time of the first occurrence of each reason are computed from the history
-    /// of the reason's number.
+    /// The test computes the share of the time and the time of the first occurrence of each reason from the values of
+    /// the reason's variable over time.
     #[test]
     fn each_reason_for_leaving_the_range_has_its_share_of_the_time_and_its_first_time() {
         let time = [0.0, 1.0, 3.0, 4.0, 10.0];

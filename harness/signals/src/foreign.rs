@@ -74,7 +74,8 @@ pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> 
             return Ok((folder, out));
         }
         let words = String::from_utf8_lossy(&done.stderr);
-        // Python lacks the package or has an older version of it.
+        // If the last line is no error of the package, Python lacks the package or has an
+        // older version of it.
         let is_there = words.lines().last().and_then(|line| line.strip_prefix("error: "));
         if let Some(words) = is_there {
             bail!("{words}");

@@ -7,10 +7,11 @@ pub static THREE: &str = include_str!("../three/three.min.js");
 /// The licence of [`THREE`], which every page that contains the library also contains.
 pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 
-/// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
+/// The scene, as the global `HubSloshScene`: it draws a bench or a spacecraft with its liquid
+/// (`scene/README.md`), and needs [`THREE`].
 pub static SCENE: &str = include_str!("../scene/scene.js");
 
-/// Escapes JSON so that it can be put into a script element of any page, or into a script. After that no text in it
+/// Escapes JSON so that it can be put into a script element of any page, or into a script. No text in the escaped JSON
 /// ends the element (`</script`), hides its end (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of
 /// JavaScript. The value stays the same, because JSON has these characters only in strings.
 pub fn json_in_script(json: &str) -> String {

@@ -1,7 +1,8 @@
 //! Covariance of Allan variances at several averaging times, for Gaussian noise.
 //!
-//! The overlapping estimate at τ = m Δt is the mean of D_m²/(2τ²) over a record, with the second differences
-//! D_m(t) = θ(t + τ) − 2θ(t) + θ(t − τ) of the integrated rate θ. For Gaussian noise
+//! The overlapping estimate A_m of the Allan variance at the averaging time τ_m = m Δt is the mean of D_m²/(2τ_m²)
+//! over a record, where D_m(t) = θ(t + τ_m) − 2θ(t) + θ(t − τ_m) are the M_m second differences of the integrated rate
+//! θ. For Gaussian noise
 //!
 //! ```text
 //! cov(A_m, A_n) = Σ_k Σ_l 2 C_mn(l − k)² / (4 τ_m² τ_n² M_m M_n),   C_mn(s) = E[D_m(t) D_n(t + s)]
@@ -19,15 +20,15 @@ use std::f64::consts::PI;
 /// Number of lags per averaging time over which the sum for a covariance runs. Up to this number of
 /// samples per averaging time the sum includes every lag and is exact.
 const PER_TIME: usize = 8;
-/// Range of the lags in multiples of the sum of both averaging times. Beyond 1 only flicker noise
-/// contributes, and its terms fall as s⁻².
+/// Range of the lags in multiples of the sum of both averaging times. At lags above one such multiple only flicker noise
+/// contributes, and its terms fall as the lag to the power −2.
 const RANGE: usize = 2;
 /// Largest ratio of two averaging times at which the Allan variances are treated as correlated. At
 /// larger ratios their covariance is set to 0.
 const RATIO: usize = 32;
 
-/// Tables of the covariance C_mn for coefficients of 1, for all pairs of averaging times: the number of pairs
-/// of differences at each lag over M_m M_n, the scale 1/(2 τ_m² τ_n²), and C_mn at each lag for each term.
+/// Tables of the covariance C_mn for coefficients of 1, for all pairs of averaging times: the number of pairs of differences
+/// at each lag divided by M_m M_n, the scale 1/(2 τ_m² τ_n²), and C_mn at each lag for each term.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,

@@ -22,9 +22,9 @@ const ITERATIONS: usize = 12;
 /// Largest number of short averaging times that a fit may leave out, and the longest averaging
 /// time, s, that it may leave out.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
-/// Number of octaves of averaging times that a fit leaves out in addition to those whose removal
-/// makes the fit pass its test. The effect of a filter on the variance halves with each octave, so
-/// that an octave which passes the test can still shift N by several standard deviations.
+/// Number of octaves of averaging times that a fit leaves out in addition to the octaves that it must leave out to pass
+/// its test. The effect of a filter on the variance halves with each octave, so that an octave which passes the test can
+/// still shift N by several standard deviations.
 const BEYOND: usize = 2;
 /// Shortest correlation time of a Gauss–Markov bias, relative to the shortest averaging time. A shorter one cannot be
 /// distinguished from white noise.
@@ -55,8 +55,8 @@ pub struct Estimate {
     pub error: f64,
 }
 
-/// The averaging time, s, at which a fit deviates most from the record, and the ratio of the record's to the fit's Allan
-/// deviation at this time.
+/// The averaging time, s, at which a fit deviates most from the record, and the Allan deviation of the record divided by
+/// the Allan deviation of the fit at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     pub tau: f64,
@@ -189,8 +189,8 @@ impl Problem<'_> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns the best fit of the coefficients if every octave has the same relative error. It is the start of the
-    /// iteration of the weights.
+    /// Returns the best fit of the coefficients under the assumption that every octave has the same relative error. The
+    /// iteration of the weights starts from it.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
@@ -233,7 +233,8 @@ impl Problem<'_> {
         let (low, high) = self.times()?;
         for iteration in 0..ITERATIONS {
             let lower = factored(&self.covariance(tables, &state))?.l();
-            // The first weights come from the start, because with only the fixed coefficient the noise might be 0.
+            // The first weights come from the start values of all coefficients, because the fixed coefficient alone might
+            // be 0, and with it the noise.
             if let (0, Some((place, value))) = (iteration, fixed) {
                 state.coefficients[place] = value;
             }
@@ -381,7 +382,7 @@ impl Problem<'_> {
         let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {
             let there = self.iterate_weights(state.clone(), Some((place, value)), tables);
             let there = there.unwrap_or_else(|| {
-                // no other noise is left with this value: the other coefficients keep their estimates
+                // with this value no other noise is left, so that the other coefficients keep their estimates
                 let mut alone = state.clone();
                 alone.coefficients[place] = value;
                 alone
@@ -400,8 +401,8 @@ impl Problem<'_> {
             let skewness = third / second.powf(1.5);
             let end = |normal: f64| value + deviation * pearson(normal, skewness);
             let estimate = estimates[place];
-            // An estimate below 0 is treated as one at 0. Otherwise the interval of one in forty records
-            // without this term would be a single point.
+            // An estimate below 0 is treated as 0. Otherwise the interval of a coefficient that is truly 0 would be a
+            // single point in one of forty records.
             Some((estimate - end(NORMAL), estimate.max(0.0) - end(-NORMAL), deviation))
         };
         let value = state.coefficients[place];
@@ -410,8 +411,8 @@ impl Problem<'_> {
         let low = match beyond(0.0)?.0 {
             above_none if above_none > 0.0 => {
                 let mut within = if above > 0.0 { value + 4.0 * step } else { value };
-                // Searched downwards from the estimate, because for a bias with a correlation time values near 0 may
-                // pass the test again.
+                // The lower end is searched downwards from the estimate, because values near 0 may pass the test again if
+                // a bias has a correlation time.
                 let mut out = DOWN * within;
                 while beyond(out)?.0 <= 0.0 && out > LEAST * value {
                     (within, out) = (out, DOWN * out);
@@ -446,8 +447,8 @@ impl Problem<'_> {
 }
 
 const BISECTIONS: usize = 14;
-/// Ratio of each tested coefficient to the one tested before, in the search for the lower end of an interval; and the
-/// smallest tested coefficient relative to the estimate.
+/// Ratio of each tested coefficient to the preceding one in the search for the lower end of an interval; and the smallest
+/// tested coefficient relative to the estimate.
 const DOWN: f64 = 0.7;
 const LEAST: f64 = 1e-4;
 
@@ -595,7 +596,7 @@ mod tests {
 
     #[test]
     fn intervals_of_the_allan_fit_contain_the_simulated_noise() {
-        // with an interval of 95 %, fewer than 33 of 40 have a probability of 1 in 3,000
+        // with 95 % intervals, fewer than 33 of 40 would contain the true value with a probability of 1 in 3,000
         let (held, described) = covered(&ALL, 40);
         assert!(held.iter().all(|count| *count >= 33) && described >= 37, "{held:?} {described}");
     }
@@ -609,7 +610,7 @@ mod tests {
         for noise in [ALL, white, walk, plateau] {
             let (held, described) = covered(&noise, 400);
             println!("{noise:?}: {held:?} of 400, {described} described");
-            // 400 draws determine a fraction of 0.95 to 0.011
+            // 400 draws determine a fraction of 0.95 with a standard deviation of 0.011
             assert!(
                 held.iter().all(|count| *count >= 366) && described >= 384,
                 "{held:?} {described}"
@@ -648,7 +649,7 @@ mod tests {
                     _ => noise.coefficient(*term).sqrt(),
                 };
                 let held = found.iter().filter(|e| (e.low..=e.high).contains(&truth)).count();
-                // with an interval of 95 %, fewer than 87 of 100 have a probability of 1 in 1,000
+                // with 95 % intervals, fewer than 87 of 100 would contain the true value with a probability of 1 in 1,000
                 assert!(held >= 87, "{term:?}: {held} of {draws}");
                 assert!(found.iter().all(|e| e.low < e.high), "{term:?}: an interval is a point");
                 let tiny = found.iter().filter(|e| e.low > 0.0 && e.low < 0.01 * e.value);
@@ -713,20 +714,20 @@ mod tests {
         let ramp = Noise { ramp: 1e-6, ..ALL };
         let fit = Octaves::from_samples(STEP, &record(&ramp, COUNT, 2)).describe().unwrap();
         assert!(fit.fits && (fit.noise.ramp / 1e-6 - 1.0).abs() < 0.1, "{fit:?}");
-        // a sine with a period of 100 s is none of the noise terms
+        // a sine with a period of 100 s, which is no term of the noise model
         let mut sine = record(&ALL, COUNT, 3);
         for (k, value) in sine.iter_mut().enumerate() {
             *value += 1e-4 * (0.0628 * STEP * k as f64).sin();
         }
         let fit = Octaves::from_samples(STEP, &sine).describe().unwrap();
         assert!(!fit.fits && (10.0..200.0).contains(&fit.worst.tau), "{fit:?}");
-        // means of two neighbouring samples, as a filter makes them
+        // means of two neighbouring samples, as a filter of the gyro computes them
         let smooth: Vec<f64> =
             record(&ALL, COUNT, 4).windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
         let fit = Octaves::from_samples(STEP, &smooth).describe().unwrap();
         assert!(fit.fits && fit.from > STEP && fit.bias_time.is_none(), "{fit:?}");
         assert!((fit.noise.arw / ALL.arw - 1.0).abs() < 0.03, "{fit:?}");
-        // no noise at all
+        // a record without any noise
         assert_eq!(Octaves::from_samples(STEP, &[0.0; 1000]).describe(), None);
         assert_eq!(Octaves::from_samples(STEP, &[1.0, 2.0]).describe(), None);
     }

@@ -16,7 +16,8 @@ pub struct Column {
     pub unit: Option<String>,
 }
 
-/// Signals by name, each with its column, and the rate (rows per second) of files without a time column.
+/// Assignment of a column to each signal by its name, and the rate (rows per second) of files
+/// without a time column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     by_signal: BTreeMap<String, Column>,

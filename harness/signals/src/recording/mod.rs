@@ -59,7 +59,7 @@ impl Header {
         }
     }
 
-    /// Finds the position of a column by its name as in the file, by its name without a unit in brackets, or by its
+    /// Finds the position of a column. `column` is its name as in the file, its name without a unit in brackets, or its
     /// name without any unit of `dimension`.
     fn place(&self, column: &str, dimension: Option<Dimension>) -> Result<usize> {
         let number = column.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
@@ -200,8 +200,8 @@ const FASTEST: f64 = 5e-5;
 /// Largest absolute value in SI units that is accepted. Statistics need its fourth power, whose sum over all
 /// rows is then finite.
 const LARGEST: f64 = 1e60;
-/// Longest gap of a slow signal that is filled, relative to the usual time between the signal's values. Gaps up to
-/// [`SHORT`] are always filled.
+/// Longest gap of a slow signal that is filled, relative to the usual time between the signal's values. Gaps of up to
+/// [`SHORT`] seconds are always filled.
 const LOST: f64 = 10.0;
 /// Ratio of the time between two values of a signal to the usual time, above which a value counts as lost.
 const LATE_BY: f64 = 1.5;
@@ -437,7 +437,7 @@ fn read_as(
                 header.full[*whole], header.full[*rest]
             ));
         } else if time == header.full[*rest] {
-            // The rate replaces the times that the file also contains.
+            // The times from the rate replace the times that the file also contains.
             columns[0] = part;
         }
     }
@@ -519,7 +519,7 @@ fn plausible(time: &[f64]) -> Result<()> {
     if usual == 0.0 {
         usual = (time[time.len() - 1] - time[0]) / steps.len() as f64;
     }
-    // Compared with six digits, as in the message.
+    // The step is compared after rounding to the six digits of the message.
     let shown: f64 = format!("{usual:.5e}").parse().unwrap_or(usual);
     ensure!(
         usual < SLOWEST && (usual > FASTEST || usual <= 0.0),
@@ -639,8 +639,8 @@ fn complete(
                 };
             }
         }
-        // Rows before the signal's first value, and after its last value. The last value of a held signal is valid for
-        // one more usual spacing.
+        // Rows before the signal's first value and after its last value are left out. The last value of a held signal
+        // is valid for one more usual spacing.
         let last = there[there.len() - 1];
         for k in (0..there[0]).chain(last + 1..rows) {
             let holds = k > last && signal.between == Between::Held && time[k] - time[last] < usual;

@@ -17,14 +17,14 @@ const DECIMALS: i32 = 6;
 /// Largest difference between a time and a multiple of its last digit's unit, relative to this unit, that
 /// floating-point rounding explains: times since 1970 in seconds have only 52 binary digits.
 const OFF: f64 = 1e-2;
-/// Deviation from an even grid in excess of half the last digit's unit, relative to this unit, at which the
-/// grid is still accepted.
+/// Largest deviation of a printed time from an even grid, in excess of half the unit of the last digit and
+/// relative to this unit, at which the grid is still accepted.
 const BEYOND: f64 = 0.02;
 const FEWEST: usize = 20;
 
-/// Relation between the times of a recording and an even grid: the times are already even or no grid explains
-/// them; they are rounded times of a grid; or several rows share one time, so that the true times are unknown for
-/// the reason in the field.
+/// Result of the search for an even grid that explains the times of a recording. `AsTheyAre`: the times are
+/// already even, or no grid explains them. `On`: they are rounded times of this grid. `Unknown`: several rows
+/// share one time, so that the true times are unknown for the reason in the field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stamps {
     AsTheyAre,
@@ -186,8 +186,8 @@ mod tests {
         }
     }
 
-    /// From times in whole seconds, the step of the grid is known to 0.03 % after a minute of rows, and with the
-    /// accuracy of any clock after twenty minutes.
+    /// If times are printed in whole seconds, the step of the grid is known to 0.03 % after a minute of rows;
+    /// after twenty minutes it is known as accurately as by any clock.
     #[test]
     fn a_grid_is_accepted_only_if_its_step_is_known_accurately() {
         let whole =
@@ -212,13 +212,13 @@ mod tests {
 
     #[test]
     fn times_printed_with_few_digits_are_restored_to_the_even_grid_of_the_samples() {
-        // the rows of the last grid are closer than the unit of the last digit
+        // in the last case the rows are closer together than the unit of the last digit
         for (step, quantum) in [(1.0 / 33.0, 1e-3), (1.0 / 60.0, 1e-2), (1.0 / 120.0, 1e-2)] {
             let grid = on(&printed(step, 0..5000, quantum));
             assert_eq!(grid.quantum, quantum);
             let off = |(k, t): (usize, &f64)| (t - grid.time[0] - k as f64 * step).abs();
             let worst = grid.time.iter().enumerate().map(off).fold(0.0, f64::max);
-            // in the last grid all halves are rounded up, which changes its step slightly
+            // in the last case all halves are rounded up, which changes the step of the grid slightly
             assert!(worst < 2e-2 * quantum, "{step} {worst:e}");
         }
         // two groups of rows are missing

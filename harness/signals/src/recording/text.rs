@@ -55,7 +55,7 @@ enum Value {
     Number(f64),
     Time(Moment),
     Missing,
-    /// A number or a time with several possible meanings, such as 1,234, or one that cannot be read; the
+    /// A number or a time that has several possible meanings, such as 1,234, or that cannot be read. The
     /// payload is the reason.
     Ambiguous(Unreadable),
     Other,
@@ -212,7 +212,7 @@ impl Sample {
                 fields.iter().map(|field| Value::parse(field, separator.0, &mut None)).collect();
             lines.push((file.number(), fields, values));
         }
-        // Lines with any value are rows, but a row of units may contain a 1.
+        // Lines with any value count as rows of values. However, a row of units may contain a 1.
         let valued = |(_, _, values): &&(u64, _, Vec<Value>)| {
             values.len() >= least && values.iter().any(Value::is_there)
         };
@@ -259,7 +259,7 @@ impl Layout {
     /// # Errors
     /// If no separator gives rows of numbers.
     pub fn detect(path: &Path) -> Result<Self> {
-        // One column is enough for a table of times alone.
+        // A single column is enough, for a table that contains only times.
         let mut tried = Vec::new();
         for (separator, least) in
             SEPARATORS.map(|of| (of, 2)).into_iter().chain([(SEPARATORS[2], 1)])

@@ -199,7 +199,7 @@ fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, Unreadable> {
         (true, _) => "%I:%M:%S%.f%p",
     };
     match NaiveTime::parse_from_str(&text, format) {
-        // A leap second has no place in the day's seconds.
+        // A leap second is refused, because it has no place among the 86,400 seconds of a day.
         Ok(time) if i64::from(time.nanosecond()) < SECOND => {
             let seconds = i64::from(time.num_seconds_from_midnight());
             Ok(Some(seconds * SECOND + i64::from(time.nanosecond())))

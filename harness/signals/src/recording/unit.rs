@@ -115,7 +115,7 @@ fn word(name: &str) -> Vec<Product> {
 fn run(name: &str, fold: bool) -> Vec<Product> {
     let either = |name: &str| [symbol(name, fold), word(name)].concat();
     let mut found = either(name);
-    // With equal cases M may be mega or milli: both meanings are returned, so that the
+    // If upper and lower case count as equal, M may be mega or milli. Both meanings are returned, so that the
     // text counts as ambiguous.
     if fold && name.starts_with(['M']) && name[1..].starts_with(['n', 'N']) {
         let milli = run(&format!("m{}", &name[1..]), true);
@@ -205,8 +205,8 @@ fn terms(text: &str) -> Option<Vec<Term>> {
     (!found.is_empty() && !divides).then_some(found)
 }
 
-/// Returns all meanings of a unit as products of symbols. If `fold` is true, upper and lower case are equal;
-/// if `divide` is true, ambiguous separators, as in `deg_s`, mean division.
+/// Returns all meanings of a unit as products of symbols. If `fold` is true, upper and lower case are treated
+/// as equal; if `divide` is true, ambiguous separators, as in `deg_s`, mean division.
 fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     let Some(terms) = terms(text).filter(|terms| terms.len() < 6) else { return Vec::new() };
     // ms2 and ms-2 mean m/s², although no sign of division is there.
@@ -219,7 +219,7 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     let is_single = terms.len() == 1;
     for term in terms {
         let exponent = if divide && term.is_soft { -term.exponent } else { term.exponent };
-        // mps2 is m/s²; dps is a symbol.
+        // `mps2` is split, because it means m/s²; `dps` is itself a symbol.
         let whole = run(&term.letters, fold);
         if whole.is_empty() {
             let letters = &term.letters;
@@ -351,7 +351,7 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
         match factors(inside, dimension)[..] {
             [factor] => {
                 let found_here = stated(from, to, inside, factor);
-                // A second unit, as in `t_ms [s]`.
+                // The name may contain a second unit, as in `t_ms [s]`.
                 if let Ok(Some(also)) = find_unit(&found_here.before, dimension)
                     && also.text.len() > 1
                     && also.factor != factor
@@ -392,7 +392,7 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
             if factors.is_empty() {
                 continue;
             }
-            // A unit may be a part of a longer one: Nm_s is not a torque.
+            // The found unit may be a part of a longer one: Nm_s is not a torque.
             let rest = name[from..].trim();
             let continues = !is_last
                 && [false, true].iter().any(|divide| !products(rest, false, *divide).is_empty());

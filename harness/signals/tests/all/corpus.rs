@@ -728,7 +728,7 @@ fn files_of_many_tools_are_read_correctly_or_refused_with_a_helpful_message() {
     for (tool, ending, bytes, columns, refusal) in &cases {
         match (read_text(ending, bytes, columns), refusal) {
             (Ok((table, said)), None) => {
-                // dates are converted to times since the first row, other times keep their zero
+                // dates are converted to times since the first row; other times are not shifted
                 let from = column(&table, "time")[0];
                 let times: Vec<f64> = column(&table, "time").iter().map(|t| t - from).collect();
                 // times since 1970 in s have only 52 binary digits

@@ -160,7 +160,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
             column.header = name.into();
             column.below = unit.into();
         }
-        // two units, which may contradict each other
+        // two units in one header, which may contradict each other
         3 => {
             let (header, _) = with_unit(dice, name, unit);
             column.header = header;
@@ -171,7 +171,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
                 column.truth = Some(vec![f64::NAN]); // must be refused
             }
         }
-        // a unit of another quantity, or no known unit
+        // a unit of another quantity, or a text that is no known unit
         4 if dice.bool() => {
             let other = pick(dice, &["V", "furlong/s", "kg", "deg", "m/s", "mm", "Hz", "rps"]);
             column.header = format!("{name} [{other}]");
@@ -234,7 +234,7 @@ fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
     };
     let form = dice.u8(..16);
     if form < 3 {
-        // names of ROS, candump and Linux
+        // names of the columns with seconds and nanoseconds in ROS, candump and Linux
         let stem = pick(dice, &["", "stamp.", "header.stamp.", "tv_", "Stamp_"]);
         let (whole, rest, unit) = pick(
             dice,
@@ -415,7 +415,7 @@ fn random_headers_are_read_right_or_refused() {
             }
         }
     }
-    // the first lines of the file for the message
+    // the message of a failure shows the first lines of the file
     let start =
         |text: &String| text.replace('\r', "\n").lines().take(12).collect::<Vec<_>>().join("\n");
     wrong.iter().chain(&refused).take(12).for_each(|each| println!("{}\n", start(each)));

@@ -56,7 +56,7 @@ const TIME: [f64; 3] = [0.0, 0.02, 0.04];
 const TORQUE: [f64; 3] = [0.1, 0.25, -0.3];
 const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::consts::PI / 180.0];
 
-/// A table with only times is a plan for an FMU without inputs.
+/// A table that contains only times is the schedule of an FMU without inputs.
 #[test]
 fn a_table_with_only_times_is_read() {
     let directory = tempfile::tempdir().unwrap();
@@ -370,7 +370,7 @@ fn recordings_with_clock_times_or_dates_in_many_notations_are_read() {
         let text = format!("time;tau_cmd;omega\n{}", rows(stamps));
         let found = read_text("csv", text.as_bytes(), "");
         if k == 1 {
-            // no time of day has the hour 24
+            // a time of day has no hour 24
             let error = found.unwrap_err();
             assert!(
                 error.contains(
@@ -401,7 +401,7 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
             "time;tau_cmd;omega\n0.5;0;0\n0,75;0;0\n",
             "line 3, column time: \"0,75\" is read with a decimal comma, the lines above with a decimal point",
         ),
-        // the error names the first line, not the last one that was examined
+        // the error names the first faulty line, and not the last line that was examined
         (
             "time,tau_cmd,omega\n0,0,true\n1,0,true\n2,0,false\n",
             "line 2, column omega: \"true\" is not a number; line 3",
@@ -459,7 +459,7 @@ fn columns_of_seconds_and_nanoseconds_form_one_time() {
         assert_close(column(&table, "time"), &TIME, head);
         assert!(said.contains("the times are the columns"), "{said}");
     }
-    // two columns that each contain the full time
+    // two columns, each of which contains the full time
     let rows = "1.00,1000000000,0\n1.02,1020000000,1\n1.04,1040000000,2\n";
     for time in ["t_s", "t_ns"] {
         let text = format!("t_s,t_ns,omega\n{rows}");

@@ -167,7 +167,7 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     }
     out += &row(&head, false);
     if below.is_some() {
-        // as many fields as the rows have
+        // the header has as many fields as the rows
         let cells =
             units.iter().map(|unit| if separator == " " && unit.is_empty() { "-" } else { unit });
         out += &row(&cells.map(String::from).collect::<Vec<_>>(), false);
@@ -203,7 +203,7 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
         "us" => TimeUnit::MICROS,
         _ => TimeUnit::NANOS,
     };
-    // timestamps and times of day have no unit s
+    // timestamps and times of day cannot have the unit s
     let ns = if kind < 2 && unit == "s" { 1 } else { ns };
     let name = if kind == 3 { format!("t [{unit}]") } else { "t".to_string() };
     let first = Type::primitive_type_builder(
@@ -219,7 +219,7 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     };
     // a time of day in ms is an i32, which is written as a plain integer without a unit
     let is_integer = kind == 2 || kind == 1 && unit == "ms";
-    // times whose unit cannot be s, by their steps
+    // the steps of these times show that their unit cannot be s
     let is_unstated = is_integer || kind == 5 && step.max(ns) >= 1_000_000_000;
     let omega = Type::primitive_type_builder("omega", Physical::DOUBLE);
     let fields =
@@ -230,7 +230,7 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), properties).unwrap();
     let mut group = writer.next_row_group().unwrap();
     let origin = if kind == 0 { BEGIN * 1_000_000_000 } else { 0 };
-    // a whole number of units
+    // the step is a whole number of the unit
     let step = (step / ns).max(1) * ns;
     let times: Vec<i64> = (0..rows).map(|k| (origin + step * k as i64) / ns).collect();
     let mut column = group.next_column().unwrap().unwrap();
