@@ -209,7 +209,7 @@ pub fn links(archive: &Archive, findings: &mut Findings) {
 pub fn duplicates(archive: &Archive, findings: &mut Findings) {
     let mut seen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for name in archive.entries.iter().map(|entry| entry.name.as_str()) {
-        // A file and a folder of the same name break another rule, zip.file_and_folder.
+        // A file and a folder with equal names break the rule zip.file_and_folder, and not this rule.
         let folder = if name.ends_with('/') { "/" } else { "" };
         let names = seen.entry(host::archive::place(name) + folder).or_default();
         // A repeated entry for a folder hides no content.

@@ -1,5 +1,5 @@
-//! Detects FMUs that write outside the arrays that the host passes. Each call has the length of its array as an
-//! argument (FMI 2.0.5, section 2.1.7).
+//! Detects FMUs that write beyond the ends of the arrays that the host passes. Each call has the length of its
+//! array as an argument (FMI 2.0.5, section 2.1.7).
 
 use anyhow::Result;
 

@@ -19,7 +19,8 @@ use host::description::{Type, Value};
 /// Largest number of initial points that are tried before a declared feedthrough counts as missing in the
 /// binary.
 const STARTS: u64 = 600;
-/// Smallest number of initial points that are tried. It is enough to find most dependencies that are not declared.
+/// Smallest number of initial points that are tried. This number is enough to find most dependencies that the
+/// description does not declare.
 const AT_LEAST: u64 = 40;
 /// Largest number of attempts to reach [`STARTS`] initial points. There are more attempts than points, because the FMU
 /// may refuse parameters that are drawn at random.
@@ -133,8 +134,8 @@ impl Seen {
         }
     }
 
-    /// Returns true if every pair (unknown, known) of `feedthrough` has been observed at least once, even if the value
-    /// changed only in its last bit.
+    /// Returns true if every pair (unknown, known) of `feedthrough` has been observed at least once. A change in the
+    /// last bit of a value is enough for an observation.
     fn is_complete(&self, feedthrough: &BTreeSet<(u32, u32)>) -> bool {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }

@@ -90,7 +90,7 @@ fn missed_event<'f>(
         }
         let after = Observed::read(session)?;
         let Some((name, change)) = before.change(&after, fmu) else { continue };
-        // A variable that changes in every event mode counts the events; it is not a missed event.
+        // A variable that changes in every event mode is a counter of events; its change is not a missed event.
         session.event()?;
         if !session.is_ended() && after.change(&Observed::read(session)?, fmu).is_none() {
             return Ok(Some((session.time, name, change)));

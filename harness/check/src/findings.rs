@@ -36,7 +36,7 @@ pub struct Findings {
     pub list: Vec<Finding>,
     pub more: usize,
     pub skipped: Option<String>,
-    /// Identifier of another rule, which reports the fault that makes it impossible to check this rule.
+    /// Identifier of another rule that reports the fault because of which this rule cannot be checked.
     pub(crate) reported_by: Option<String>,
     /// The call at which the rule ended early, because the FMU crashed or refused the call. The rule's last finding
     /// then describes this call.

@@ -42,7 +42,7 @@ const LOCATED: f64 = 1e-3;
 const SHORTEST: f64 = 1e-12;
 
 enum Trial {
-    /// The step is done: the new states, and the estimated error divided by the allowed error.
+    /// The step has succeeded: the new states, and the estimated error divided by the allowed error.
     Done(DVector<f64>, f64),
     /// The FMU could not be evaluated at a stage (fmi2Discard, or values that are NaN or infinite).
     Impossible(Impossible),
@@ -82,14 +82,14 @@ impl<V: Tested> Session<'_, V> {
                 break;
             }
             if step == EXPLICIT_STEPS && n <= MOST_STATES {
-                // Begin again with a Jacobian and with a new initial step.
+                // The integration begins again, with a Jacobian and with a new initial step.
                 h = (end - self.time) / PARTS;
             }
             let (t, x) = (self.time, DVector::from_vec(self.states()?));
             if step >= EXPLICIT_STEPS && n <= MOST_STATES {
                 jacobian = Some(self.jacobian(t, &x, &magnitudes)?);
             }
-            // If no step is possible, the reason for the shortest step, which is tried last, is reported.
+            // If no step is possible, the reason for the failure of the shortest step, which is tried last, is reported.
             let mut why = None;
             loop {
                 // A step ends neither after `end` nor after a time event that the FMU has announced.
@@ -126,7 +126,7 @@ impl<V: Tested> Session<'_, V> {
                     continue;
                 }
                 self.time = to;
-                // A step that was shortened to end in time is no reason to shorten the next step.
+                // If a step was shortened only to end at a given time, the length of the next step does not follow from it.
                 h = if last { h.max((to - t) * factor) } else { (to - t) * factor };
                 V::complete_step(self, crossed)?;
                 z = if crossed { self.indicators()? } else { z_new };

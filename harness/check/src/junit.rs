@@ -48,7 +48,8 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
         }
         xml.write(XmlEvent::end_element())?;
     }
-    // This is a separate test case, because viewers show a suite whose cases are all skipped as a success.
+    // An unchecked FMU is a test case of its own that fails, because viewers show a suite whose cases are all
+    // skipped as a success.
     if let Some(why) = &report.unchecked {
         begin_case(&mut xml, "check", "0.000")?;
         write_element(&mut xml, "error", Some(why), "")?;

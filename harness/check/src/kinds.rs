@@ -120,7 +120,7 @@ fn at_points(
             session.advance(2)?;
         }
         if point > 0 && exchange && !initializing {
-            // other states, without an event in between
+            // the second and third point have other states, and no event is between them
             let states = fmu.states();
             let mut x = session.states()?;
             let here = x.clone();

@@ -11,8 +11,8 @@ use super::under_test::{
 use host::description::Value;
 use host::fmi2::{CallError, Callbacks, Instance, Instantiation, Status, file_uri};
 
-/// `load.opens`: if no binary could be loaded, the check has already ended. If the two interfaces have different
-/// binaries, one of them may still be broken, which is reported here.
+/// `load.opens`: the check has already ended if no binary could be loaded. If the two interfaces have different
+/// binaries, one binary may be loaded and the other broken; this function reports the broken one.
 pub fn opens<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     for why in fmu.callability_faults() {
         findings.at("the binary of one interface").add(why);
@@ -36,7 +36,7 @@ pub fn version<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result
     fmu.announce(&call);
     for binary in fmu.binaries() {
         let answer = binary.version();
-        // Releases of FMI 3.0 that only fix errors have versions such as 3.0.1.
+        // FMI 3.0 has bug-fix releases, whose versions are for example 3.0.1.
         let is_fixed = fmu.description.words.version == "3.0" && answer.starts_with("3.0.");
         if answer != fmu.description.words.version && !is_fixed {
             findings
@@ -446,7 +446,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for (stage, calls) in &common {
             let more: &[Misplaced] = match stage {
                 Stage::Initialised if interface == Interface::CoSimulation => &[],
-                // The first and the last of these calls are allowed in continuous-time mode.
+                // In continuous-time mode, only the first and the last of these calls are allowed.
                 Stage::Initialised => &own[1..3],
                 _ => &own,
             };

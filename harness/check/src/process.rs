@@ -34,8 +34,8 @@ const PRINTED: usize = 200;
 #[derive(Default)]
 pub struct SoFar {
     hung: AtomicUsize,
-    /// Reason why the binary cannot be loaded. The first rule that finds the reason stores it here, so that no other
-    /// rule tries to load the binary.
+    /// Reason why the binary cannot be loaded. The process of the first rule that finds the reason stores it here, so that
+    /// no other rule tries to load the binary.
     lost: OnceLock<String>,
     pub bug: OnceLock<String>,
 }
@@ -103,7 +103,7 @@ fn run(
     let hear = |answer: &[u8]| match serde_json::from_slice(answer) {
         Ok(Answer::Doing(what, then)) => (doing, crash) = (what, then),
         Ok(Answer::Done(found)) => done = Some(found),
-        // The program sends nothing else, unless the FMU has overwritten its memory.
+        // A damaged message means that the FMU has overwritten memory, because the program sends nothing else.
         Err(_) => is_damaged = true,
     };
     let ended = guard::run(&options.program, arguments, &limits, Output::Kept, hear)?;
@@ -228,7 +228,7 @@ fn call<V: Tested>(rule: &Rule, check: CheckCalls<V>, fmu: Result<UnderTest<V>>)
                     }
                 }
             }
-            // Announced, so that a crash or a hang while the binary is unloaded is reported as such.
+            // The call is announced, so that a crash or a hang while the binary is unloaded is reported with these words.
             fmu.announce("unloading the binary");
         }
     }

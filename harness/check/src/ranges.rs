@@ -13,7 +13,7 @@ use super::values::{contains_name, items};
 use host::description::{Type, Value};
 
 /// Largest amount by which a value may exceed min or max without a finding, relative to min or max or to the nominal
-/// value. It is needed because an integrator may leave a state slightly outside its range.
+/// value. A small excess is allowed because an integrator may move a state slightly out of its range.
 const OVERSHOOT: f64 = 1e-3;
 
 pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -172,7 +172,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
     };
-    // runs with other parameters, and runs with one parameter far from its start value
+    // runs with random parameters, and runs with one parameter far from its start value
     for attempt in 0..STEPS as u64 {
         let mut session = random_session(fmu, fmu.first_interface()?, attempt)?;
         fmu.announce(format!("initialising with other parameters, try {attempt}"));

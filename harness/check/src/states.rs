@@ -7,8 +7,9 @@ use super::under_test::{
     FmuUnderTest, Mark, Readings, STEPS, Session, Stage, Tested, UnderTest, Unusable, Use,
 };
 
-/// Returns the uses whose interface declares a capability. Its name is `can`, for example "canSerialize", followed by
-/// the word for a state in this version of FMI. Skips the rule if there are none.
+/// Returns the uses whose interface declares a capability. The name of the capability is `can`, for
+/// example "canSerialize", followed by the word for a state in this version of FMI. Skips the rule if
+/// no interface declares it.
 pub fn uses_with<V: Tested>(fmu: &UnderTest<V>, can: &str, findings: &mut Findings) -> Vec<Use> {
     let flag = format!("{can}{}", V::STATE);
     let mut all = fmu.uses();
@@ -110,8 +111,8 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let here = session.mark();
             (continue_from(&mut session, &here)?, here, bytes)
         };
-        // The state is restored into an instance that has been simulated, and into one that was neither set up nor
-        // initialised.
+        // The state is restored into an instance that has been simulated, and into a new one that was neither
+        // set up nor initialised.
         for lived in [true, false] {
             let mut other = match lived {
                 true => fmu.running(interface)?,

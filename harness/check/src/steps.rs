@@ -246,8 +246,8 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const SEEN: f64 = 1e-6;
     /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
-    /// A value counts as equal to the value of one step earlier if they differ by less than this fraction of the change
-    /// between them.
+    /// If two values differ by less than this fraction of the change within one step, the value counts as equal to the
+    /// value of one step earlier.
     const SAME: f64 = 0.02;
     let usual = after_three_steps(fmu)?.step;
     let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();
@@ -288,7 +288,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     };
     let points = long.len().min(short.len() / 2);
     for (i, v) in watched.iter().enumerate() {
-        // short[2k + 1] is at the same time as long[k]; short[2k] is half a long step earlier.
+        // short[2k + 1] is the value at the time of long[k]; short[2k] is the value half a long step earlier.
         let off = |k: usize| (long[k][i] - short[2 * k + 1][i]).abs();
         let largest = |of: &dyn Fn(usize) -> f64| (SETTLED..points).map(of).fold(0.0, f64::max);
         let size = largest(&|k| long[k][i].abs()).max(1e-3 * v.nominal());
@@ -348,8 +348,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     /// Change of an input within a step, relative to its magnitude, by which the rule tests whether
     /// the FMU uses the input's slope.
     const SHARE: f64 = 0.3;
-    /// If the difference between a held input and one with a slope is below this fraction of the held input's
-    /// effect, the FMU ignores the slope.
+    /// An FMU ignores the slope of an input if a held input and an input with a slope have almost equal effects: the
+    /// difference is below this fraction of the held input's effect.
     const IGNORED: f64 = 0.05;
     after_three_steps(fmu)?;
     fmu.require(Interface::CoSimulation, "canInterpolateInputs")?;
@@ -390,7 +390,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         let held = end(*here, None)?;
         let on_average = end(0.5 * (here + there), None)?;
         let on_slope = end(*here, Some((there - here) / step))?;
-        // The FMU changes the input itself, and other variables may change too little to be seen.
+        // The last value is the input: if it differs, the FMU changes the input itself. Other variables may change too
+        // little to be seen.
         if on_slope.last() != held.last() {
             acts = true;
             continue;
@@ -442,7 +443,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
     if !fmu.has_capability(Interface::CoSimulation, STEP_SIZES) {
         return Ok(());
     }
-    // Differences over two short steps with held inputs. If the two disagree, the output is not smooth.
+    // Differences over two successive short steps with held inputs. If they disagree, the output is not smooth.
     let h = session.step * 1e-3;
     let mut points = Vec::new();
     for n in 0..3 {
@@ -458,7 +459,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
             ((points[1][n] - points[0][n]) / h, (points[2][n] - points[1][n]) / h);
         let at_start = 1.5 * first - 0.5 * second;
         let smooth = (first - second).abs() <= 0.1 * first.abs().max(second.abs());
-        // one per cent of the value, plus the rounding of the values
+        // the tolerance is one per cent of the value, plus the rounding error of the difference
         let rounding = 1e-9 * points[0][n].abs().max(1e-3 * v.nominal()) / h;
         let off = (declared[n] - at_start).abs();
         if declared[n].is_nan() || (smooth && off > 1e-2 * at_start.abs() + rounding) {

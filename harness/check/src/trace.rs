@@ -24,7 +24,8 @@ pub(super) enum Answer {
 
 /// Tells the parent process the next call and the meaning of a crash in this call.
 pub fn announce_call(what: &str, crash: Crash) {
-    // If sending fails, the report of a crash does not name the call.
+    // If the message cannot be sent, the report of a crash does not name the call; nothing
+    // else depends on it.
     let _ = send(&Answer::Doing(what.into(), crash));
 }
 

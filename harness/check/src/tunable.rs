@@ -124,7 +124,7 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let change = Some((v, &value));
             let runs = (run(fmu, interface, change, None)?, run(fmu, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };
-            // the effect on all variables except for the parameter itself
+            // the effect on all variables other than the parameter itself
             let differing = |run: &Readings| {
                 let mut all = fmu.variables().iter().zip(run.iter().zip(&plain));
                 all.find(|(o, (a, b))| {

@@ -93,10 +93,10 @@ pub trait Tested: Version + 'static {
     const TERMINATION: Option<&'static str>;
     /// Description of the call that reads a Real with a value reference that no variable has.
     const UNKNOWN_READ: &'static str;
-    /// True if `load.opens` also reports binaries that are missing.
+    /// True if `load.opens` also reports an interface whose binary is missing.
     const REPORTS_MISSING: bool;
-    /// Smallest number of steps in the experiment that the FMU suggests at which the rules use Model Exchange; 0 for
-    /// any number. After the suggested experiment a model may do anything.
+    /// Smallest number of steps in the experiment that the FMU suggests at which the rules use Model Exchange; 0 for any
+    /// number. A very short experiment is not used, because the model may do anything after its end.
     const EXCHANGE_STEPS: f64;
     /// Smallest number of steps in the suggested experiment at which the check uses the suggested step size.
     const SUGGESTED_STEPS: f64;
@@ -226,7 +226,7 @@ impl<V: Tested> UnderTest<V> {
             if all.is_empty() { "the FMU declares no interface".into() } else { all.join("; ") }
         };
         fmu.binaries.first().with_context(why)?;
-        // FMI 2.0 has another rule for an interface whose binary is missing.
+        // In FMI 2.0 another rule reports an interface whose binary is missing.
         let file =
             |name: &str| format!("binaries/{}/{name}{}", V::PLATFORM, std::env::consts::DLL_SUFFIX);
         fmu.broken.retain(|(name, _)| V::REPORTS_MISSING || directory.join(file(name)).exists());
@@ -235,8 +235,8 @@ impl<V: Tested> UnderTest<V> {
         Ok(fmu)
     }
 
-    /// Copies the unpacked FMU to `directory` and loads the copy, which the operating system treats as
-    /// another library.
+    /// Copies the unpacked FMU to `directory` and loads the copy. The operating system treats the copy as another library,
+    /// so that it has static variables of its own.
     pub fn copy(&self, directory: &Path) -> Result<Self> {
         copy_files(&self.directory, directory)?;
         UnderTest::open(directory, &self.path, self.description, self.deadline)
@@ -312,8 +312,8 @@ impl<V: Tested> UnderTest<V> {
             calls()
         });
         drop(returned);
-        // Some rules make thousands of such calls. Waiting threads that have not ended would exhaust the memory that
-        // the process may use for threads.
+        // The watchdog thread is joined, because some rules make thousands of such calls, and waiting threads would exhaust
+        // the memory that the process may use for threads.
         let _ = watchdog.join();
         answer
     }
@@ -477,7 +477,7 @@ pub struct Session<'f, V: Tested = Fmi2> {
     pub notes: V::Notes,
 }
 
-/// Quantities of the host, such as the time, at the instant at which an FMU state was saved. A saved FMU state
+/// Quantities that the host has stored at the instant at which it saved an FMU state, such as the time. The FMU state
 /// does not contain them.
 #[derive(Clone, Copy, Debug)]
 pub struct Mark {

@@ -46,7 +46,7 @@ impl Unit {
         [0, other.exponents[RADIAN]].contains(&self.exponents[RADIAN])
     }
 
-    /// Writes the unit as UnitDefinitions does, for example "kg=1, m=2, s=-2".
+    /// Returns the unit in the form of UnitDefinitions, for example "kg=1, m=2, s=-2".
     fn text(&self) -> String {
         let mut text: Vec<String> = BaseUnit::NAMES
             .iter()

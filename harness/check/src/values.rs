@@ -298,7 +298,7 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     for (place, is_taken) in accepted {
         match refused {
-            // The binary accepts the new value, so that this parameter is in fact tunable.
+            // The binary accepts the new value, so that the parameter is tunable, although the description says fixed.
             Some(other) if is_taken => findings.at(place).fail(format!(
                 "the call is accepted as for tunable parameters, while {other} is refused (allowed: \
                      fmi2Error, or variability=\"tunable\")"

@@ -1,9 +1,10 @@
 //! Computes one point of a work-precision diagram, for one method at one tolerance: CPU time for 20 ms of motion, and the
 //! error over the thesis's sweep (0.1 N·m, 10 cm of water, dry friction).
 //!
-//! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints `ns per 20 ms,largest error of omega in rad/s`. The
-//! motion is simulated RUNS times. For each piece of 10 s (for the whole sweep, if a solver takes it in one call) the
-//! smallest CPU time counts, which excludes other load of the machine. METHOD is one of:
+//! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints `ns per 20 ms,largest error of omega in rad/s`.
+//! The motion is simulated RUNS times. The CPU time is measured in pieces of 10 s, or over the whole sweep if a solver
+//! takes it in one call. For each piece the smallest time of all runs counts, which excludes other load of the machine.
+//! METHOD is one of:
 //!
 //! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`) with the slosh model of this name and set-valued
 //!   friction. With `--write FILE` the rates are written to a file, which is the REFERENCE of later calls
@@ -176,7 +177,7 @@ fn main() -> Result<()> {
     ensure!(runs > 0, "RUNS = 0 (allowed: 1 or more)");
     let torque = torque(seconds);
     let end = (torque.len() - 1) as f64 * STEP;
-    // without a limit of the number of steps and without detection of stiffness; other options have their defaults
+    // the number of steps is not limited, and stiffness is not detected; other options have their defaults
     macro_rules! whole_sweep {
         ($solver:ident, $max:expr, $min:expr, $beta:expr) => {{
             let start = cpu_time();

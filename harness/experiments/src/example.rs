@@ -99,7 +99,7 @@ impl Example {
         let none = BTreeMap::new();
         let input = folder.join(self.input());
         self.histories().write(&input, &none)?;
-        // the reference is computed from the written file, whose numbers are rounded
+        // the reference result is computed with the inputs in the written file, whose numbers are rounded
         let answer = replay(fmu, &input, Some(TOLERANCE), false)?;
         thinned(fmu.description(), &answer).write(&folder.join(self.reference()), &none)?;
         let options =

@@ -105,7 +105,7 @@ pub fn histories(
         })
         .collect();
     signals.extend([signal("time", None), signal(SLOPE, Some("N.m/s"))]);
-    // recognised by the names of the inputs, with any unit
+    // columns are recognised by the names of the inputs, with or without a unit
     let there = recording::assigned(path, &signals)?;
     let columns: Vec<&str> = there
         .iter()
@@ -231,7 +231,7 @@ impl Run {
         self.torque.span().0
     }
 
-    /// Returns the number of steps between rows of the result, the last of which may be shorter. Returns
+    /// Returns the number of intervals between the rows of the result, the last of which may be shorter. Returns
     /// 0 if [`Run::check`] fails.
     pub fn steps(&self) -> usize {
         budget::steps(self.stop - self.start(), self.step).unwrap_or(0)

@@ -39,7 +39,8 @@ impl Contents {
             speed = speed.max(v);
             let bond = self.liquid.bond(g, self.radius);
             let weber = self.liquid.weber(speed, self.radius);
-            // Measure of dominance: Bond number divided by 30, or weight divided by inertia if this is smaller.
+            // Dominance of weight in a row: the Bond number divided by 30 or, if this is smaller, the ratio
+            // of weight to inertia.
             let rules = (bond / LEAST_BOND).min(bond / weber.max(1.0));
             if rules < 1.0 && worst.is_none_or(|(other, _)| rules < other) {
                 worst = Some((rules, Weightless { bond, weber }));
@@ -80,8 +81,8 @@ impl std::fmt::Display for Weightless {
 }
 
 /// A tank of Spacecraft or SloshTank: the prefix of its variables' names (`tank[1]`, `tank`), the hinge of mode 1 relative
-/// to O, m, and the direction out of the liquid, both in the axes of the craft or the host, and the wall elevation per
-/// slosh angle of each mode, m. `has_ball` is true if the FMU can model detached liquid, but does not in this tank.
+/// to the point O, m, and the direction out of the liquid, both in the axes of the craft, and the wall elevation per slosh
+/// angle of each mode, m. `has_ball` is true if the FMU can model detached liquid, but does not in this tank.
 #[derive(Clone, Debug)]
 struct Tank {
     name: String,
@@ -214,8 +215,8 @@ impl Tank {
         modes.flat_map(|n| [1, 2].map(|i| format!("{}.p_dot[{n},{i}]", self.name))).collect()
     }
 
-    /// Describes how weight fails to dominate in this tank. It uses the specific force along the axis at the hinge of mode
-    /// 1, f_O + ω' × ρ + ω × (ω × ρ), and the speed of the surface at the wall, summed over all modes.
+    /// Describes in which way weight does not dominate the liquid in this tank. The specific force along the axis at the
+    /// hinge of mode 1 is f_O + ω' × ρ + ω × (ω × ρ); the speed of the surface at the wall is summed over all modes.
     fn without_weight(&self, table: &Table, accelerometer: &str) -> Option<String> {
         let column = |name: &String| table.column(name);
         let vector = |name: &str| {
@@ -322,7 +323,8 @@ mod tests {
         }
         let [without] = <[String; 1]>::try_from(warnings(&tank(false), &rows)).unwrap();
         assert!(!without.contains("ball"), "{without}");
-        // Weight still dominates at 0.01 m/s², Bo = 28.1, with nothing moving: same warning as for the bench.
+        // Weight still dominates at 0.01 m/s², Bo = 28.1, in liquid at rest, but the surface is curved: the warning is the
+        // same as for the bench.
         let [low] =
             <[String; 1]>::try_from(warnings(&tanks, &[[0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
         assert!(low.contains("Bond number 28.125") && low.contains("curved"), "{low}");

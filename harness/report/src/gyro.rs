@@ -50,7 +50,7 @@ pub fn page(rows: &[(String, String)], found: &Rest) -> String {
 }
 
 pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
-    // frame around the range that noise stays in
+    // frame around the range within ±y in which white noise stays
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
     let allan = allan(
         "Allan deviation of the recorded gyro at rest",

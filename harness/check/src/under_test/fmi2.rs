@@ -17,8 +17,8 @@ pub type FmuUnderTest = UnderTest<Fmi2>;
 
 /// Number of calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
-/// Largest number of events that may immediately follow each other. An FMU that always requests the next event at
-/// once breaks a rule.
+/// Largest number of events that may follow each other at the same time. An FMU that always requests the next event
+/// at once breaks a rule.
 const IMMEDIATE: usize = 3;
 /// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
 const ASKED: usize = 20;

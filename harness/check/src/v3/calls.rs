@@ -39,7 +39,8 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
             findings.at(subject.last_call()).add(error.to_string());
             continue;
         }
-        // intermediate variables are requested, but no callback receives them
+        // the instance is created with intermediate variables, but without a callback
+        // that could receive them
         let mut session = subject.session(using)?;
         session.initialise()?;
         session.advance(2)?;
@@ -191,7 +192,8 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let all = subject.readable().filter(|v| v.c_type == CType::Float64);
     for v in all {
         let n = v.length();
-        // nValues is n and then n - 1. The array of the host is longer in both cases.
+        // The FMU is called with nValues = n, and then with n - 1. In both calls the array of the host
+        // is longer than nValues.
         for told in [n, n.saturating_sub(1)] {
             let place = format!("fmi3GetFloat64 of {} with nValues = {told}", v.name);
             let mut values = vec![CANARY; n + 8];

@@ -344,7 +344,7 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
         session.count = k;
         session.stimulate()?;
         let (from, h) = (session.time, session.step);
-        // The FMU's own steps may not fit into the step, as in `faults`.
+        // The FMU's own steps may not fit into the communication step, see `faults`.
         let slack = 1e-2 * h;
         let mut wrong: Option<String> = None;
         session.raw_step_with_updates(
@@ -536,7 +536,8 @@ fn unknown_at_displacement(
 }
 
 fn require_derivatives(subject: &Subject, flag: &str) -> Result<Use> {
-    // In Model Exchange, derivatives follow immediately from states and inputs, so that differences can be compared.
+    // In Model Exchange the derivatives are functions of states and inputs, so that finite differences can
+    // be compared with them.
     if !subject.has(Interface::ModelExchange) {
         return skip(
             "the FMU offers no Model Exchange, where derivatives can be compared with differences",

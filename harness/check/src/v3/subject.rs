@@ -152,8 +152,8 @@ impl Subject {
         Ok(with)
     }
 
-    /// Instantiates the FMU with the arguments `with`. The inner error is the refusal by the FMU; the outer error ends
-    /// the rule, because it cannot create an instance at all.
+    /// Instantiates the FMU with the arguments `with`. The inner error is the refusal by the FMU. The outer error ends
+    /// the rule, because the check cannot create an instance at all.
     pub fn instantiate(&self, with: &Instantiation) -> Result<Result<Instance<'_>, CallError>> {
         let binary = self.binary(with.interface)?;
         self.make(with.interface, || binary.instantiate_with(with))

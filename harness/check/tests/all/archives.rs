@@ -28,8 +28,8 @@ fn archives_that_break_hosts_are_reported() {
         files.push((name.into(), b"x".to_vec()));
         zipped(&files, DEFLATED)
     };
-    // the bits of the archive's structures in both headers of the first file: the local header at 0, and its copy
-    // in the central directory
+    // flipped bits in the fields of the archive's structures, in both headers of the first file: the local header
+    // at 0, and its copy in the central directory
     let central = whole.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
     let patched = |local: usize, value: u8| {
         let mut bytes = whole.clone();

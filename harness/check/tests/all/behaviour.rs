@@ -46,7 +46,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
         Ok(instance.do_step(0.0, 1.0)?)
     };
     begin("0.1").unwrap();
-    // The host still assigns the message to the instance whose call it explains.
+    // The host nevertheless assigns the message to the instance that was called.
     let refused = begin("-1").unwrap_err();
     assert!(format!("{refused:#}").contains("friction.b = -1"), "{refused:#}");
 }
@@ -177,7 +177,7 @@ fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_
         ("hangs_at_nan", "steps.size", Severity::Warning),
     ] {
         let (found, text) = severities(word, rule);
-        // A Boolean that is read as 2 also keeps a 2, which is a warning.
+        // A Boolean that is read as 2 also gives a second finding, a warning, because the FMU stores a 2.
         let worst = found.iter().min();
         assert_eq!(worst, Some(&meant), "{word}: {text}");
     }
@@ -191,7 +191,7 @@ fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_
     let [(_, finding)] = &all[..] else { panic!("{}", report.text()) };
     assert_eq!(finding.severity, Severity::Error);
     assert!(finding.place.contains("friction.b"), "{}", report.text());
-    // If the binary accepts all of them, the binary is too lax, and none is in fact tunable.
+    // A binary that accepts all changes of fixed parameters is too lax, and none of the parameters is in fact tunable.
     let (found, text) = severities("sets_anything", "values.fixed");
     assert!(!found.is_empty() && found.iter().all(|s| *s == Severity::Warning), "{text}");
 }
@@ -202,7 +202,7 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("Mutant.fmu");
     std::fs::write(&path, misbehaving("hangs_at_zero")).unwrap();
-    // long enough for the preceding calls on a busy machine
+    // a time limit that is long enough for the preceding calls on a busy machine
     let report = check_rules(&path, &["steps.size", "load.version"], 5.0);
     let all: Vec<_> = report.all().collect();
     let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };

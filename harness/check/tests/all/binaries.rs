@@ -15,8 +15,8 @@ use crate::common::{
 #[test]
 fn our_own_fmu_breaks_no_rule() {
     let report = check_rules(packed_for_tests(), &[], 120.0);
-    // A plain build is for this machine and uses its newer glibc and libgcc. Builds by `pack --all-platforms` do not,
-    // and are checked when they are packed.
+    // A plain build for this machine uses its newer glibc and libgcc, which breaks bin.system. Builds by `pack
+    // --all-platforms` do not use them, and are checked when they are packed.
     let others: Vec<_> = report.all().filter(|(rule, _)| rule.id != "bin.system").collect();
     assert!(others.is_empty(), "{}", report.text());
     assert_eq!(report.count_findings(Severity::Error), 0);
@@ -59,7 +59,7 @@ fn binaries_that_no_host_can_use_are_reported() {
         files.push(("binaries/aarch64-linux/HubSlosh.so".into(), aarch64.into()));
         zipped(&files, CompressionMethod::Stored)
     };
-    // The groups are checked separately, because a plain build breaks bin.system.
+    // Each group of rules is checked separately, because a plain build breaks bin.system, too.
     breaks(
         vec![
             (

@@ -185,7 +185,8 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
         vec![
             ("an output missing", without(outputs), &["xml.outputs"][..]),
             ("an output twice", twice(outputs), &["xml.outputs"]),
-            // The variable is then neither a state nor a derivative, so that InitialUnknowns must not list it.
+            // Without its entry in Derivatives the variable is neither a state nor a derivative, so that InitialUnknowns
+            // must not list it.
             (
                 "a derivative missing",
                 without(derivatives),

@@ -95,7 +95,8 @@ fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     for (name, definitions, rate, experiment) in cases {
         let small = Small { definitions, rate: *rate, experiment };
         let report = check_bytes(&small.packed(), &[]);
-        // The small FMUs are built without the options for old systems, and one case has a step that is too long on purpose.
+        // Findings of two rules are expected: the small FMUs are built without the options for old systems, and one case has
+        // a step that is too long on purpose.
         let fine = ["bin.system", "xml.default_experiment"];
         let others: Vec<_> = report.all().filter(|(rule, _)| !fine.contains(&rule.id)).collect();
         if !others.is_empty() || report.count_findings(Severity::Error) > 0 {
@@ -172,7 +173,7 @@ fn outputs_that_lag_by_one_step_are_reported_and_intended_delays_are_not() {
     let experiment = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.1\"";
     for (habit, severity) in [
         (&["-DSTALE"][..], Some(Severity::Error)),
-        // For an output the check cannot be sure that a lag is a fault.
+        // If an output lags by a step, the check cannot be sure that the lag is a fault, and gives a warning.
         (&["-DSTALE", "-DHIDDEN_STATE"], Some(Severity::Warning)),
         (&["-DDELAY"], None),
         (&["-DUNIT_DELAY"], None),

@@ -86,7 +86,7 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
     }
-    // outputs, and the slosh angles of a six-axis FMU, which are local variables
+    // the outputs, and the slosh angles of a six-axis FMU, which are local variables and no outputs
     let outputs = description
         .variables
         .iter()
@@ -233,7 +233,7 @@ impl Campaign {
         let jobs = jobs.min(cases.len().max(1));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
         let warned = Mutex::new(BTreeSet::new());
-        // only one warning of several that differ only in numbers
+        // of several warnings that differ only in numbers, only the first is reported
         let warn = |case: &Case, warning: String| {
             let words: String = warning.chars().filter(|c| !c.is_ascii_digit()).collect();
             let mut warned = warned.lock().unwrap_or_else(PoisonError::into_inner);
@@ -369,7 +369,7 @@ impl Campaign {
         let put = |table: &Table, notes: &BTreeMap<String, String>| {
             store.add(&case.name, |path| table.write(path, notes))
         };
-        // checked before a simulation that may take hours
+        // the work of the analysis is checked before the simulation, which may take hours
         let work = match is_bench(fmu.description()) && case.recording.is_none() {
             true => outcome::check_work(&case.torque, run.step, run.steps() + 1),
             false => Ok(()),
@@ -432,7 +432,7 @@ impl Campaign {
                 }
             }
             None => {
-                // without time and the driven input, which are always recorded
+                // without time and the driven input, because both are recorded in any case
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
                 let others: Vec<&str> = others.map(String::as_str).collect();
                 let others = run.columns_with(&others, sensors.required_variables());

@@ -17,8 +17,8 @@ use crate::progress::Progress;
 
 const APART: f64 = 0.0025;
 const WITHIN: f64 = 0.0025;
-/// Number of grid steps by which the frequencies with rotary slosh at a smaller torque may be outside the range of such
-/// frequencies at a larger torque.
+/// Number of grid steps by which the frequencies with rotary slosh at a smaller torque may lie outside the range of
+/// frequencies with rotary slosh at a larger torque.
 const MARGIN: usize = 3;
 
 #[derive(Clone, Copy)]
@@ -28,8 +28,8 @@ struct Dwell {
 }
 
 /// Result of a search for the onset of rotary slosh: its frequency, Hz, the largest torque without rotary slosh and the
-/// smallest torque with it, N·m. If no torque makes the slosh rotary, there are no torques, and the frequency is that of
-/// the largest slosh angle.
+/// smallest torque with it, N·m. If no torque makes the slosh rotary, both torques are missing, and the frequency is the
+/// frequency with the largest slosh angle.
 #[derive(Debug, PartialEq)]
 struct Found {
     frequency: f64,

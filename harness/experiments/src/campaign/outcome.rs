@@ -42,8 +42,8 @@ const RESOLVED: f64 = 3.0;
 /// of the power of the rate does not follow from the torque.
 const MOST_MISFIT: f64 = 0.3;
 /// Largest shift of the resonance by a passing sweep, relative to the separation of antiresonance and resonance, at which the
-/// estimate counts as valid; also the largest such difference of two estimates from a whole record. If the resonance is
-/// narrow, the shift is 0.6 times the square root of the sweep's rate in Hz/s.
+/// estimate counts as valid; also the largest difference of the resonances in two estimates from a whole record, relative to
+/// the separation. If the resonance is narrow, the shift is 0.6 times the square root of the sweep's rate in Hz/s.
 const MOST_SHIFT: f64 = 0.25;
 
 const LEAST_SNR: f64 = 0.0;
@@ -129,7 +129,7 @@ impl Totals {
 }
 
 /// Rates measured by a gyro, minus their biases, rad/s: about the hub's axis, and about x and y if a recording contains
-/// them. `bias` is the bias about the hub's axis, 0 for a gyro without errors; `warnings` are about large or drifting
+/// them. `bias` is the bias about the hub's axis, 0 for a gyro without errors; `warnings` report large or drifting
 /// means of the rates.
 struct Rates {
     about_axis: Vec<f64>,
@@ -328,8 +328,7 @@ pub struct Outcome {
     pub history: History,
     pub path: SloshPath,
     pub ending: Ending,
-    /// Name of the force that dominates the liquid, if gravity does not
-    /// ([`Range::without_weight`]).
+    /// Name of the force that dominates the motion of the liquid, if this force is not gravity ([`Range::without_weight`]).
     pub weightless: Option<String>,
     /// Sentence about how the run left the range of validity of the tank's model; empty if it did not.
     pub limits: Vec<String>,
@@ -407,8 +406,8 @@ impl Estimate {
     }
 }
 
-/// Returns true if the separation of antiresonance and resonance is less than `than`, Hz. Returns false if one of
-/// the two is missing.
+/// Returns true if the separation of antiresonance and resonance is less than `than`, Hz. Returns false if antiresonance
+/// or resonance is missing.
 fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
@@ -478,7 +477,7 @@ impl Record {
         };
         let estimate = |response: FrequencyResponse, length: f64| {
             let resolution = 1.0 / length;
-            // the band is reduced at its ends, where the estimate oscillates because the band is cut off
+            // the band is narrower by one resolution at either end, where the estimate oscillates because the band is cut off
             let inner = (band.0 + resolution, band.1 - resolution);
             Estimate::new(response, inner, resolution, |features| match features {
                 features if closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
@@ -489,7 +488,7 @@ impl Record {
         let spa = spa::Estimate::new(step, &tau, &omega, &frequencies, lengths.lag);
         let (deviation, slope) = (spa.deviation(unexplained), spa.slope());
         let mut spa = estimate(spa.response, lengths.lag).with_uncertainties(deviation, |_| slope);
-        // a further estimate if the sweep was too fast for the estimate at the moment of passing
+        // a transfer function is fitted, too, if the sweep was too fast for the estimate at the moment of passing
         let fast = profile.sweep().is_some() && !enough;
         let mut rational = (fast || !enough && !spa.features.has_any())
             .then(|| Rational::fit(step, &tau, &omega, band))
@@ -540,7 +539,8 @@ impl Passing {
         let column = |name| table.column(name).unwrap_or_default();
         let is_recording = table.column(F_RADIAL).is_none();
         let about_axis = &rates.about_axis[..];
-        // a missing rate is replaced by the rate about the axis, whose result is not used
+        // if the rate about another axis is missing, the rate about the hub's axis takes its place, and the
+        // result is not used
         let other = |k: usize| rates.others[k].as_deref().unwrap_or(about_axis);
         let signals = match is_recording {
             false => {
@@ -559,7 +559,7 @@ impl Passing {
             &grid,
         );
         let [rate, second, third, fourth] = responses;
-        // unexplained power at the frequencies that the sweep passes
+        // power spectral density of the unexplained rate at the frequencies that the sweep passes
         let unexplained: Vec<f64> = (rate.frequency.iter())
             .map(|f| unexplained.get(grid.partition_point(|g| g < f)).copied().unwrap_or(f64::NAN))
             .collect();
@@ -664,7 +664,8 @@ impl Outcome {
             None => (None, None),
             Some(profile) => {
                 let (tau, omega) = (column(TAU_CMD), &rates.about_axis[..]);
-                // at every fourth frequency, because it changes little between them
+                // computed at every fourth frequency, because the unexplained power changes
+                // little between neighbouring frequencies
                 let unexplained = profile.band().map_or(Vec::new(), |band| {
                     let grid = logarithmic_grid(band, GRID_POINTS);
                     let some: Vec<f64> = grid.into_iter().skip(1).step_by(4).collect();
@@ -931,7 +932,7 @@ mod tests {
         let work = |profile: &str, step: f64, rows: usize| {
             check_work(&profile.parse::<Written>().unwrap().torque().unwrap(), step, rows)
         };
-        // allowed: 111 h at 50 Hz in the bench's band, and the thesis's run from 1e-6 Hz
+        // analyses that are allowed: 111 h at 50 Hz in the bench's band, and the thesis's run with a sweep from 1e-6 Hz
         work("exp-sweep:f0=1.25,f1=3.5,duration=400000", 0.02, 20_000_000).unwrap();
         work("exp-sweep:f0=1e-6,f1=3.5,duration=2700", 0.02, 135_000).unwrap();
         for profile in ["exp-sweep:f0=1e-9", "noise:f0=1e-9"] {
@@ -958,7 +959,7 @@ mod tests {
         for words in ["Bond number 0.923", "Weber number 98.", "Froude number 106.", "inertia"] {
             assert!(cut.contains(words), "{words}: {cut}");
         }
-        // without any specific force, and at rest
+        // the liquid at rest without any specific force
         let still = range.without_weight(&[0.0; 2], Some(&[9.81, 0.0])).unwrap();
         assert!(still.contains("Froude number infinite"), "{still}");
         assert!(still.contains("surface tension"), "{still}");

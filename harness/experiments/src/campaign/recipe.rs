@@ -120,7 +120,7 @@ fn difference(
         let text = notes.get("parameters").map_or("", String::as_str);
         serde_json::from_str(text).unwrap_or_default()
     };
-    // the cause first: parameters before the settings that set them
+    // a difference that causes others is named first: parameters before the settings that set them
     const ORDER: [&str; 4] = ["format", "model", "binary_sha256", "parameters"];
     let rest = wanted.keys().map(String::as_str).filter(|key| !ORDER.contains(key));
     // runs with equal parameters are the same, even if they were set in another way

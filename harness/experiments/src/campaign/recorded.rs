@@ -110,7 +110,7 @@ pub(super) fn table(
             );
             clock
         }
-        // the random noise of the recording is unknown, so that it cannot be correlated
+        // the phase of random noise in the recording is unknown, so that its torque cannot be found by correlation
         None => Clock { first: 0.0, rate: 0.0 },
     };
     let Clock { first, rate } = clock;
@@ -253,7 +253,7 @@ impl Sought<'_> {
                 let phase = self.sweep.phase(self.time(clock, row + k));
                 sum += window * value * Complex64::cis(-phase);
             }
-            // the phase of a sine is a quarter of a turn ahead of its cosine's
+            // a sine lags behind the cosine with the same phase angle by a quarter of a turn
             let angle = (sum * self.sweep.amplitude.signum()).arg() / TAU + 0.25;
             let unwrapped = last.map_or(angle, |last: f64| angle - (angle - last).round());
             last = Some(unwrapped);
@@ -325,7 +325,7 @@ mod tests {
         assert!(lag == -400 && correlation > 0.999_999, "{lag} {correlation}");
         let found =
             |record: &[f64]| Sought { step: 0.02, span: (0.0, 100.0), sweep: &sweep }.align(record);
-        // equal clocks are not corrected
+        // if both clocks are equal, times are not corrected
         assert_eq!(found(&late).0, Clock { first: 300.0, rate: 0.0 });
         let reversed: Vec<f64> = wanted.iter().rev().copied().collect();
         assert!(aligned(&reversed, &wanted).1 < 0.9);
@@ -336,7 +336,7 @@ mod tests {
         let sweep = Sweep::THESIS;
         let sought = Sought { step: 0.02, span: (0.0, 2700.0), sweep: &sweep };
         for (rate, begins) in [(5e-5, 5.13), (-3e-4, 5.13), (1e-3, 0.0), (3e-4, -400.0)] {
-            // recorded times of the sweep; 3 % of the rows are interpolated linearly
+            // times of the sweep by the recorder's clock; 3 % of the rows are interpolated linearly
             let at = |k: usize| {
                 let t = (0.02 * k as f64 - begins) / (1.0 + rate);
                 if (0.0..2700.0).contains(&t) { sweep.torque(t) } else { 0.0 }

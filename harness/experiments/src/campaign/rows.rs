@@ -10,8 +10,8 @@ use host::fmu::Fmu;
 
 use self::Column::{Number, Text};
 
-/// A row of `features.csv`: a case, its outcome if it was analysed, the estimate that gives the features of the row, and,
-/// for a run that was not analysed, how it left the range of validity of its model.
+/// A row of `features.csv`: a case, its outcome if it was analysed, the estimate from which the features of the row are
+/// taken, and, for a run that was not analysed, how it left the range of validity of its model.
 #[derive(Clone, Copy)]
 pub struct Row<'a> {
     pub case: &'a Case,
@@ -20,7 +20,8 @@ pub struct Row<'a> {
     pub limits: &'a [String],
 }
 
-/// Columns of the table of runs. A cell is empty if the value does not exist, or if the torque cannot show it.
+/// Columns of the table of runs. A cell is empty if the value does not exist, or if it cannot be determined under the
+/// torque of the run.
 enum Column {
     Number(fn(&Row) -> Option<f64>),
     Text(fn(&Row) -> Option<String>),

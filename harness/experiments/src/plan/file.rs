@@ -100,7 +100,8 @@ pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Opti
     let vary =
         reader.named("[vary] ", vary, "a list of values, such as [0.05, 0.1]", allowed).into_iter();
     let vary = vary.map(|vary| vary.map(|list| list.iter().map(Scalar::to_string).collect()));
-    // leaves room for the number of a run
+    // the first number is at most half of the largest 32-bit integer, so that the number of a run can
+    // be added to it
     let most = i64::from(i32::MAX / 2);
     let expected = format!("the whole number to count from, 0 to {most}");
     let count = reader.names(table, "count");

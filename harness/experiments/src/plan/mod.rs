@@ -49,7 +49,8 @@ pub const BUILT_IN: &[(&str, &str)] = plans! {
 
 /// Time between the rows of a result, s, unless the plan states it: the sampling period of the thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
-/// Varied names from which file names `<model>_<fill>mm_<amplitude>` are formed, which are a documented interface.
+/// Names that a plan usually varies. Runs that vary only these have the file names `<model>_<fill>mm_<amplitude>`, which
+/// are a documented interface.
 const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
 pub const AMPLITUDE: &str = "profile.amplitude";
 const FREQUENCY: &str = "profile.frequency";
@@ -244,8 +245,9 @@ impl Plan {
         names
     }
 
-    /// Returns the name of the varied number with the most values in the plan, which becomes the axis of figures; if
-    /// several have equally many, the last one. Returns `None` if no number is varied, or if values are drawn at random.
+    /// Returns the name of the varied number with the most values in the plan, which becomes the horizontal axis of
+    /// figures; if several have equally many values, the last one of them. Returns `None` if no number is varied, or if
+    /// values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
         self.axis_of_vary().or_else(|| self.axis_of_listed())
     }
@@ -260,7 +262,7 @@ impl Plan {
             values.entry(&one.name).or_default().insert(&one.value);
         }
         let several = values.into_iter().filter(|(_, values)| values.len() > 1);
-        // if several have equally many values, the amplitude of the torque
+        // if several numbers have equally many values, the amplitude of the torque is chosen
         let most = several.max_by_key(|(name, values)| (values.len(), *name == NAMING[2]));
         most.map(|(name, _)| name).filter(|_| !self.is_random())
     }
@@ -412,7 +414,7 @@ impl Plan {
                     continue;
                 };
                 case.name = self.name(run, &case, draw, &mut names);
-                // recorded and simulated runs are plotted over their values, not over their names
+                // a recording is plotted over its varied values, as simulated runs are, and not over its name
                 case.listed = run.name.clone().filter(|_| run.recording.is_none());
                 cases.push(case);
             }
@@ -524,7 +526,7 @@ impl Plan {
     /// varied. Otherwise the name consists of the varied values, as in `d_0.111_amplitude_0.1`. Random draws have numbers.
     fn name(&self, run: &Listed, case: &Case, draw: usize, taken: &mut BTreeSet<String>) -> String {
         let mut parts = match &run.name {
-            // a named run with further variation: the varied values are appended to its name
+            // if a named run is varied further, the varied values are appended to its name
             Some(name) => vec![name.clone()],
             None => Vec::new(),
         };
@@ -934,7 +936,8 @@ mod tests {
             let m = mean(x);
             (x.iter().map(|v| (v - m).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
         };
-        // four standard errors of 4000 draws: 0.063 standard deviations of a mean, 4.5 % of a standard deviation
+        // limits of four standard errors of 4000 draws: 0.063 standard deviations for a mean, 4.5 %
+        // for a standard deviation
         let inertia = drawn(0);
         assert!((mean(&inertia) - 0.3).abs() < 0.01 * 0.063, "{}", mean(&inertia));
         assert!((deviation(&inertia) / 0.01 - 1.0).abs() < 0.045);
@@ -944,12 +947,12 @@ mod tests {
         let even = drawn(2);
         assert!(even.iter().all(|b| (0.03..0.05).contains(b)));
         assert!((mean(&even) - 0.04).abs() < 0.02 / 12_f64.sqrt() * 0.063);
-        // the minimum 0 of friction.c is the FMU's, and the maximum is the plan's
+        // friction.c has the FMU's minimum, 0, and the plan's maximum
         assert!(drawn(3).iter().all(|c| (0.0..=0.02).contains(c)));
         let seeds = drawn(4);
         for seed in 1..=6 {
             let count = seeds.iter().filter(|s| **s == f64::from(seed)).count();
-            // 667 are expected; four standard deviations are 94
+            // 667 draws are expected; the limit of four standard deviations is 94 draws
             assert!(count.abs_diff(667) < 94, "{seed}: {count}");
         }
     }

@@ -132,7 +132,7 @@ impl Distribution {
         for _ in 0..MOST_DRAWS {
             let value = match self.kind {
                 Kind::Normal { mean, deviation } => mean + deviation * random.normal(),
-                // whole numbers, including `from` and `to`
+                // whole numbers from `from` to `to`, including both
                 Kind::Uniform { from, to } if whole => {
                     from + (random.uniform() * (to - from + 1.0)).floor()
                 }

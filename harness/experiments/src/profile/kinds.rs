@@ -48,8 +48,8 @@ pub enum Allowed {
 }
 
 impl Allowed {
-    /// Returns a description of what is wrong with a value, worded to follow the parameter's name
-    /// in a message; `None` for an allowed value.
+    /// Returns what is wrong with a value, as a phrase that a message puts after the parameter's name;
+    /// `None` for an allowed value.
     pub(super) fn fault(self, value: f64) -> Option<String> {
         let (met, demand) = match self {
             Allowed::Any => (true, String::new()),
@@ -113,7 +113,7 @@ const fn sweep_from(first: Allowed) -> [Parameter; 4] {
     ]
 }
 const MOVES: Demand = (|v| v.value("f0") != v.value("f1"), "f0 and f1 are equal; use sine");
-/// Condition on the frequencies of a profile. Outside this range the phase of the sine would
+/// Condition on the frequencies of a profile. Outside the allowed range the phase of the sine would
 /// have no valid digits.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.value(name))),

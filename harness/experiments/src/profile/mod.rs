@@ -463,7 +463,7 @@ impl Profile {
             edges.sort_by(f64::total_cmp);
             let mut last = 0.0;
             for edge in edges {
-                // Two edges that differ only by rounding are the same edge.
+                // Two edges whose times differ only by rounding are one edge.
                 let apart = 1e-9 * (1.0 + edge.abs());
                 if edge > last + apart && edge < stop - apart {
                     row(edge);

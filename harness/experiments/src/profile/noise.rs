@@ -102,7 +102,8 @@ mod tests {
             power += noise.torque_after(t).powi(2);
         }
         assert!(clipped > 0);
-        // 600 s resolve 1.7 mHz, and the sines are 39 mHz apart: the error is a fraction of a per cent
+        // a record of 600 s resolves 1.7 mHz, and the sines are 39 mHz apart, so that the power has an error of a
+        // fraction of a per cent
         assert!(((power / 60_000.0).sqrt() / 0.05 - 1.0).abs() < 0.01);
         let brown = Noise::new(0.05, (0.0, 20.0), -2.0, 1, 1.0);
         assert!((0..100).all(|k| brown.torque_after(k as f64).is_finite()));
@@ -113,8 +114,8 @@ mod tests {
         let noise = Noise::new(0.05, (1.25, 3.5), -1.0, 3, 0.26);
         let tau = samples(&noise, 600.0, 0.05);
         let rms = (tau.iter().map(|v| v * v).sum::<f64>() / tau.len() as f64).sqrt();
-        // 600 s resolve 1.7 mHz, and the sines are 4.4 mHz apart on average, so that they overlap little: the error is
-        // a few per cent
+        // a record of 600 s resolves 1.7 mHz, and the sines are 4.4 mHz apart on average, so that they overlap little:
+        // the error of the root mean square is a few per cent
         assert!((rms / 0.05 - 1.0).abs() < 0.05, "{rms}");
         let loud = Noise::new(0.13, (1.25, 3.5), 0.0, 3, 0.26);
         let tau = samples(&loud, 100.0, 0.05);
@@ -143,8 +144,9 @@ mod tests {
                 })
                 .sum::<f64>()
         };
-        // from the octave 1 to 2 Hz to the octave 2 to 4 Hz the power of white noise doubles, of pink noise stays the
-        // same, of brown noise halves; the random frequencies within the cells cause an error
+        // from the octave 1 to 2 Hz to the octave 2 to 4 Hz the power of white noise doubles, the power of pink
+        // noise is unchanged, and the power of brown noise halves; the frequencies are random within the cells,
+        // which causes an error
         for (exponent, ratio) in [(0.0, 2.0), (-1.0, 1.0), (-2.0, 0.5)] {
             let found = power(exponent, (2.0, 3.99)) / power(exponent, (1.01, 2.0));
             assert!((found / ratio - 1.0).abs() < 0.1, "exponent {exponent}: {found}");

@@ -48,7 +48,7 @@ fn replayed_input_gives_the_reference_result() {
         for (name, difference) in differences(&answer, &reference) {
             // the README.md of each example states this figure; the default tolerance is 1e-8
             assert!(difference < 1e-6, "{}, {name}: {difference:e}", example.model);
-            // no difference is divided by a value that consists of rounding errors
+            // the divisor is not so small that it consists of rounding errors
             let largest =
                 reference.column(&name).unwrap().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             assert!(largest == 0.0 || largest > 1e-6, "{}, {name}: {largest:e}", example.model);
@@ -81,7 +81,7 @@ fn the_example_replayed_with_held_torque_is_as_close_to_the_reference_as_its_rea
     let input = folder(example).join(example.input());
     let answer = example::replay(&fmu, &input, None, true).unwrap();
     let all = differences(&answer, &reference(example));
-    // outputs that do not jump when the hub stops; a delay of 10 ms at 2 Hz changes them by 2 pi
+    // these outputs do not jump when the hub stops; a delay of 10 ms at 2 Hz changes them by 2 pi
     // 2 0.01 = 0.13
     let smooth = ["theta", "omega", "slosh_angle", "slosh_rate"];
     let smooth = all.iter().filter(|(name, _)| smooth.contains(&name.as_str()));
@@ -94,7 +94,8 @@ fn committed_files_of_the_examples_equal_the_files_that_hubslosh_example_writes(
     for example in &EXAMPLES {
         let made = tempfile::tempdir().unwrap();
         example.write(&packed(example), made.path()).unwrap();
-        // the last digits of the reference may change; its values are compared above
+        // the file of the reference result is not compared, because its last digits may change; its
+        // values are compared above
         for name in [example.input(), example.options()] {
             let made = std::fs::read_to_string(made.path().join(&name)).unwrap();
             let committed = std::fs::read_to_string(folder(example).join(&name)).unwrap();

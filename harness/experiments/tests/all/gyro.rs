@@ -20,8 +20,8 @@ fn simulated_random_walk_and_bias_instability_are_estimated() {
     for (specified, settings, hours) in [(bench, &[][..], 2.0), (other, &set[..], 1.0)] {
         let found = recording(hours, 4, settings).characterise(&fmu, &|_| {}).unwrap();
         assert_eq!(found.specified, specified);
-        // Standard errors: N 0.1 %; B sqrt(bias_time/(2 x 4 records x hours)) = 4 and 3 %. The limits for the
-        // gyro are 5 and 20 %.
+        // Standard errors: 0.1 % of N, and sqrt(bias_time/(2 x 4 records x hours)) = 4 and 3 % of B. The
+        // limits for the gyro are 5 and 20 %.
         let deviation = |found: f64, specified: f64| (found / specified - 1.0).abs();
         assert!(deviation(found.fit.noise.arw, specified.arw) < 0.05, "{}", found.text());
         let bias = deviation(found.fit.noise.bias_instability, specified.bias_instability);

@@ -131,10 +131,10 @@ fn a_camera_measures_a_tilted_plane_if_the_liquid_is_at_rest_on_a_tilted_bench()
     let set: Vec<_> = set.into_iter().chain([("slosh.model", "spherical")]).collect();
     let table = record(&set, &sensors, &["g_axial"], 20.0);
     let last = |name: &str| *column(&table, name).last().unwrap();
-    // ten modes leave 2e-6 of the plane, because Σ 8/(ξ²(ξ²−1)) = 1 is truncated; the angles differ from their sines by the third
-    // power of the tilt
+    // with ten modes 2e-6 of the plane is missing, because the sum Σ 8/(ξ²(ξ²−1)) = 1 is truncated; the angles differ from their
+    // sines by the third power of the tilt
     assert!((last("view.plane_radial") / rise - 1.0).abs() < 3e-4, "{}", last("view.plane_radial"));
-    // at the wall the truncated sum Σ 2/(ξ²−1) = 1 leaves 2 %
+    // at the wall 2 % of the height is missing, because the sum Σ 2/(ξ²−1) = 1 is truncated
     assert!((last("low") / rise - 1.0).abs() < 0.025, "{}", last("low"));
     // hydrostatic pressure with the lateral specific force: ρ (g (h − z) + g tan(tilt) R); the modes that are left out contribute
     // nothing at the wall
@@ -163,7 +163,7 @@ fn sensors_have_the_requested_noise_bias_scale_quantisation_rate_and_delay() {
         let [read, truth] = ["s", "t"].map(|name| column(&table, &format!("{name}{channel}")));
         let mut errors = Vec::new();
         for row in 0..table.rows() {
-            // every second row, three rows late
+            // a sample is taken in every second row, and its reading arrives three rows later
             let arrives = row >= 3 && (row - 3) % 2 == 0;
             assert_eq!(!read[row].is_nan(), arrives, "{kind}: row {row}");
             if arrives {
@@ -202,7 +202,8 @@ fn noise_does_not_depend_on_other_sensors_and_differs_between_sensors_seeds_and_
     assert_ne!(column(&two, "c"), column(&two, "b"));
 }
 
-/// The sensor has 10 Hz in rows at 50 Hz. Rows without a reading are empty in CSV and null in Parquet.
+/// The sensor takes 10 samples a second in a run with 50 rows a second. Rows without a reading are empty in CSV
+/// and null in Parquet.
 #[test]
 fn missing_readings_are_missing_in_files() {
     let table = record(&[], &["s=encoder:rate=10,noise=1e-3"], &["omega"], 1.0);

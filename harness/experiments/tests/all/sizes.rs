@@ -77,7 +77,7 @@ fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last
         let moves = found.column(name).unwrap().iter().any(|x| x.abs() > 1e-6);
         assert!(moves, "{scalar}");
     }
-    // the table of a run describes itself: the size, the settings, and the start values of everything else
+    // the metadata of a run's table contain the size, the settings, and the start values of everything else
     let all = parameters(arrays.description(), &set, &[]);
     let of = |name: &str| all.get(name).map(String::as_str);
     assert_eq!((of("tanks"), of("tank.modes[2]")), (Some("2"), Some("2")));

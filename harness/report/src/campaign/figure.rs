@@ -209,7 +209,8 @@ pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
         (low, (high - low).max(1e-300))
     };
     let ((x0, w), (y0, h)) = (span(&|p| place(p.0)), span(&|p| p.1));
-    // Sized for 2000 by 400 px instead of the usual size, because readers may zoom into a narrow resonance.
+    // Curves are thinned for a plot of 2000 by 400 px, which is larger than usual, because readers may zoom
+    // into a narrow resonance.
     let scaled: Vec<(f64, f64)> =
         points.iter().map(|p| (2000.0 * (place(p.0) - x0) / w, 400.0 * (p.1 - y0) / h)).collect();
     let mut kept = simplified(&scaled, 0.4).into_iter().peekable();

@@ -77,7 +77,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             untrusted.extend(doubt.map(|doubt| format!("{} ({doubt})", run.case.name)));
         }
     }
-    // Groups with equal parameters have the same exact response.
+    // Groups with equal parameters have the same exact response, which is drawn only once.
     let mut drawn: Vec<Vec<(f64, f64)>> = Vec::new();
     for group in &page.groups {
         for get in [|f: &Features| f.f_dip, |f: &Features| f.f_res] {
@@ -253,7 +253,7 @@ pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
 }
 
 pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
-    // For recordings these figures come from rates and are drawn by `cross_axis`.
+    // The cross-axis figures of recordings come from the rates, and `cross_axis` plots them.
     let share = |run: &Outcome| run.off_axis().filter(|_| !run.is_recording());
     small(
         page,

@@ -187,7 +187,8 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
         .enumerate()
         .filter(|(_, name)| grouping.contains(name) && *name != axis)
         .filter(|(_, name)| ![slosh::MODEL, tank::H].contains(name))
-        // A single recording needs no such label, because no other recording differs from it.
+        // A single recording needs no label with its varied values, because no other
+        // recording differs from it.
         .filter(|(i, _)| !recorded || differs(*i))
         .filter_map(|(i, name)| Some((i, Varied::new(name, fmu, &results.outcomes)?)))
         .collect();

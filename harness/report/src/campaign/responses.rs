@@ -21,7 +21,8 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             None => (page.name(run), "solid"),
         };
         traces.extend(bode(&name, &color, dash, &estimate.response));
-        // The intervals of all curves would cover each other.
+        // Only the first and the last curve have an interval, because the intervals of all curves
+        // would cover each other.
         if i == 0 || i + 1 == runs.len() {
             traces.extend(intervals(&name, &color, estimate));
         }
@@ -83,8 +84,8 @@ fn bode(
 /// Draws the band of two standard deviations around a response. Draws nothing where the band would be as
 /// narrow as the line.
 fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
-    /// Smallest half-width of a band that is visible, dB, and the largest half-width that is drawn, as the standard
-    /// deviation of ln |H|.
+    /// Smallest half-width of an uncertainty band that is visible, dB, and the largest half-width that is drawn, as
+    /// the standard deviation of ln |H|.
     const SEEN: f64 = 0.2;
     const WIDEST: f64 = 0.5;
     let decibel = 20.0 / std::f64::consts::LN_10;

@@ -104,7 +104,8 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
         plants.dedup();
         plants.len() > 1
     };
-    // the reference: the linear runs of the same plant, otherwise the exact linear plant
+    // the results of nonlinear models are compared with the linear runs of the same plant or, without such
+    // runs, with the exact linear plant
     let measured = |own: &Series| {
         series.iter().find(|s| s.model == SloshModel::Linear.name() && s.plant == own.plant)
     };
@@ -221,13 +222,13 @@ fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> 
                 let low = values.iter().copied().fold(f64::MAX, f64::min);
                 let high = values.iter().copied().fold(f64::MIN, f64::max);
                 Some(match high - low < 5e-3 * high {
-                    // values that hardly change
+                    // the feature hardly changes over the axis
                     true => format!(
                         "stays within {} mHz of {:.3} Hz",
                         format_two_digits(500.0 * (high - low)),
                         (low + high) / 2.0
                     ),
-                    // values that increase or decrease from one end to the other
+                    // the feature increases or decreases from one end of the axis to the other
                     false if (last - first).abs() > 0.9 * (high - low) => {
                         format!("moves from {first:.3} to {last:.3} Hz")
                     }

@@ -37,7 +37,8 @@ impl Thinning {
     pub fn too_few(&self, columns: &[&[f64]]) -> Option<f64> {
         let frames = |column: &&[f64]| {
             let (low, high) = range(column.iter().copied());
-            // with hysteresis, so that noise does not count as oscillation
+            // crossings of the middle are counted with hysteresis, so that noise does
+            // not count as oscillation
             let (mut above, mut crossings) = (column[0] > 0.5 * (low + high), 0usize);
             for value in column.iter() {
                 let middle = 0.5 * (low + high) + if above { -0.1 } else { 0.1 } * (high - low);

@@ -286,7 +286,8 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             level = drawing.level(m_liq);
             bottom = lowest(&drawing.outline);
             match drawing.outline {
-                // the first side, for which `hubslosh tank` computes the modes, is the tangential one
+                // `hubslosh tank` computes the modes along the first side of a box, which is the tangential
+                // side on the bench
                 Outline::Box([a, b, low, high]) => Outline::Box([b, a, low, high]),
                 Outline::Revolved(_) => drawing.outline.clone(),
             }
@@ -358,7 +359,8 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         }
         radius = mode_radius(&modes[0]);
         level = fill.level(m_liq);
-        // the lowest fill is that of a cylinder: the liquid's centre is half-way between bottom and surface
+        // the lowest fill is treated as the fill of a cylinder: the liquid's centre is half-way
+        // between bottom and surface
         let first = fill.levels[0];
         let part = fill.levels[1];
         bottom = first[1] - (part[1] - first[1]) * first[0] / (part[0] - first[0]);

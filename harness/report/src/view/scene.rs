@@ -194,8 +194,9 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     (geometry, reach)
 }
 
-/// Returns the scene of a tank on the host's craft, whose centre is the middle of the tank, with the point O
-/// and the arrows there, and the radius that contains the scene, m.
+/// Returns the scene of a tank on the craft that carries it. The centre of the craft is the middle of
+/// the tank; the scene contains the point O and the arrows there. Also returns the radius that
+/// contains the scene, m.
 fn host_tank_scene(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let [middle, half] = tank.middle_and_extent();
     let [x, y, z] = tank.position;
