@@ -8,7 +8,8 @@ fn main() {
     println!("cargo::rerun-if-changed=src/host_state.c");
     let mut build = cc::Build::new();
     build.file("src/logger.c").file("src/host_state.c");
-    // cc asks the compiler for its version once. For macOS zig then leaves an empty a.o in the current folder.
+    // cc asks the compiler for its version once. If the compiler is zig, with macOS as the target, this leaves an
+    // empty a.o in the current folder.
     let here = env::current_dir().expect("Cargo sets the current folder");
     env::set_current_dir(env::var_os("OUT_DIR").expect("Cargo sets OUT_DIR")).expect("it exists");
     build.get_compiler();

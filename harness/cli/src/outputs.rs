@@ -47,7 +47,7 @@ const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat",
 pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let Some(command) = command.find_subcommand(name) else { return Ok(()) };
-    // The subcommands of `identify` have its options.
+    // `identify` has subcommands, which share its entries in the list of outputs.
     let (command, matches) = match matches.subcommand() {
         Some((kind, matches)) => (command.find_subcommand(kind).unwrap_or(command), matches),
         None => (command, matches),
@@ -105,7 +105,7 @@ fn protect(path: &Path) {
     if path.extension().is_none_or(|ending| ending != "toml") || !path.is_file() {
         return;
     }
-    // The command itself reports what is wrong with the file.
+    // If the file cannot be read, nothing is protected here, and the command itself reports what is wrong.
     let read = input::text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut values: Vec<toml::Value> = read.into_iter().map(toml::Value::Table).collect();

@@ -47,7 +47,7 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
         exact <= ROWS as f64,
         "{span:?} s in steps of {step:?} s are {exact:.3e} steps (allowed: at most {ROWS})"
     );
-    // 2700 s / 0.02 s is 135000 steps, even if the quotient is rounded.
+    // 2700 s / 0.02 s counts as 135000 steps, although the quotient may have a rounding error.
     let whole = (exact - exact.round()).abs() < 1e-6;
     Ok(if whole { exact.round() } else { exact.ceil() } as usize)
 }

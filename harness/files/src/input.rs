@@ -18,7 +18,7 @@ use crate::budget;
 /// If the file cannot be opened or is not a regular file. The message does not repeat the path.
 pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
-    // This is checked before `File::open`, which would wait until somebody writes to a named pipe.
+    // The kind of the file is checked before `File::open`, which would wait until somebody writes to a named pipe.
     if !kind.is_file() {
         bail!("the path is {} (allowed: a regular file)", file_kind(&kind));
     }
@@ -160,8 +160,8 @@ pub fn check_replaceable(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// The system may give the file number of a deleted input to a new file. This new file may be
-    /// overwritten.
+    /// The file system may give the file number of a deleted input to a new file. This new file is not the input,
+    /// and may be overwritten.
     #[cfg(unix)]
     #[test]
     fn a_new_file_is_never_taken_for_a_deleted_input() {

@@ -38,7 +38,8 @@ pub fn destination(path: &Path) -> Result<Destination> {
             });
         }
         let folder = containing_folder(&place).to_path_buf();
-        // These links open a descriptor. Their text names a pipe, or a file that another program is writing.
+        // Links below /proc open a descriptor. The text of such a link names a pipe, or a file that
+        // another program is writing.
         if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
             return Ok(Destination::Stream);
         }
@@ -90,7 +91,7 @@ pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     let move_or_pour = || -> Result<()> {
         match destination(path)? {
             Destination::File(place) => match fs::rename(draft, &place) {
-                // The link leads to another disk, so that the file must be copied.
+                // The destination is on another disk, to which a file cannot be renamed, so that it is copied.
                 Err(error) if error.kind() == ErrorKind::CrossesDevices => {
                     atomically(&place, |file| Ok(io::copy(&mut File::open(draft)?, file)?))?;
                     Ok(fs::remove_file(draft)?)
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn sha_256_equals_the_example_of_the_standard() {
-        // the example with one block in FIPS 180-4
+        // the one-block example of FIPS 180-4
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), expected);
         assert_eq!(hash_reader(&b"abc"[..]).unwrap(), expected);

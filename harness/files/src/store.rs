@@ -96,7 +96,8 @@ pub enum Damage {
     Unreadable(anyhow::Error),
 }
 
-/// Text of a definition, and a function that fails if another text, which is in the folder, defines other runs.
+/// The text of a definition, and a function that compares it with the text in the folder. The function fails if that
+/// text defines other runs.
 #[derive(Clone, Copy)]
 pub struct Definition<'a> {
     pub text: &'a str,
@@ -363,7 +364,7 @@ impl Store {
     pub fn publish(self, files: Vec<(&str, Vec<u8>)>) -> Result<()> {
         for (name, bytes) in &files {
             let place = self.path.join(name);
-            // A plan that is executed from its own place in the folder is not written again.
+            // If a plan is executed from its own place in the folder, the file is already there and is not written again.
             if !input::bytes(&place).is_ok_and(|there| there == *bytes) {
                 input::check_replaceable(&place)?;
             }
@@ -423,7 +424,7 @@ impl Store {
         let place = place.with_context(|| format!("{name} is closed, or could not be written"))?;
         let added = place.write_all(line.as_bytes()).and_then(|()| place.sync_data());
         if added.is_err() {
-            // An incomplete line must stay the last line.
+            // No further line is written, because an incomplete line must be the last one.
             manifest.file = None;
         }
         added.with_context(|| format!("{name} cannot be written"))?;
@@ -434,7 +435,7 @@ impl Store {
 
 impl Drop for Store {
     fn drop(&mut self) {
-        // A forked process also has the store, which belongs to the process that locked it.
+        // After a fork, the child also has the store, but the folder belongs to the process that locked it.
         if std::process::id() == self.process {
             let _ = fs::remove_dir_all(&self.unfinished);
         }
@@ -539,7 +540,7 @@ mod tests {
             }
             fs::write(&path, "2").unwrap();
             assert!(folder.check_text("b").is_ok());
-            // a run of another program, which is verified from now on
+            // a run that another program has stored, and that is verified from now on
             let other = directory.path().join(kind.run_file("c"));
             fs::write(&other, "other").unwrap();
             assert!(matches!(folder.read("c"), Err(Damage::Unlisted)));

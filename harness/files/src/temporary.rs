@@ -97,7 +97,8 @@ impl Folder {
             // The file is locked before it gets its name, so that no other program finds it unlocked.
             let draft = directory.path().join("draft");
             let alive = File::create(&draft)?;
-            // On a system without locks, no other program can take this folder for an abandoned one either.
+            // On a system without locks the call fails. No other program can lock the file of this folder either, so
+            // that none removes the folder as abandoned.
             let _ = alive.try_lock();
             fs::rename(&draft, directory.path().join(ALIVE))?;
             let files = directory.path().join(FILES);

@@ -79,7 +79,8 @@ pub struct Archive {
     file: File,
     /// Entries in the order of the zip directory, with repeated names, up to the first fault.
     pub entries: Vec<Entry>,
-    /// Error in the directory, or the limit that is exceeded. If there is a fault, no file of the archive should be unpacked.
+    /// Error in the zip directory, or the limit that the archive exceeds. If there is a fault, no file of the
+    /// archive should be unpacked.
     pub fault: Option<String>,
 }
 
@@ -161,7 +162,7 @@ impl Archive {
                 bail!("{name}: {why} (allowed: files and folders with relative names)");
             }
             let Some(other) = places.insert(place(&entry.name), entry) else { continue };
-            // Two entries for one folder overwrite no file.
+            // Two entries for one folder do no harm, because no file is overwritten.
             if entry.is_folder() && other.is_folder() {
                 continue;
             }
@@ -178,7 +179,7 @@ impl Archive {
     ///
     /// # Errors
     ///
-    /// If size or checksum differ from those in its header.
+    /// If its size or checksum differs from the size or checksum in its header.
     pub fn copy(&self, entry: &Entry, to: &mut impl Write) -> Result<()> {
         let said = entry.zip.size();
         if entry.name == DESCRIPTION {

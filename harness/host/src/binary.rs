@@ -176,10 +176,10 @@ impl Binary {
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
     }
 
-    /// Returns a sentence with the exports that are not functions of FMI, or `None` if there are none.
+    /// Returns a sentence that names the exported functions that do not belong to FMI, or `None` if there are none.
     pub fn surplus(&self) -> Option<String> {
-        // On macOS further exports do no harm, because a name is bound to the library from which it comes; and the
-        // linker for macOS exports some of Rust's names when it runs on other systems. One library may serve several
+        // On macOS further exports are allowed: they do no harm, because a name is bound to the library from which it comes,
+        // and the linker for macOS exports some of Rust's names when it runs on other systems. One library may serve several
         // versions of FMI (FMI 3.0.2, section 2.5).
         let own = |name: &&str| name.starts_with("fmi2") || name.starts_with("fmi3");
         let others = || self.exports.iter().map(String::as_str).filter(|name| !own(name));
@@ -359,7 +359,7 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
         if !is(0, SIGNATURE) {
             return None;
         }
-        // a magic number, a length and a count, then the type and the offset of each blob
+        // the signature has a magic number, a length and a count, followed by the type and the offset of each blob
         let directory =
             (0..number(8)?).filter_map(|i| number(16 + 8 * i)).find(|at| is(*at, DIRECTORY))?;
         let hashes = directory + number(directory + 16)?;
@@ -394,7 +394,7 @@ pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     let mut head = vec![macho::FAT_MAGIC, parts.len() as u32];
     let mut body = vec![0; page];
     for part in parts {
-        // In a Mach-O file type and subtype of the processor follow the magic number.
+        // In a Mach-O file the type and the subtype of the processor follow the magic number.
         let number = |at: usize| -> Option<u32> {
             Some(u32::from_le_bytes(part.get(at..at + 4)?.try_into().ok()?))
         };

@@ -331,7 +331,7 @@ pub(crate) fn load(
     identifier: &str,
 ) -> Result<Loaded> {
     let name = name.display();
-    // A library outside the archive would not be part of the FMU.
+    // The identifier must not be a path, because a library outside the archive would not be part of the FMU.
     if identifier.contains(['/', '\\', ':', '\0']) {
         bail!(
             "the FMU {name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \

@@ -808,7 +808,7 @@ impl ModelDescription {
     ) -> Result<f64> {
         let (name, own) = (&variable.name, self.unit(variable));
         let known = self.units.iter().find(|unit| unit.name == own).and_then(|unit| unit.base);
-        // A variable without a unit is a dimensionless number.
+        // A variable without a unit is treated as a dimensionless number.
         let plain = BaseUnit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
         let known = if own.is_empty() { Some(plain) } else { known };
         let Some(known) = known else {

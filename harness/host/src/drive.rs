@@ -25,8 +25,8 @@ pub struct Inputs {
 /// Relative tolerance of the host's solver in Model Exchange, if neither the user nor the default
 /// experiment gives one.
 const TOLERANCE: f64 = 1e-6;
-/// Deviation of an input from the value that its slope predicts, relative to its magnitude, above which the input
-/// jumps. A jump is an event.
+/// Deviation of an input from the value that its last slope predicts, relative to its magnitude, above which the input
+/// counts as discontinuous. A jump of an input is an event.
 const JUMP: f64 = 1e-9;
 
 /// The inputs between two communication points: value and slope of each input, in the order of [`Inputs`].
@@ -110,8 +110,8 @@ impl Inputs {
         Ok(())
     }
 
-    /// Simulates as [`Inputs::drive`] does, but in Model Exchange. An input that deviates from its slope, and a change
-    /// of an input that is not a Real, are events.
+    /// Simulates as [`Inputs::drive`] does, but in Model Exchange. A Real input that deviates from the line of its
+    /// last slope causes an event, and so does every change of another input.
     fn integrate<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,

@@ -234,7 +234,8 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             let (mut to, mut x_to) = (if ends_row { limit } else { t + h }, new.clone());
             let crossed = self.crosses(to, &x_to)?;
             if crossed {
-                // the last fraction of the step before the sign change, and the first after it
+                // the sign change is between these fractions of the step: the last one with the old sign, and the first
+                // one with the new sign
                 let (mut before, mut after) = (0.0, 1.0);
                 while after - before > LOCATED {
                     let middle = 0.5 * (before + after);
@@ -251,7 +252,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             self.go_to(to, &x_to)?;
             (self.t, self.x) = (to, x_to);
             let grown = h * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
-            // A step that was shortened to end at a point is no reason to shorten the next step.
+            // If a step was shortened only to end at a given time, the length of the next step does not follow from it.
             self.h = match crossed || h < self.h {
                 true => self.h.max(grown),
                 false => grown,

@@ -95,8 +95,8 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.binary_hash())
     }
 
-    /// Lists the parts of the process state that loading the binary has changed, for example the rounding
-    /// mode.
+    /// Lists the parts of the process state, for example the rounding mode, that have changed while
+    /// the binary was loaded.
     pub fn changed(&self) -> &[&'static str] {
         each!(Fmu, self, fmu => fmu.changed())
     }

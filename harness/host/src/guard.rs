@@ -152,7 +152,7 @@ pub fn run<A: AsRef<OsStr>>(
     let floods = || readers.iter().any(|reader| lock(&reader.printed).more > flood);
     let cause = wait_for_end(child, &mut news, started, limits, &files, &floods)?;
     let printed = readers.map(|reader| {
-        // A process that was not found may keep the pipe open.
+        // A process that was not found, and therefore not killed, may keep the pipe open.
         let _ = reader.end.recv_timeout(Duration::from_millis(500));
         let printed = lock(&reader.printed);
         if shown && printed.more > 0 {
@@ -172,7 +172,7 @@ fn wait_for_end(
     files: &Path,
     floods: &dyn Fn() -> bool,
 ) -> Result<Cause> {
-    // A process sends a sign of life four times a second, but not while it is stopped.
+    // The process sends a sign of life four times a second, unless it is stopped. A longer silence counts as an endless call.
     let silence = limits.call.max(Duration::from_secs(3));
     let (mut done_at, mut closed_at) = (None, None);
     let mut counted_at = started;
@@ -183,7 +183,7 @@ fn wait_for_end(
         pause = (pause * 2).min(Duration::from_millis(10));
         let now = Instant::now();
         if news.done.is_some() {
-            // Only the end of the program is still to come.
+            // After this message the process has only to end.
             if now - *done_at.get_or_insert(now) > Duration::from_secs(2) {
                 break;
             }
@@ -227,7 +227,7 @@ fn wait_for_end(
     Ok(panic.or(cause).unwrap_or(Cause::Ended(status)))
 }
 
-/// Longest time that a process may run after its connection to the parent has ended. Then it is killed.
+/// Longest time that a process may still run after it has closed its connection to the parent. Afterwards the parent kills it.
 const CLOSED: Duration = Duration::from_secs(1);
 
 const COUNTING: Duration = Duration::from_millis(50);
@@ -241,7 +241,7 @@ fn disk_usage(folder: &Path) -> u64 {
             if entries > COUNTED {
                 return u64::MAX;
             }
-            // the size of the link, not of its target
+            // the metadata of a link are its own, and not the metadata of its target
             match entry.metadata() {
                 Ok(found) if found.is_dir() => folders.push(entry.path()),
                 Ok(found) => bytes += size_on_disk(&found),
@@ -279,7 +279,7 @@ fn shared_memory(id: u32) -> u64 {
         let found = is_hidden(name.to_str()?).then(|| std::fs::metadata(entry.path()))?.ok()?;
         Some((identity(&found), size_on_disk(&found)))
     });
-    // A file that is open twice counts once.
+    // A file that is open under two descriptors counts once.
     let hidden: std::collections::BTreeMap<_, u64> = hidden.collect();
     mapped.max(hidden.values().sum())
 }
@@ -398,7 +398,7 @@ struct Messages<F> {
     done: Option<u8>,
 }
 
-// Kinds of messages.
+// Kinds of messages from the process to its parent.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
 /// Kind of the message that the first binary is going to be loaded. The content is the size of the temporary files, bytes.
@@ -656,7 +656,7 @@ pub(crate) fn before_loading() {
             use rustix::process::Resource;
             let memory = guarded.limits.memory;
             restrict(Resource::Data, memory_in_use("VmData:").saturating_add(memory));
-            // Shared memory does not count as data. Each thread reserves more memory than it uses.
+            // Shared memory does not count as data of the process. Each thread reserves more memory than it uses.
             let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
             let reserved = (1 << 30) + (threads << 27);
             restrict(Resource::As, memory_in_use("VmSize:").saturating_add(memory + reserved));

@@ -218,7 +218,7 @@ fn from_json(text: &str) -> Result<ParameterSet> {
     let none = "it is not a result of `hubslosh identify` with parameters of an FMU";
     let found: Identified = serde_json::from_str(text).map_err(|why| match why.classify() {
         Category::Eof => anyhow!("{none}: the file ends too early, in line {}", why.line()),
-        // The message of the library describes Rust types, which says nothing to a user.
+        // The library's message about wrong types describes types of Rust, which a user does not know.
         Category::Data if why.to_string().contains("expected ") => anyhow!(none),
         _ => anyhow!("{none}: {why}"),
     })?;

@@ -2,7 +2,7 @@
 //! The binary of the FMU stays the same: it reads the array sizes from the GUID, and start values other than its own
 //! from a file in the resources.
 //!
-//! The other half, with the format of the GUID and of the file, is `fmu/runtime/src/extent.rs`.
+//! `fmu/runtime/src/extent.rs` reads both in the FMU, and describes the formats of the GUID and of the file.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -275,19 +275,20 @@ mod tests {
                 (0.015, false),
                 (0.02, true),
                 (0.04, true),
-                // 3 · 0.02 is 0.06 plus one ulp
+                // in floating-point numbers, 3 · 0.02 is one ulp above 0.06
                 (0.06, true),
                 (0.07, true)
             ]
         );
         let rows = [0.0, 0.015, 0.02, 0.06, 0.07].map(|t| (t, true));
         assert_eq!(schedule((0.0, 0.07), None, &inputs), rows);
-        // before the inputs begin, and after their end
+        // values before the first row and after the last row of the inputs
         assert_eq!(
             schedule((-0.02, 0.01), Some(0.02), &[0.0, 0.005]),
             [(-0.02, true), (0.0, true), (0.005, false), (0.01, true)]
         );
-        // A row that differs from a row of an input by less than 1e-6 of a step is moved to it, not added.
+        // A row of the result that differs from a row of an input by less than 1e-6 of a step is moved to this row, instead of
+        // being an additional point.
         let near = [0.0, 0.02 + 1e-9, 0.04 - 1e-9, 0.06];
         let found = schedule((0.0, 0.06), Some(0.02), &near);
         assert_eq!(found, near.map(|t| (t, true)));
@@ -306,7 +307,7 @@ mod tests {
         assert_eq!(at(&lines(false), -1.0), (0.0, 0.0));
         assert_eq!(at(&lines(true), 2.9), (5.0, 0.0));
         assert_eq!(lines(false).held(), lines(true));
-        // 3 · 0.1 is one ulp above 0.3, and 1 - 0.9 is three ulps below 0.1.
+        // in floating-point numbers, 3 · 0.1 is one ulp above 0.3, and 1 - 0.9 is three ulps below 0.1
         assert_eq!(lines(true).near(1.0 - 1e-12), 5.0);
         let given = History::new(
             vec![0.0, 1.0, 2.0],

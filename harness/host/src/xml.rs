@@ -205,7 +205,7 @@ fn exceeded_budget(text: &str) -> Option<String> {
             longest_value = longest_value.max(value);
             false
         });
-        // The parser reports a tag without an end; here only the length of its names is checked.
+        // A tag without an end is reported by the parser; this function checks only the length of its names.
         let end = end.unwrap_or(rest.len().saturating_sub(1));
         depth += 1;
         elements += 1;
@@ -292,7 +292,8 @@ mod tests {
         assert_eq!(Element::unpack(&mut rest).as_ref(), Some(&root));
         assert!(rest.is_empty());
         assert_eq!(Element::unpack(&mut short), None);
-        // Four bytes at each position are overwritten, which gives a wrong length or a wrong line number.
+        // At each position four bytes are overwritten, which gives a wrong length or a wrong line number
+        // of the packed element.
         for at in 0..all.len() - 3 {
             let mut wrong = all.to_vec();
             wrong[at..at + 4].fill(0xff);

@@ -99,7 +99,8 @@ impl Model {
     fn at(&self, w: f64) -> Vec<Complex> {
         let (n, m) = (self.states, self.inputs);
         let s = point(w, self.period);
-        // sI − A, then B: real and imaginary parts in separate arrays, of which a processor computes several elements at once
+        // the matrices sI − A and B, with real and imaginary parts in separate arrays, of which a processor computes
+        // several elements at once
         let width = n + m;
         let mut rows = [vec![0.0; n * width], vec![0.0; n * width]];
         let [re, im] = &mut rows;
@@ -387,7 +388,7 @@ impl Shape {
     /// within `half` of `w`.
     fn at(&self, w: f64, half: f64) -> Logarithm {
         let s = point(w, self.period);
-        // ds/dω, and the distance by which s can move
+        // ds/dω, and the distance by which s can move within `half`
         let (along, reach) = match self.period {
             0.0 => (Complex::new(0.0, 1.0), half),
             period => (Complex::new(0.0, period) * s, half * period),
@@ -407,7 +408,7 @@ impl Shape {
                 let share = 1.0 / least;
                 let near = root.bends[0] * share * share;
                 bends[0] += near;
-                // The phase of a root on the axis changes linearly.
+                // The phase of a root on the axis changes linearly with the frequency.
                 bends[1] += near.min(root.bends[1] * share * share * share);
                 nearest = nearest.min(least);
                 if root.is_zero {
@@ -418,7 +419,7 @@ impl Shape {
                     sum -= inverse;
                 }
             }
-            // bound by the derivative on the line between zero and pole
+            // bound of the curvature from the derivative on the line between zero and pole
             let least = nearest - pair.half_gap;
             if least > 0.0 {
                 let both = pair.steep / (least * least * least);
@@ -532,7 +533,7 @@ impl Logarithm {
         }
         let (value, slope, bend) = match kind {
             Kind::Gain => (value[0], slope[0], curvature[0] * half),
-            // the phase of a negative or a positive real number
+            // a crossing can occur at the phase of a negative or of a positive real number
             Kind::Phase => {
                 let turns = value[1] / std::f64::consts::PI;
                 let value = (turns - turns.round()) * std::f64::consts::PI;
@@ -658,7 +659,7 @@ fn search(
         }
         before = Some((w, gain));
     }
-    // points at which the gain is real in any case
+    // frequencies at which the loop gain is real in any case
     let ends = [
         0.0,
         if model.period == 0.0 { f64::INFINITY } else { std::f64::consts::PI / model.period },
@@ -712,7 +713,7 @@ impl Model {
 
     fn unit_magnitudes(&self, nodes: &[f64]) -> Vec<(f64, f64, f64)> {
         let height = |values: &[Complex], i: usize| values[i].norm().max(1e-300).ln();
-        // No eigenvalue is larger than the largest sum of the magnitudes in a row, which is faster to compute.
+        // No eigenvalue is larger than the largest row sum of magnitudes, which takes less time to compute.
         let all: Vec<_> = nodes.iter().map(|w| (*w, self.at(*w))).collect();
         let is_small = |response: &[Complex]| {
             let mut rows = response.chunks_exact(self.inputs);

@@ -243,7 +243,7 @@ impl Feedback {
     pub fn turn(&mut self, fmu: &mut Instance, begin: f64, end: f64) -> Called<f64> {
         let Some(wheels) = &mut self.wheels else { return Ok(end) };
         for (h, slope) in wheels.momentum.iter_mut().zip(&mut wheels.slope) {
-            // as the FMU itself extrapolates its input over the step before
+            // the momentum is extrapolated in the same way as the FMU extrapolates its input over the preceding step
             *h += *slope * wheels.step;
             *slope = 0.0;
         }

@@ -281,7 +281,7 @@ fn jacobian(
     const BLOCK: usize = 8;
     let mut moves = |places: &[usize]| -> Called<bool> {
         let block: Vec<u32> = places.iter().map(|i| knowns[*i]).collect();
-        // The knowns have different weights, so that effects of opposite knowns do not cancel.
+        // Each known has another weight in this direction, so that the effects of two knowns with opposite effects do not cancel.
         let direction: Vec<f64> = (1..=block.len()).map(|n| (n as f64).sqrt()).collect();
         let all = instance.directional_derivative(unknowns, &block, &direction)?;
         Ok(all.iter().any(|x| *x != 0.0))

@@ -34,8 +34,8 @@ pub fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
     PyBuffer::get(array)?.to_vec(array.py())
 }
 
-/// A numpy array with `rows` rows of `width` numbers. Blocks of rows are copied to this value, so that Python's lock is
-/// needed only once for each block.
+/// A numpy array with `rows` rows of `width` numbers. Its rows are copied in blocks between the array and this value,
+/// so that Python's lock is needed only once for each block.
 pub struct Numbers {
     array: PyBuffer<f64>,
     width: usize,

@@ -79,7 +79,7 @@ const RUN_TIME: [RunTime; 4] = [
         origin: "Unwinding of panics, from zig's distribution; the text is its lib/libunwind/LICENSE.TXT",
     },
     RunTime {
-        // Zig links both libraries together when it builds for an old glibc.
+        // The mark of libunwind also stands for this library, because zig links both when it builds for an old glibc.
         mark: &backwards(*b"libunwind: "),
         name: "glibc-nonshared",
         licence: "LicenseRef-LGPL-2.1-or-later-with-unlimited-permission-to-link",
@@ -182,7 +182,7 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     while place < wanted.len() {
         let node = nodes.iter().find(|node| node.id == *wanted[place]);
         for dependency in node.into_iter().flat_map(|node| &node.deps) {
-            // without dependencies of tests and build scripts
+            // dependencies of tests and of build scripts are left out, because they are not linked
             let linked = dependency.dep_kinds.iter().any(|d| d.kind == DependencyKind::Normal);
             if linked && !wanted.contains(&&dependency.pkg) {
                 wanted.push(&dependency.pkg);
@@ -237,7 +237,7 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     let mut all = BTreeSet::new();
     let places = bytes.windows(BEFORE.len()).enumerate().filter(|(_, w)| *w == BEFORE);
     for (place, _) in places {
-        // a path separator of this system or of the target's system on either side
+        // on either side of the path is a path separator, of this system or of the target's system
         let separator = |b: &u8| b"/\\".contains(b);
         let Some((first, rest)) = bytes[place + BEFORE.len()..].split_first() else { continue };
         let of_a_name = |b: &u8| b.is_ascii_alphanumeric() || b"-_.+".contains(b);
@@ -479,7 +479,8 @@ mod tests {
         assert!(error.contains("new-thing-1.0.0"), "{error}");
     }
 
-    /// The program that searches binaries for paths of crates itself contains beginnings of such paths.
+    /// This program contains the beginnings of the paths for which it searches binaries. It must not
+    /// find them in itself.
     #[test]
     fn the_search_for_linked_crates_does_not_find_its_own_list_of_names() {
         for words in [
@@ -493,7 +494,8 @@ mod tests {
         }
     }
 
-    /// The program that searches binaries for marks of run-time libraries contains these marks only reversed.
+    /// This program searches binaries for marks of run-time libraries, and contains these marks only reversed, so that
+    /// it does not find them in itself.
     #[test]
     fn this_program_is_not_mistaken_for_one_that_links_a_run_time_library() {
         let this = crate::archive::read(&std::env::current_exe().unwrap()).unwrap();

@@ -89,7 +89,7 @@ fn published(page: &str) -> String {
             }
             _ => continue,
         };
-        // The last "](…" in the range belongs to this link, because links inside it end earlier.
+        // The last "](…" in the range of the link is its own, because links inside the text of the link end earlier.
         let written = format!("]({to}");
         if !to.contains("://")
             && !to.starts_with('#')

@@ -197,7 +197,8 @@ impl Toolchain {
             Ok(String::from_utf8_lossy(&said.stdout).trim().into())
         };
         let sysroot = PathBuf::from(rustc(&["--print", "sysroot"])?);
-        // "rustc 1.95.0 (…)": only the standard library of this version compiles with it.
+        // the output is "rustc 1.95.0 (…)"; only the standard library of this version can be
+        // compiled with this compiler
         let version = rustc(&["--version"])?;
         let version = version.split_whitespace().nth(1).unwrap_or_default();
         let source = [
@@ -357,8 +358,8 @@ mod tests {
     use super::*;
     use crate::fmi::Fmi;
 
-    /// Every platform that is built has a folder in the FMU. Without a folder its binary would silently be
-    /// missing in the archive.
+    /// Every platform for which binaries are built has a folder in the FMU. A binary without a folder would be missing
+    /// in the archive without any error.
     #[test]
     fn every_platform_has_its_folder_in_an_fmu() {
         for platform in &PLATFORMS {

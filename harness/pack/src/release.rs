@@ -179,8 +179,8 @@ pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
 mod tests {
     use super::*;
 
-    /// Packing version n removes the files of version n − 1 from the folder. SHA256SUMS.all keeps the hashes of files
-    /// that are published elsewhere.
+    /// A release of version n removes the files of version n − 1 from the folder. SHA256SUMS.all keeps the hashes of
+    /// files that are published elsewhere.
     #[test]
     fn a_release_replaces_the_files_of_the_last_one_and_keeps_their_hashes() {
         let folder = tempfile::tempdir().unwrap();

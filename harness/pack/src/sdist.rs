@@ -29,7 +29,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     let files = files()?;
     output::directory(folder)?;
     output::atomically(&out, |file| {
-        // Without name and time in the header of gzip.
+        // The header of gzip contains neither a name nor a time, so that equal files give equal bytes.
         let mut archive = Builder::new(GzEncoder::new(file, Compression::best()));
         for (path, bytes) in &files {
             let mut header = Header::new_ustar();
@@ -56,7 +56,7 @@ fn files() -> Result<Files> {
     ensure!(said.status.success(), "git does not list the files of the source: {}", why.trim());
     let mut files = Files::new();
     for name in String::from_utf8(said.stdout)?.split('\0').filter(|name| !name.is_empty()) {
-        // Deleted in the working tree, but still in git's index.
+        // A file that is deleted in the working tree may still be in git's index.
         let path = root().join(name);
         if !name.starts_with("dist/") && !name.starts_with(".git") && path.is_file() {
             files.push((name.into(), read(&path)?));

@@ -137,7 +137,8 @@ fn cross_build_binaries(
         let bytes = toolchain.build(product, platform, target)?;
         let mut binary = Binary::read(&bytes).context(target.triple)?;
         if matches!(product, Product::Native) {
-            // python3.dll need not be part of every system, because Python itself has loaded it.
+            // The wheel may need python3.dll, although it is not part of every system, because Python
+            // itself has loaded it.
             binary.libraries.retain(|library| library != "python3.dll");
         }
         let found = binary.loading_faults_for(&[target.architecture]);
@@ -204,7 +205,7 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
             [format!("manylinux_{major}_{minor}_{machine}")].into_iter().chain(older).collect()
         }
         Kind::Windows => vec!["win_amd64".into()],
-        // From macOS 11 on the second number of a version does not denote a release.
+        // For macOS 11 and later, only the first number of the version denotes a release.
         Kind::MacOs => vec![format!("macosx_{}_0_{architecture}", needed(MACOS).0)],
     })
 }

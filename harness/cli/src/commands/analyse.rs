@@ -98,7 +98,7 @@ impl AnalyseArgs {
         for path in &self.recordings {
             let (name, columns) = (path.display(), self.columns.clone());
             let recorded = Recorded { path: path.clone(), columns };
-            // Changes to the recording are not printed here, because its analysis prints them.
+            // The messages about changes to the recording are discarded, because its analysis prints them later.
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
             ensure!(
                 each >= 1e-6,

@@ -177,7 +177,8 @@ impl AnyFmuArgs {
             outputs: names(&self.outputs),
             sensors: self.sensors.clone(),
             biases: read(&self.bias, &mut problems),
-            // The name of a triad, which precedes its sign of equality, contains commas.
+            // The name of a triad, which is the part before the equals sign, contains commas, so that items are
+            // not split at commas.
             triads: parsed(self.triad.iter().map(|text| text.parse()), &mut problems),
             drift: self.drift,
             solver: self.solver.solver,

@@ -198,7 +198,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter
         fmu.description().variables.iter().filter(|v| v.causality == Causality::Output).count();
     let jobs = budget::jobs(campaign.jobs, 0)?;
     let largest = rows.iter().max().copied().unwrap_or(0) * (columns + 20) * 8;
-    // memory for tables and their spectra, and for the data of each run that the report needs
+    // memory for tables and their spectra, and for the data of each run that the report keeps
     let kept = rows.len().min(CURVES) * (4 << 20) + rows.len() * (64 << 10);
     let jobs = jobs.min(rows.len());
     guard::allow((jobs * largest * 4 + kept) as u64 + jobs as u64 * courses);

@@ -246,7 +246,7 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     let peak = knots.iter().fold(0.0_f64, |peak, t| peak.max(wanted(*t).abs()));
     let mut lines = lines.cursor();
     for &t in knots.iter().filter(|t| **t <= time[time.len() - 1]) {
-        // An edge may lie one ulp before the row that it coincides with.
+        // An edge of the torque may lie one ulp before the row with the same time.
         let row = (t / STEP).round() * STEP;
         let made = lines.after(if (t - row).abs() < 1e-6 * STEP { row } else { t }).0;
         ensure!(
@@ -407,7 +407,7 @@ impl Plan {
         let head = if self.sweep.is_some() { "sweep %" } else { "" };
         println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std, noise", "std %");
         for (k, (name, value, deviation)) in self.bounds.iter().enumerate() {
-            // A standard deviation has no percentage of an expected value of 0.
+            // If the expected value is 0, the standard deviation cannot be given in per cent of it.
             let percent = |std: f64| match *value {
                 0.0 => "-".to_string(),
                 _ if !std.is_finite() => "-".to_string(),
@@ -455,7 +455,7 @@ impl DesignArgs {
         let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
         ensure!(0.0 < f0 && f0 < f1 && f1.is_finite(), "--band = {f0},{f1} (allowed: 0 < f0 < f1)");
         ensure!(snr.abs() <= 200.0, "--snr = {snr} (allowed: -200 to 200 dB)");
-        // Per sample: the sine's power Ω²/2 divided by the noise power, arw² times the sampling rate.
+        // Ratio in one sample: the power of the sine, Ω²/2, divided by the power of the noise, arw² times the sampling rate.
         let sigma = white_noise(real)?;
         let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
         let dry = real(friction::C)? + real(friction::D)?;

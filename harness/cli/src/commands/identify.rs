@@ -222,7 +222,7 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     let Some(place) = arguments.iter().position(|argument| argument == "identify") else {
         return Ok(arguments);
     };
-    // Only options of the program may precede the command; otherwise `identify` is not the command.
+    // Only options of the program may come before the command; otherwise the word `identify` is no command.
     let is_value = |k: usize| arguments[k - 1].to_string_lossy().starts_with("--");
     let before = (1..place).all(|k| arguments[k].to_string_lossy().starts_with('-') || is_value(k));
     if !before {

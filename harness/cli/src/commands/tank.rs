@@ -125,7 +125,8 @@ impl TankArgs {
                 if self.large_waves {
                     finite_amplitude::add_large_waves(&tank, &mut data);
                 }
-                // The printed table states the warnings of a given surface tension itself, and `--parameters` prints its own.
+                // If a surface tension is given, the printed table contains the warnings about it; `--parameters`
+                // prints its own warnings.
                 let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
                 if self.parameters.is_none() && !has_table {
                     let found = parameters::surface_tension_warnings(&data, self.liquid());

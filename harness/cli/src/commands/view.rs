@@ -169,7 +169,7 @@ fn find_model(columns: &[String]) -> Option<PathBuf> {
 fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     let time = table.column("time").unwrap_or_default();
     let (from, to) = (from.unwrap_or(f64::NEG_INFINITY), to.unwrap_or(f64::INFINITY));
-    // The limit may have fewer digits than the time in the table.
+    // Rounding is allowed for, because the user's limit may have fewer digits than the time in the table.
     let kept: Vec<usize> =
         (0..time.len()).filter(|k| time[*k] >= from - 1e-9 && time[*k] <= to + 1e-9).collect();
     if kept.len() < 2 && time.len() > 1 {

@@ -34,12 +34,12 @@ fn with_viscous_friction_the_antiresonance_equals_that_of_the_exact_transfer_fun
         );
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         // minima of |H| to 12 digits, from the roots of d log|H|/df in 60-digit arithmetic; the tolerance of 2 mHz is a
-        // seventh of the half-power width
+        // seventh of the half-power width of the slosh
         for (row, f_dip) in features(directory).iter().zip([2.1329468, 2.3431981]) {
             let number = |name: &str| row[name].parse::<f64>().unwrap();
             assert!((number("f_dip_hz") - f_dip).abs() < 0.002, "{row:?}");
             assert!(number("f_res_hz") > number("f_dip_hz"), "{row:?}");
-            // the required accuracy of a whole sweep
+            // accuracy that is required of a whole sweep
             assert!(number("max_energy_residual") < 1e-8, "{row:?}");
             assert_eq!(number("stuck_s"), 0.0);
         }
@@ -60,7 +60,7 @@ fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     // The header begins with these columns; others may follow.
     assert!(text.lines().next().unwrap().starts_with(HEADER));
     for row in features(directory) {
-        // The bearing of the thesis sticks at 10 cm: ranges that the acceptance check requires.
+        // The bearing of the thesis sticks at times at 10 cm fill; the ranges are required by the acceptance check.
         let number = |name: &str| row[name].parse::<f64>().unwrap();
         assert!((number("f_dip_hz") - 2.344).abs() < 0.004, "{row:?}");
         assert!((2.45..2.48).contains(&number("f_res_hz")), "{row:?}");

@@ -126,8 +126,8 @@ fn an_unknown_name_brings_a_suggestion() {
     );
 }
 
-/// For example an unknown item of an enumeration, a text for a number, a value for an output, or a value for the input that
-/// the profile drives.
+/// Each case sets a value of the wrong kind, for example an unknown item of an enumeration, a text in place of a number, a value
+/// for an output, or a value for the input that the profile drives.
 #[test]
 fn a_value_of_the_wrong_kind_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn a_value_of_the_wrong_kind_is_refused() {
     }
 }
 
-/// A depth of 0, a negative depth and NaN: the command fails with the FMU's message, which names tank.h.
+/// The depth of the liquid is 0, negative or NaN: the command fails with the FMU's message, which names tank.h.
 #[test]
 fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -273,7 +273,7 @@ fn an_experiment_without_information_is_refused() {
         let arguments = [&["design", "--fmu", fmu, "--profile"], plan].concat();
         refuses(directory.path(), || hubslosh(directory.path(), &arguments), words);
     }
-    // --duration belongs to the multisine.
+    // --duration is an option for the multisine; with a profile it is refused.
     let done = hubslosh(directory.path(), &["design", "--profile", "sine", "--duration", "0.02"]);
     let said = String::from_utf8_lossy(&done.stderr);
     assert!(said.contains("cannot be used with '--duration"), "{said}");
@@ -446,7 +446,7 @@ fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_ref
     let table = read(&["theta", "tau_cmd"]);
     assert_eq!(table.column("tau_cmd").unwrap()[4..6], [0.1, 0.0]);
     let (theta, steady) = (table.column("theta").unwrap()[10], cmd);
-    // tau/I (t1²/2 + t1 t1), compared with tau/I (2 t1)²/2 of a constant torque
+    // angle tau/I (t1²/2 + t1 t1) after the edge, compared with tau/I (2 t1)²/2 of a constant torque
     assert!((theta / steady - 0.75).abs() < 1e-9, "{theta} {steady}");
 
     refuses(
@@ -577,7 +577,8 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     assert_eq!(text(&loud.stdout), "11 rows in out.csv\n");
     let quiet = short_run(directory, &["--profile", "zero", "--quiet", "--strict"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
-    // no stiffness: the FMU warns, and at the end the run says which force dominates and that the model's range ended
+    // there is no restoring force: the FMU warns, and at the end the run says which force dominates and that the model
+    // has left its range
     let weightless = ["--profile", "zero", "--set", "g_axial=0", "--quiet"];
     let warned = short_run(directory, &weightless);
     assert!(warned.status.success() && text(&warned.stderr).starts_with("warning: "));

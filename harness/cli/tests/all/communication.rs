@@ -103,7 +103,7 @@ fn a_torque_file_has_the_same_impulse_with_any_output_step() {
         _ => f64::NAN,
     };
     let integral = |t: f64| match ramp(t) {
-        // half of the torque's integral, while the torque acts
+        // while the torque acts: the integral over the first ramp, 0.0005 N·m·s, plus the time at 1 N·m
         value if value.is_nan() => 0.0005 + (t - 0.303).clamp(0.0, 0.007),
         value => value,
     };
@@ -207,7 +207,7 @@ fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     for step in ["0.02", "0.007", "1"] {
         let found = impulse("pulse:amplitude=1,start=0.005,width=0.01,duration=1", step);
         assert!((found - 0.01).abs() < 1e-15, "{step}: {found}");
-        // half a period of 50 Hz: 2/ω
+        // the integral over half a period of 50 Hz is 2/ω
         let found = impulse("sine:amplitude=1,frequency=50,duration=0.01", step);
         assert!((found * std::f64::consts::TAU * 25.0 - 1.0).abs() < 1e-3, "{step}: {found}");
     }
@@ -283,8 +283,9 @@ fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     assert!(said.contains("commands until 2700 s"), "{said}");
 }
 
-/// If the input were held at the start of a line over each step, it would be late by half a step, and a row would pair
-/// an input with the response to the previous input.
+/// If an input that changes linearly were held at its value at the start of each step, it would be late by half a step,
+/// and a row would pair an input with the response to the previous input. Therefore the command refuses straight lines
+/// for such an FMU.
 #[test]
 fn an_fmu_that_cannot_interpolate_has_inputs_that_are_constant_between_rows() {
     let folder = tempfile::tempdir().unwrap();

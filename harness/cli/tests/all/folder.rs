@@ -49,7 +49,7 @@ fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
 fn is_consistent(directory: &Path) {
     let folder = directory.join("c");
     let manifest = std::fs::read_to_string(folder.join(MANIFEST)).unwrap();
-    // If a name has several lines, the last one counts.
+    // If several lines of the manifest have the same file name, the last one is valid.
     let sums: BTreeMap<&str, &str> =
         manifest.lines().map(|line| line.split_once("  ").unwrap()).map(|(s, n)| (n, s)).collect();
     for (name, sum) in sums {
@@ -86,7 +86,7 @@ fn every_flipped_bit_in_a_stored_run_is_noticed() {
     let whole: Vec<Vec<u8>> = runs.iter().map(|run| std::fs::read(run).unwrap()).collect();
     let mut random = Random::new(1, 0);
     let mut draw = |below: usize| (random.uniform() * below as f64) as usize;
-    // 200 flipped bits
+    // 200 bits are flipped, one in each of 50 runs, four times
     for _ in 0..4 {
         for (run, bytes) in runs.iter().zip(&whole) {
             let mut bytes = bytes.clone();
@@ -137,11 +137,11 @@ fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
         assert!(std::fs::read(&run).unwrap() == whole);
         assert!(published(directory) == before);
     }
-    // a lost file
+    // the file of a run is lost
     std::fs::remove_file(&run).unwrap();
     let (_, error) = successful(campaign(directory, plan));
     assert!(error.contains(": the file of the run is missing"), "{error}");
-    // a lost manifest
+    // the manifest is lost, and the run is damaged
     std::fs::write(&run, &flipped).unwrap();
     std::fs::remove_file(&manifest).unwrap();
     let done = campaign(directory, plan).output().unwrap();
@@ -173,7 +173,7 @@ fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
     // The report draws every second run and the last one.
     let words = format!("drawn of {} of the {RUNS} runs", RUNS / 2 + 1);
     assert!(report.contains(&words), "{words}");
-    // A run without curves has the same numbers as in a campaign of this run only.
+    // A run whose curves are not kept has the same numbers as in a campaign of this run only.
     let alone = format!("profile = \"sine:duration=0.06\"\n[vary]\nhub.I = [{:?}]\n", inertias[1]);
     successful(campaign(directory, &alone));
     let [one] = &rows("runs.csv")[..] else { panic!() };
@@ -221,7 +221,7 @@ fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() 
         let before = published(directory);
         let mut other = campaign(directory, INTERRUPTED);
         let mut child = other.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        // until the run is in the manifest and has its final name
+        // waits until the run is in the manifest and has its final name
         while !directory.join("c/runs/sine.parquet").exists() {
             assert!(child.try_wait().unwrap().is_none(), "it ended before its first run");
             std::thread::sleep(std::time::Duration::from_millis(1));

@@ -124,7 +124,7 @@ fn booleans_are_driven_from_a_file_and_held() {
         if done.status.success() { Ok(out) } else { Err(error) }
     };
     let out = run("0,0,0\n0.95,0,1\n1.45,0,0\n2,0,0\n").unwrap();
-    // spellings of pandas and of spreadsheets
+    // true and false as pandas and spreadsheets write them
     for words in [["True", "False"], ["TRUE", "FALSE"], ["true", "false"]] {
         let [on, off] = words;
         let same = run(&format!("0,0,{off}\n0.95,0,{on}\n1.45,0,{off}\n2,0,{off}\n"));
@@ -149,7 +149,7 @@ fn booleans_are_driven_from_a_file_and_held() {
     let error = run("0,0,true\n1,true,true\n2,0,true\n").unwrap_err();
     assert!(error.contains("line 3, column u: \"true\" is not a number"), "{error}");
     assert_eq!(run("0,0,0\r2,0,0\r").unwrap(), run("0,0,0\n2,0,0\n").unwrap());
-    // The date changes at midnight, and nothing shows if the day or the month comes first.
+    // The date changes at midnight, and nothing in the file shows whether the day or the month comes first.
     let error = run("01/02/2026 23:59:59,0,0\n02/02/2026 00:00:01,0,0\n").unwrap_err();
     assert!(
         error.contains("line 3, column time: \"02/02/2026 00:00:01\" may have the day first"),

@@ -144,7 +144,7 @@ fn a_designed_multisine_is_within_the_wheels_limits() {
     let folder = folder.path();
     let asked = ["design", "--multisine", "0.5", "--duration", "400", "--optimal"];
     let said = hubslosh(folder, &[&asked[..], &["--out", "torque.csv"]].concat()).unwrap();
-    // 0.5 N·m is more than the 0.26 N·m of the wheel.
+    // the requested 0.5 N·m exceed the limit of the wheel, 0.26 N·m
     assert!(
         said.contains("within the wheel's limits") && said.contains("peak 0.260 N·m"),
         "{said}"
@@ -155,7 +155,7 @@ fn a_designed_multisine_is_within_the_wheels_limits() {
     let recommended =
         if numbers[0] <= numbers[1] { "the multisine" } else { "the sweep, --profile lin-sweep" };
     assert!(said.contains(&format!("Recommended: {recommended}")), "{said}");
-    // The torque is reduced if the liquid must stay linear.
+    // The torque is reduced further if the slosh has to stay linear.
     let asked = [
         "design",
         "--profile",
@@ -204,7 +204,7 @@ fn no_kind_of_recording_has_more_than_15_options() {
             lines.filter(|line| line.starts_with('-')).filter_map(word).collect()
         };
         let (of_every, own) = (named(&every), named(&said));
-        // A line of an example may begin with an option, too.
+        // A continued line of an example may begin with an option.
         let own: BTreeSet<&String> =
             own.iter().filter(|option| !of_every.contains(option)).collect();
         assert!(!own.is_empty() && own.len() <= 15, "{kind}: {own:?}");
@@ -270,9 +270,9 @@ fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let asked = ["design", "--snr", "20", "--band", "1.25,20"];
-    // In a linear bench 7500 samples determine the noise to 0.8 %, 0.07 dB; the tolerance is four times this. Dry
-    // friction takes a quarter of the torque at the lower end of the band, and more than half at the resonance. Viscous
-    // friction with the same first harmonic is accurate to a twentieth.
+    // In a linear bench 7500 samples determine the noise to 0.8 %, 0.07 dB; the tolerance is four times this. Dry friction
+    // takes a quarter of the torque at the lower end of the band, and more than half at the resonance. The command
+    // replaces it by viscous friction with the same first harmonic, whose error is a twentieth.
     let linear = ["friction.c=0", "friction.d=0"];
     for (set, most) in [(&linear[..], 0.3), (&[], 0.5)] {
         let set: Vec<&str> = set.iter().flat_map(|one| ["--set", one]).collect();
@@ -291,8 +291,8 @@ fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
             let run = ["run", "--profile", &profile];
             hubslosh(folder, &[&run[..], &flags, &out, &set].concat()).unwrap();
             let table = Table::read(&folder.join("twin.parquet"), &["omega", "omega_imu"]).unwrap();
-            // at the gyro's sampling times, after the liquid's own oscillation has decayed by exp(−0.003 · 2π 2.4
-            // · 150) = e⁻⁷
+            // the rate and the noise at the gyro's sampling times, after the liquid's own oscillation has decayed by
+            // exp(−0.003 · 2π 2.4 · 150) = e⁻⁷
             let taken = |name: &str| -> Vec<f64> {
                 table.column(name).unwrap()[150_000..].iter().copied().step_by(20).collect()
             };

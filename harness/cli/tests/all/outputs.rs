@@ -249,7 +249,7 @@ fn a_draining_tank_gets_the_damping_of_every_fill() {
     let text = written(&["--nu", "1e-6"]);
     // The column of the fill table replaces this parameter.
     assert!(!text.contains("\"tank.zeta[1]\""), "{text}");
-    // the expected damping of a clean wall of this size: some 0.1 %
+    // the damping ratio that is expected of a tank of this size with smooth walls: some 0.1 %
     for point in 1..=3 {
         assert!(text.contains(&format!("\"tank.fill.zeta[1,{point}]\" = 0.00")), "{text}");
     }
@@ -346,7 +346,7 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
             std::fs::remove_file(at(name)).unwrap();
         }
     }
-    // three reports of the same check
+    // three reports of one check in three formats
     let reports = ["a.json", "a.xml", "a.sarif"];
     for name in reports {
         std::os::unix::fs::symlink(format!("far/{name}"), at(name)).unwrap();

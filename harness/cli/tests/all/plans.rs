@@ -101,7 +101,7 @@ fn runs_by_another_importer_give_the_same_tables() {
     let runs = list["runs"].as_array().unwrap();
     assert_eq!(runs.len(), 24);
 
-    // stands for another importer, which knows only the list, `hubslosh torque` and FMI
+    // this code takes the place of another importer, which knows only the list, `hubslosh torque` and FMI
     let fmu = Fmu::open(list["fmu"]["path"].as_str().unwrap()).unwrap();
     let columns: Vec<String> = serde_json::from_value(list["columns"].clone()).unwrap();
     std::fs::create_dir_all(directory.join("theirs/runs")).unwrap();
@@ -198,9 +198,9 @@ fn features_that_the_torque_does_not_excite_stay_empty() {
         for column in ["f_res_hz", "f_dip_hz", "delta_f_hz", "notch_db", "rotary_from_hz"] {
             assert_eq!(row[column], "", "{column} of {}", row["name"]);
         }
-        // Planar slosh: none of these torques excites rotary slosh.
+        // Only planar slosh occurs: none of these torques excites rotary slosh.
         assert_eq!(row["swirl"].parse(), Ok(0.0), "{row:?}");
-        // only noise has a spectrum that a model can be fitted to
+        // only the torque `noise` has a frequency band to which a model can be fitted
         assert_eq!(row["fit_freq_pct"].is_empty(), row["name"] != "noise", "{row:?}");
         assert!(row["peak_slosh_angle_deg"].parse::<f64>().unwrap() >= 0.0);
         assert!(row["max_energy_residual"].parse::<f64>().unwrap() < 1e-8, "{row:?}");
@@ -375,7 +375,7 @@ fn hubslosh_torque_writes_the_slope_of_each_row() {
 
 #[test]
 fn an_fmu_that_is_not_the_bench_is_driven_and_stored_without_analysis() {
-    // the bench with another name for one of the outputs that its analysis needs
+    // the description of the bench, with another name for one of the outputs that its analysis needs
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let unpacked = directory.join("unpacked");

@@ -154,7 +154,8 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
         assert!(page.contains(words), "{words}");
     }
 
-    // the format of a data logger: semicolons, decimal commas, milliseconds, degrees, 5 s before the start, lost rows
+    // the recording in the format of a data logger: semicolons, decimal commas, milliseconds, degrees, a beginning 5 s
+    // before the torque, lost rows
     let mut random = Random::new(4, 0);
     let mut text = String::from("# bench\nt;T_cmd;gyro z\nms;mNm;deg/s\n");
     for k in -250..time.len() as i64 {
@@ -205,7 +206,7 @@ fn a_recorded_gyro_at_rest_is_characterised() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let mut random = Random::new(1, 0);
-    // noise of 4e-4 rad/s at 50 Hz: N = 4e-4/√50
+    // the recorded noise has 4e-4 rad/s at 50 Hz: N = 4e-4/√50
     let mut text = String::from("t,w\n");
     for k in 0..50_000 {
         let _ = writeln!(text, "{},{}", 20 * k, (4e-4 * random.normal()).to_degrees());
@@ -304,7 +305,7 @@ fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
         assert!((value - truth).abs() < 4.0 * std && std < 0.05 * truth, "{name}: {estimate}");
         assert_eq!(estimate["unit"], unit);
     }
-    // times in another unit that is not stated, and times in whole seconds, which 50 rows share
+    // times in a unit that the file does not state, and times in whole seconds, each of which 50 rows share
     let probe = text.lines().skip(2).map(|line| line.split_once('\t').unwrap());
     let rows: Vec<(f64, String)> =
         probe.map(|(t, wave)| (t.parse().unwrap(), wave.to_string())).collect();

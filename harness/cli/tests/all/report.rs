@@ -62,7 +62,7 @@ fn a_linear_liquid_keeps_antiresonance_and_resonance_from_0_05_newton_metres_on(
     for table in [swept, spa] {
         for name in ["f_dip_hz", "f_res_hz"] {
             let values = figure(table, "linear", name);
-            // the required accuracy; noise moves the antiresonance by 2 mHz at 0.05 N·m
+            // 4 mHz is the required accuracy; noise moves the antiresonance by 2 mHz at 0.05 N·m
             assert!(spread(&values[1..]) < 4e-3, "{name}: {values:?}");
         }
     }
@@ -116,12 +116,12 @@ fn the_fit_of_one_linear_model_to_a_spherical_liquid_falls_with_the_torque() {
     let (fit, coherence) = (of("fit_freq_pct"), of("coherence"));
     // The fit falls from about 90 to about 40 points; at 0.0125 N·m the friction of the bearing reduces it.
     assert!(fit[1] > 80.0 && fit[2] < 60.0 && (30.0..45.0).contains(&fit[4]), "{fit:?}");
-    // The bench has 0.45 to 0.7 at large torque, rising with the torque.
+    // In the measurements of the thesis the coherence is 0.45 to 0.7 at large torque, and rises with the torque.
     assert!(coherence[1] < 0.2 && coherence[3] > coherence[1] + 0.1, "{coherence:?}");
     assert!((0.45..0.7).contains(&coherence[4]), "{coherence:?}");
     let (fit, coherence) =
         (figure(swept, "linear", "fit_freq_pct"), figure(swept, "linear", "coherence"));
-    // Only dry friction reduces this fit, and its share falls with the torque.
+    // In these runs only dry friction reduces the fit, and the share of friction in the torque falls with the torque.
     assert!(fit.is_sorted() && fit[0] < 70.0 && fit[4] > 98.0, "{fit:?}");
     assert!(coherence[0] > 0.5 && (0.15..0.35).contains(&coherence[4]), "{coherence:?}");
 }
@@ -223,7 +223,7 @@ fn without_dry_friction_a_linear_model_fits_a_linear_liquid() {
     let plan = plan.replace("[count]\nimu.seed = 1\n", "[vary]\nslosh.model = [\"linear\"]\n");
     let plan = format!("{plan}profile.amplitude = [0.0125, 0.05]\n");
     campaign(directory, &plan);
-    // The difference to 100 is caused by the lag window of spa.
+    // The lag window of spa causes the difference between this fit and 100 %.
     let fit = figure(&rows(directory, "features.csv"), "linear", "fit_freq_pct");
     assert!(fit.iter().all(|fit| *fit > 98.5), "{fit:?}: dry friction is all that does not fit");
 }
@@ -292,7 +292,8 @@ fn a_spacecraft_under_low_thrust_gets_its_antiresonance_and_resonance_to_a_hundr
         }
         assert_eq!(row["estimator"], estimator);
     }
-    // Estimated over the whole record, a record that is too short gives a reason instead of a number.
+    // If the record is too short for an estimate over the whole record, the report gives the reason
+    // instead of a number.
     let spa = rows(directory, "features_spa.csv");
     assert_eq!(
         (spa[0]["f_dip_hz"].as_str(), spa[0]["not_trusted"].as_str()),
@@ -401,7 +402,7 @@ fn two_campaigns_are_compared_run_by_run() {
     assert!(
         page.contains("This campaign minus the other") && page.contains("<code>heavier</code>")
     );
-    // less inertia, so a higher resonance
+    // this campaign has less inertia than the other one, so that its resonance is higher
     let largest = page.split("resonance / mHz: +").count();
     assert!(largest > 1, "the resonance rises");
 }

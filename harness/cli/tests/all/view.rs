@@ -136,7 +136,8 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
             );
         }
     }
-    // the columns recorded by default; without the states of the higher modes the page draws the first mode and says so
+    // a run with only the columns recorded by default: the states of the higher modes are missing, so that the page draws
+    // the first mode and says so
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--set", "slosh.modes=3"];
     assert!(hubslosh(directory, &[&run[..], &["--out", "all.parquet"]].concat()).status.success());
     let done = hubslosh(directory, &["view", "all.parquet"]);

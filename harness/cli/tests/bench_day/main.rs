@@ -63,7 +63,7 @@ fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals(
         assert!(page.contains(&format!(" {figure}.</figcaption>")), "figure {figure}");
     }
     assert!(page.contains("the hub turns more easily clockwise"));
-    // two short decays cannot tell friction that depends on the angle from scatter
+    // with only two short decays, friction that depends on the angle cannot be distinguished from scatter
     assert!(page.contains("Figures 5.11 and 5.12 of the thesis need more decays"));
     assert!([" 5.11.</figcaption>", " 5.12.</figcaption>"].iter().all(|end| !page.contains(end)));
     assert!(!page.contains("No usable recordings"));
@@ -115,7 +115,8 @@ fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals(
             off.push((a - b) / s.hypot(t));
         }
     }
-    // On 1 % of days the sum of 12 squares is larger than 26.2 (χ²); on 2 % of days more than two values exceed 1.96.
+    // On 1 % of days the sum of these 12 squares is larger than 26.2 (χ²), and on 2 % of days more than two of
+    // the values exceed 1.96.
     let squares: f64 = off.iter().map(|off| off * off).sum();
     assert!(squares < 26.2 && off.iter().all(|off| off.abs() < 3.0), "{squares}: {off:?}");
     let outside = off.iter().filter(|off| off.abs() > 1.96).count();
@@ -175,11 +176,11 @@ fn bench_day_reports_a_missing_log_file_in_its_chapter() {
     let page = std::fs::read_to_string(folder.join("out/report.html")).unwrap();
     assert!(page.contains("The messages of the command say which recordings could not be used"));
 
-    // a sweep whose fill is not given
+    // the list lacks the fill of a sweep
     std::fs::write(&manifest, list.replace("fill = 0.1\n", "")).unwrap();
     let said = text(&analyse(folder).stderr);
     assert!(said.contains("[[recording]] 1") && said.contains("fill is missing"), "{said}");
-    // a directory without the list
+    // the directory lacks the list
     std::fs::remove_file(&manifest).unwrap();
     let said = text(&analyse(folder).stderr);
     assert!(said.contains("day.toml is needed"), "{said}");

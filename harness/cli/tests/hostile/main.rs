@@ -165,7 +165,7 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
          </TypeDefinitions>"
     );
     let entities = "<!DOCTYPE a [<!ENTITY b \"bbbbbbbbbb\"><!ENTITY c \"&b;&b;&b;\">]>";
-    // Only bombs need to be large. Zeros compress to a thousandth.
+    // Only archives that unpack to a very large size have to be large. Zeros compress to a thousandth.
     let mut set: Vec<(&str, Vec<u8>, &str)> = vec![
         ("an empty file", Vec::new(), "archive"),
         ("no archive", b"PK\x05\x06 and no more".to_vec(), "archive"),
@@ -348,7 +348,8 @@ fn ends_its_own_process(when: &str) {
                 assert!(told, "{what}: {said}");
             }
         }
-        // Only rules that notice the fault are checked; with all rules, every step of every rule would wait for it.
+        // Only rules that notice the fault are checked; with all rules, every step of every rule would wait
+        // for the endless call.
         let only = if when == "AT_LOAD" { "load" } else { "load,host.silent,steps.run" };
         let output = sandbox.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -371,7 +371,7 @@ impl<V: Version> Fmu<V> {
             is_set = true;
             let value = self.description.value(variable, value)?;
             let start = variable.attributes().start.as_deref().unwrap_or_default();
-            // The declared value needs no call.
+            // A parameter with its declared value needs no call.
             match self.description.value(variable, start).is_ok_and(|start| start == value) {
                 true => self.structural.remove(&variable.reference),
                 false => self.structural.insert(variable.reference, value),
@@ -380,8 +380,8 @@ impl<V: Version> Fmu<V> {
         if !is_set {
             return Ok(());
         }
-        // The FMU is asked before the description is parsed, because a size that the FMU refuses may also be too
-        // large for a description.
+        // The FMU is asked for the size before the description is parsed, because a size that the FMU refuses may also
+        // be too large for a description.
         let mut instance = self.instantiate("sizes")?;
         let mut description = ModelDescription::from_xml_with(text, &self.structural)?;
         let mut starts = Vec::new();
@@ -413,8 +413,8 @@ impl<V: Version> Fmu<V> {
         &self.binary_hash
     }
 
-    /// Lists the parts of the process state that loading the binary has changed, for example the rounding
-    /// mode.
+    /// Lists the parts of the process state, for example the rounding mode, that have changed while
+    /// the binary was loaded.
     pub fn changed(&self) -> &[&'static str] {
         &self.changed
     }

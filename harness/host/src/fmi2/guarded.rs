@@ -94,7 +94,8 @@ fn lengths(all: usize) -> Vec<usize> {
 }
 
 impl Instance<'_> {
-    /// Makes calls with margins around every array, and returns the stray writes, also of calls that fail; for tests.
+    /// Makes calls with margins around every array, and returns the stray writes that it finds, also in calls
+    /// that fail; for tests.
     pub fn find_stray_writes(&mut self, lists: &Lists) -> Vec<StrayWrite> {
         let mut found = Vec::new();
         self.begin_call();

@@ -7,7 +7,7 @@ pub fn markdown() -> Vec<String> {
         for entry in folder.read_dir().unwrap().flatten() {
             let (path, name) = (entry.path(), entry.file_name());
             let name = name.to_string_lossy();
-            // skips built files, and texts of other projects in virtual environments
+            // skips files that were built, and texts of other projects in virtual environments
             if name.starts_with('.') && name != ".ci" || ["target", "dist"].contains(&&*name) {
                 continue;
             }

@@ -199,7 +199,7 @@ fn release_is_small_and_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in committed_fmus() {
         let mut processors = 0;
         for Platform { folder, ending, .. } in &PLATFORMS {
-            // FMI 2.0 has one folder for both processors of macOS.
+            // In FMI 2.0 both processors of macOS share one folder.
             for folder in fmi.folders(folder) {
                 let binary = format!("binaries/{folder}/{name}{ending}");
                 let binary = Binary::read(&release::read(&fmu, &binary).unwrap()).unwrap();
@@ -207,8 +207,9 @@ fn release_is_small_and_for_all_platforms() {
             }
         }
         let size = fmu.metadata().unwrap().len();
-        // Code for one processor has 530 to 750 kB since 0.4.0, whose libraries contain the functions of both versions
-        // of FMI, and Spacecraft's also the modes of tanks without axial symmetry. Before 0.4.0 it had 410 to 520 kB.
+        // Since 0.4.0 the code for one processor has 530 to 750 kB, because the libraries contain the functions of both
+        // versions of FMI, and Spacecraft's library also the modes of tanks without axial symmetry. Before 0.4.0 it had
+        // 410 to 520 kB.
         let limit = 800_000 * processors;
         assert!(size < limit, "{}: {size} bytes of {limit}", fmu.display());
     }

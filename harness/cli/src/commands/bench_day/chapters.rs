@@ -226,7 +226,7 @@ fn bearing(fitted: &Identification, is_used: bool) -> Chapter {
     let most = points.iter().fold(0.0_f64, |most, p| most.max(p.rate.abs()));
     let friction_chart = |title: &str, most: f64| {
         let rates = (-200..=200).map(|k| most * f64::from(k) / 200.0);
-        // The law jumps at zero; a gap separates its two branches.
+        // The friction law jumps at zero; NaN makes a gap between its two branches in the figure.
         let law = rates.map(|w| (w, if w == 0.0 { f64::NAN } else { 1e3 * curve(w) }));
         let within = points.iter().filter(|p| p.rate.abs() <= most);
         let measured = within.map(|p| (p.rate, 1e3 * p.torque));
@@ -295,7 +295,8 @@ fn preferential_direction(
     let fit = |(_, of, sign): (&str, &Braking, f64)| -> Vec<(f64, f64)> {
         angles().map(|angle| (angle, sign * of.at(angle.to_radians()))).collect()
     };
-    // Each band is a confidence band for the whole curve. There is none if the decays are too few.
+    // Each band is a simultaneous confidence band of the whole curve. If there are too few decays,
+    // there is no band.
     let bands: Option<Vec<Vec<f64>>> = ways
         .iter()
         .map(|(_, of, _)| angles().map(|angle| of.half_width(angle.to_radians())).collect())
@@ -323,7 +324,8 @@ fn preferential_direction(
         Some(bands) => {
             let fits = ways.map(fit);
             let [of_ahead, of_back] = &fits;
-            // The fits of the two directions are independent.
+            // The fits of the two directions are independent, so that the squares of
+            // their half-widths add up.
             let edges = |sign: f64| -> Vec<(f64, f64)> {
                 let halves = bands[0].iter().zip(&bands[1]).map(|(a, b)| a.hypot(*b));
                 let both = of_ahead.iter().zip(of_back).zip(halves);
@@ -401,7 +403,7 @@ fn preferential_direction(
     let verdict = match asymmetry {
         Some(p) if p.determined => {
             let [low, high] = p.interval.map(|end| 100.0 * end);
-            // two digits of the interval's width
+            // digits after the decimal point, so that the width of the interval has two digits
             let places = (1.0 - (high - low).log10().floor()).clamp(1.0, 6.0) as usize;
             let size = format!(
                 "Counter-clockwise dry friction is {:+.places$} % from the mean of both directions (95 %: {low:.places$} to \
