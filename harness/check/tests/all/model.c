@@ -2,13 +2,14 @@
  * Co-Simulation. Compiled with -DRATE=… for k, -DCO_SIMULATION, -DMODEL_EXCHANGE or both, and -DBLOWS_UP
  * for x' = k x^2, which has no solution after t = 1/(k x(0)). Further definitions give it one fault or one habit each:
  * STALE        x is the value before the last step
- * DELAY        x is that of 0.25 s before
+ * DELAY        x is its value of 0.25 s earlier
  * UNIT_DELAY   x is the input of the last step but one
  * EULER        steps of Euler's method
  * CRASHES      every step crashes
  * NO_CATEGORY  messages have the category NULL
  * RESOURCES    k is read from resources/rate.txt
- * RAW_LOCATION, NEEDS_AUTHORITY, TRUSTS: of that location, %20 is not decoded; only file:/// is known; NULL crashes
+ * RAW_LOCATION, NEEDS_AUTHORITY, TRUSTS: in the location of the resources, %20 is not decoded; only URIs with file:/// are
+ *              accepted; NULL crashes
  * UNKNOWN      an unknown value reference crashes
  * SILENT       no messages
  * GIVES_UP     no steps after an error
@@ -43,9 +44,9 @@ struct state {
     enum mode mode;
     int setup;
     double t, stop, x, k, u;
-    double shown, held; /* of x and u */
+    double shown, held; /* values of x and u that the host sees */
     double parameters[MANY / 10 + 1];
-    unsigned long long check; /* of the above, so that noise is refused */
+    unsigned long long check; /* checksum of the fields above, with which damaged states are refused */
 };
 
 typedef struct {
@@ -546,7 +547,7 @@ Status fmi2GetNominalsOfContinuousStates(Component m, double *x, size_t n)
 #endif
 
 #ifdef UNDEFINED
-/* Nobody defines this function. The library also exports 1,000 functions of C++. */
+/* This function is not defined anywhere, so that the library cannot be loaded. The library also exports 1,000 functions of C++. */
 extern void UNDEFINED(void);
 void (*const undefined)(void) = UNDEFINED;
 #define ONE(n) void _ZN9pythonfmu4m##n##Ev(void) {}

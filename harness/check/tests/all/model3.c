@@ -13,7 +13,7 @@
 #ifndef MUTANT
 #define MUTANT "00"
 #endif
-static const volatile char fault[] = "MUTANT=" MUTANT; /* the tests write the digits in the binary */
+static const volatile char fault[] = "MUTANT=" MUTANT; /* the tests overwrite the digits in the compiled binary */
 #define IS(n) ((fault[7] - '0') * 10 + fault[8] - '0' == (n))
 #define PERIOD 0.25
 #define TOKEN "{model3}"
@@ -34,7 +34,7 @@ struct state {
     double t, x, u, k, next, a[3];
     int32_t n;
     bool on, due, below;
-    uint64_t check; /* last: bytes cut short lack it */
+    uint64_t check; /* the last field, so that truncated bytes lack it */
 };
 typedef struct {
     bool exchange, events, early;
@@ -168,7 +168,7 @@ Status fmi3GetFloat64(Instance m, const uint32_t vr[], size_t n, double y[], siz
                 y[at + j] = m->s.a[IS(5) ? 2 - j : j];
         else if (vr[i] == DX)
             y[at] = rate(&m->s);
-        else if (vr[i] == Y) /* with fault 37 not finite between two events */
+        else if (vr[i] == Y) /* with faults 37 and 38, not finite between two events */
             y[at] = IS(37) && m->s.n == 1 ? NAN : IS(38) && m->s.n == 1 ? INFINITY : 2 * m->s.x;
         else if (vr[i] == Z)
             y[at] = indicator(m);

@@ -1,5 +1,5 @@
 /* A library around our FMU that misbehaves in one way, for the tests of `hubslosh check`. Every call is passed on to
- * real.so in the same folder, except for the misbehaviour that the word in misbehaviour.txt selects. */
+ * real.so in the same folder, except for the calls of the misbehaviour that the word in misbehaviour.txt selects. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -18,12 +18,12 @@ typedef const unsigned *References;
 
 static void *real;
 static char word[64], guid[64];
-static struct callbacks host;           /* a copy, as it should be */
-static const struct callbacks *kept;    /* the host's own struct, as it should not be */
+static struct callbacks host;           /* a copy of the host's callbacks, as it should be */
+static const struct callbacks *kept;    /* the host's own struct, which is a misbehaviour */
 static int loads, instances, steps, terminated, initialised;
 static double reached, start_of;
-static double lag;                      /* time that swallowed steps lack */
-static double tuned;                    /* friction.b, set and not passed on */
+static double lag;                      /* total length of the steps that were not passed on */
+static double tuned;                    /* value of friction.b that was set but not passed on */
 static int is_tuned;
 
 static int is(const char *name) { return strcmp(word, name) == 0; }
@@ -389,7 +389,7 @@ Status fmi2DoStep(Component c, double t, double h, int forget)
         }
         t -= lag;
     }
-    if (is("terminates")) /* fmi2GetBooleanStatus tells */
+    if (is("terminates")) /* fmi2GetBooleanStatus then returns the reason */
         return DISCARD;
     if (is("any_point"))
         t = reached;

@@ -26,7 +26,7 @@ static int deeper(int n)
     return n < 0 ? 0 : deeper(n + 1) + page[0];
 }
 
-/* Writes the messages of a run that is done and of a rule without findings, as a process with the right connection would. */
+/* Writes the messages "the run is done" and "the rule has no findings", as the guarded process itself would send them. */
 static void forge(int file)
 {
     static const char text[] = "{\"Done\":{\"severity\":\"Error\",\"list\":[],\"more\":0,\"skipped\":null,\"told_by\":null}}\n";

@@ -1,9 +1,9 @@
 /* A mass on a spring that swings in a plane, as an FMU 2.0 whose Co-Simulation has an adaptive solver of its own:
  * Bogacki and Shampine's pair of order 3(2), whose step doubles or halves. The steps go past the communication
  * points and outputs are interpolated, so that the error jumps where the pattern of steps changes. A change of the
- * input restarts the solver. -DTOLERANCE=… is the relative tolerance; -DDEAF ignores that of fmi2SetupExperiment;
- * -DROUGH makes each step depend on the seventh digit of r, as a solver with Newton's iterations and many orders does;
- * -DMODEL_EXCHANGE offers Model Exchange too. The equations, with the hinge accelerated by a along x:
+ * input restarts the solver. -DTOLERANCE=… is the relative tolerance; with -DDEAF the tolerance of fmi2SetupExperiment is ignored;
+ * with -DROUGH each step depends on the seventh digit of r, as a solver with Newton's iterations and many orders does;
+ * with -DMODEL_EXCHANGE the FMU offers Model Exchange, too. The equations, with the hinge accelerated by a along x:
  *
  *   r'' = r phi'^2 + g cos(phi) - k/m (r - L) - d/m r' - a sin(phi)
  *   r phi'' = -2 r' phi' - g sin(phi) - c r phi' - a cos(phi)
@@ -22,14 +22,14 @@ struct event_info {
 };
 
 enum { STATES = 4 };
-/* States, their derivatives, then what else there is; UNUSED does nothing. */
+/* Value references: the states, their derivatives, and then parameters and the input A. UNUSED has no effect. */
 enum { R, V, PHI, W, DERIVATIVES, M = 8, K, D, L, C, UNUSED, A, COUNT };
 
 typedef struct {
-    double value[COUNT]; /* of the states: those at the communication point */
+    double value[COUNT]; /* the states have their values at the communication point */
     double tolerance, t;
     int is_running;
-    /* The solver's last step: from x0 with slope f0 at t0 to x1 with slope f1 at t0 + h, then the next one's length. */
+    /* The solver's last step, from x0 with slope f0 at t0 to x1 with slope f1 at t0 + h, and the length of the next step. */
     double t0, h, next, x0[STATES], f0[STATES], x1[STATES], f1[STATES];
 } Model, *Component;
 
@@ -43,7 +43,7 @@ static void rates(const Model *m, const double *x, double *f)
     f[W] = (-2 * x[V] * x[W] - g * sin(x[PHI]) - p[A] * cos(x[PHI])) / x[R] - p[C] * x[W];
 }
 
-/* A step of the solver from the end of the last one. */
+/* Makes a step of the solver from the end of its last step. */
 static int advance(Model *m)
 {
     double f2[STATES], f3[STATES], at[STATES];
@@ -210,7 +210,7 @@ Status fmi2GetNominalsOfContinuousStates(Component m, double *x, size_t n)
 }
 #endif
 
-/* What a host must find, but does not call here. */
+/* Functions that an FMU must export, but that the host does not call in these tests. */
 #define ABSENT(name) \
     Status name(void) { return ERROR; }
 ABSENT(fmi2SetDebugLogging)

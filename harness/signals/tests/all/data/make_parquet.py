@@ -1,6 +1,7 @@
-"""Writes the Parquet files of these tests with the libraries that users have.
+"""Writes the Parquet files that the tests of the crate ``signals`` read.
 
-Five rows 20 ms apart (1 s apart if the unit is s); pyarrow 26, pandas 3, polars 2.
+The files come from pyarrow 26, pandas 3 and polars 2, the libraries with which users write Parquet.
+Each file has five rows 20 ms apart, or 1 s apart if the unit of its times is s.
 """
 
 import numpy as np
