@@ -41,7 +41,7 @@ pub struct Point {
     pub variance: f64,
 }
 
-/// Ratio of a record's length to the longest averaging time of its Allan variances.
+/// Ratio of a record's length to the longest averaging time for which an Allan variance is computed.
 const LONGEST: usize = 10;
 
 /// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally spaced in

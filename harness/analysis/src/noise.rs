@@ -58,8 +58,8 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
     frequencies.iter().map(at).collect()
 }
 
-/// Returns the mean of |V|² over the spectral lines around one frequency, from the spectra `u` of
-/// the input and `y` of the output; `None` if one of them is 0.
+/// Returns the mean of |V|² over the spectral lines around one frequency, from the spectra `u` of the input
+/// and `y` of the output; `None` if a spectrum is 0 at these lines.
 fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let mean = |x: &[Complex64]| x.iter().map(|x| x.norm()).sum::<f64>() / LINES as f64;
     let (scale_u, scale_y) = (mean(u), mean(y));

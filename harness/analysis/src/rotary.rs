@@ -31,9 +31,8 @@ pub struct Rotary {
     pub swirl: f64,
 }
 
-/// Returns the swirl number at each frequency of the responses, which are those of the radial and the
-/// tangential slosh angle to the torque. It is 0 where a torque with the amplitude `torque`, N·m, causes a
-/// slosh angle below [`LEAST`].
+/// Returns the swirl number at each frequency, from the responses of the radial and of the tangential slosh angle
+/// to the torque. It is 0 where a torque with the amplitude `torque`, N·m, causes a slosh angle below [`LEAST`].
 pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque: f64) -> Vec<f64> {
     let number = |(x, y): (&Complex64, &Complex64)| {
         let power = x.norm_sqr() + y.norm_sqr();

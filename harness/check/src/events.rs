@@ -21,7 +21,7 @@ use super::under_test::{FmuUnderTest, Interface, Observed, STEPS, Session, skip}
 const STARTS: u64 = 12;
 /// Relative change of a value in event mode below which the change counts as rounding and not as a missed event.
 const ROUNDING: f64 = 1e-9;
-/// Time to the next time event, as a fraction of the step, below which the event counts as due.
+/// If the time to the next time event is below this fraction of the step, the event counts as due.
 const NEARLY_DUE: f64 = 1e-6;
 
 pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

@@ -33,7 +33,7 @@ const EXPLICIT_STEPS: usize = 40;
 const MOST_STEPS: usize = 100;
 /// Largest number of states for which a Jacobian is computed by finite differences.
 const MOST_STATES: usize = 200;
-/// Ratio of the communication step to the first step of the integrator.
+/// Ratio of the communication step to the first step that the integrator tries.
 const PARTS: f64 = 8.0;
 /// Accuracy with which an event indicator's zero crossing is located, as a fraction of the communication
 /// step.

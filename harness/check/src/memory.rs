@@ -12,7 +12,7 @@ use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, skip};
 
 const MOST: usize = 500;
-/// Time limit for the first window of calls; the other windows have the same number of calls.
+/// Time limit of the first window. Its number of calls is then the number of calls in all other windows.
 const LONGEST: Duration = Duration::from_millis(500);
 /// Smallest number of calls in a window from which a leak can be concluded.
 const FEWEST: usize = 10;

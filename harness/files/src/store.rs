@@ -265,7 +265,7 @@ impl Store {
             _lock: lock,
         };
         if let Some(definition) = definition {
-            // Another program may have written a definition before this one got the lock.
+            // Before this program got the lock, another program may have written a definition.
             definition.check(path, kind)?;
             let text = definition.text.as_bytes();
             let is_there = fs::read(path.join(kind.definition)).is_ok_and(|there| there == text);

@@ -16,7 +16,7 @@ use crate::fmu::Instance;
 
 /// Accuracy with which the time of an event is located, as a fraction of the integrator's step.
 const LOCATED: f64 = 1e-13;
-/// Smallest time between two events, as a fraction of the time between two rows of the result.
+/// Smallest time that is kept between two events, as a fraction of the time between two rows of the result.
 const APART: f64 = 1e-6;
 pub const MOST_STEPS: usize = 100_000;
 

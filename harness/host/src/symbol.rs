@@ -38,7 +38,7 @@ pub fn readable(symbol: &str) -> Option<String> {
     } else {
         name.write_str(symbol)
     };
-    // An error at this point means that the name is full.
+    // An error is accepted if the text is full, because a shortened name is valid.
     (written.is_ok() || name.0.ends_with('…')).then_some(name.0)
 }
 

@@ -1,8 +1,9 @@
-//! Tuning constants of the identification (those of the engine are in `engine/mod.rs`), grouped by the file that uses them. Each
-//! group lists tests that depend on its constants.
+//! Tuning constants of the identification, grouped by the file that uses them. The constants of the engine are in
+//! `engine/mod.rs`. Each group lists tests that depend on its constants.
 //!
-//! A constant without a unit is a ratio, unless its description gives another unit. "Standard deviations" are those of the noise,
-//! and sums of squares are in units of its variance. Coefficients of formulas, orders of tables and names stay with their code.
+//! A constant without a unit is a ratio, unless its description gives another unit. "Standard deviations" are standard deviations
+//! of the noise, and sums of squares are in units of the noise's variance. Coefficients of formulas, orders of tables and names
+//! stay with their code.
 
 // Signals on clocks of their own: `input/clocks.rs`.
 // Tests: `readings_of_a_slow_gyro_are_interpolated_and_measured_rows_are_marked`, `a_band_limited_torque_of_10_hz_is_interpolated_accurately_between_its_samples`.
@@ -105,7 +106,7 @@ pub const SPIKE_SHARE: f64 = 0.01;
 pub const SPIKE_NEAR_STEP: usize = 3;
 /// Change of the torque from one row to the next, relative to its peak, that counts as a step.
 pub const TORQUE_STEP: f64 = 0.5;
-/// Number of rows on each side of a row whose median deviation is taken as the usual deviation there.
+/// Number of rows on each side of a row. The usual deviation at this row is the median of the deviations in these rows.
 pub const SPIKE_AROUND: usize = 50;
 
 // Tolerances: `input/tolerance.rs`.

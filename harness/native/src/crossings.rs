@@ -17,8 +17,8 @@ use pyo3::types::PyBytes;
 use crate::numbers::numbers;
 use crate::schedule::bytes;
 
-/// Loop gain above which phase crossings are not searched, because such a gain occurs only close to a pole on the
-/// imaginary axis, for example an integrator at 0.
+/// Loop gain above which phase crossings are not searched. So large a gain occurs only close to a pole on the imaginary axis, for
+/// example at an integrator's pole at 0.
 const INTEGRATOR: f64 = 1e8;
 /// Loop gain below which no phase crossing is searched, because a value this small consists of
 /// rounding errors.
@@ -289,7 +289,7 @@ impl Root {
 /// A zero of the loop gain and its partner, the nearest pole without another partner. If the two are close, they nearly
 /// cancel in ln L, and the bound of the curvature is much smaller than the bound for two separate roots.
 struct Pair {
-    /// Number of roots in the pair: 2 for a zero with its pole, 1 for a root without a partner.
+    /// Number of roots in the pair: 2 for a zero with its pole, 1 for a zero or a pole without a partner.
     roots: usize,
     /// Half the distance between zero and pole, and the factor of the joint bound of the curvature, which is divided by the cube
     /// of the distance from them.

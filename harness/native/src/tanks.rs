@@ -18,7 +18,7 @@ use pyo3::types::PyDict;
 
 use crate::fmu::FmuError;
 
-/// Time between two checks whether the user has pressed Ctrl-C.
+/// Time between two checks whether the user has pressed Ctrl-C, while the threads compute.
 const SILENCE: Duration = Duration::from_millis(100);
 
 /// A tank, read from a file or from a text.

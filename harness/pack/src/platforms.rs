@@ -177,7 +177,8 @@ pub struct Toolchain {
     root: PathBuf,
     path: OsString,
     sysroot: PathBuf,
-    /// Source of the standard library, for targets whose compiled library is not installed.
+    /// Path of the source of the standard library, from which it is compiled for targets whose compiled
+    /// library is not installed.
     source: Option<PathBuf>,
     home: String,
 }

@@ -6,12 +6,12 @@
 //! ```
 //!
 //! prints one row for each wave in a tank that moves on a line (`line`) or on a circle (`circle`): the fill; the frequency
-//! divided by that of small waves; the acceleration over g; and the wave's largest slosh angle, phase (degrees) and force
-//! over the weight of the slosh mass. Then follow the errors of the third-order slosh mass in angle (%), phase (degrees)
-//! and force (%), and the same errors of the slosh mass with the wave's energy, if its coefficients are known. In the
-//! command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills follow. With `swirl`
-//! the tank moves on a line while its liquid rotates; each row then has angle and phase along the line and across it. A
-//! fill takes about a minute.
+//! divided by the frequency of small waves; the acceleration over g; and the wave's largest slosh angle, phase (degrees) and
+//! force over the weight of the slosh mass. Then follow the errors of the third-order slosh mass in angle (%), phase
+//! (degrees) and force (%), and the same errors of the slosh mass with the wave's energy, if its coefficients are known. In
+//! the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills follow. With
+//! `swirl` the tank moves on a line while its liquid rotates; each row then has angle and phase along the line and across
+//! it. A fill takes about a minute.
 use std::f64::consts::{PI, TAU};
 
 use formulas::energy_terms::EnergyTerms;

@@ -421,8 +421,8 @@ impl Contour {
         }
     }
 
-    /// Returns all positions where the contour passes through the height z, in its order. A point exactly at
-    /// z counts as above.
+    /// Returns all positions at which the contour passes through the height z, in the order of the contour. A point
+    /// exactly at the height z counts as above z.
     fn crossings(&self, z: f64) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
         let level = LEVEL * self.size;
@@ -636,7 +636,7 @@ impl Outline {
                     return Some((i, j, [p[0] + u * d[0], p[1] + u * d[1]]));
                 }
             }
-            // The next line may fold back on this one at their joint.
+            // The next line may fold back on the present line at the joint of the two.
             if let Some(&(j, _, s)) = lines.get(a + 1) {
                 let (d, e) = (sub(q, p), sub(s, q));
                 if cross(d, e).abs() < 1e-9 * norm(d) * norm(e) && dot(d, e) < 0.0 {

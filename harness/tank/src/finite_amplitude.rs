@@ -37,7 +37,8 @@ const DEGREES: [usize; 2] = [18, 24];
 /// Relative difference of a box's two lengths below which the first modes along both directions exchange energy, so that
 /// coefficients for motion in one direction are not valid.
 const NEARLY_SQUARE: f64 = 0.1;
-/// Largest tanh kh, the ratio of lambda to the wave number, of a ring of liquid between vertical walls.
+/// Largest ratio tanh kh of lambda to the wave number k from which the depth h of a ring of liquid between vertical walls is
+/// computed. A deeper ring gets the depth of this ratio.
 const DEEP: f64 = 0.999;
 /// Largest slosh angle, rad, at which the third order counts as valid. At 26 degrees the frequency of the circular wave
 /// in a cylinder with h/R = 0.613 differs by 4 % from fully nonlinear flow.

@@ -48,8 +48,8 @@ enum Motion {
     Forced(forced::Function),
 }
 
-/// Size of the truncated expansion: degree of the solid harmonics, number of polynomials of the elevation for each
-/// azimuthal number, and the largest azimuthal number, which is also the largest multiple of the frequency.
+/// Resolution of an expansion, which has a finite number of terms: degree of the solid harmonics, number of polynomials of the
+/// elevation for each azimuthal number, and the largest azimuthal number, which is also the largest multiple of the frequency.
 #[derive(Clone, Copy, Debug)]
 struct Resolution {
     degree: usize,
@@ -57,14 +57,16 @@ struct Resolution {
     order: usize,
 }
 
-/// Number of Gauss points between the surface at rest and the wave.
+/// Number of Gauss points over the height between the surface at rest and the wave.
 const DEPTHS: usize = 4;
 const STEPS: usize = 12;
 /// Largest change of the unknowns in a Newton step, relative to the amplitude, at which a wave counts as converged.
 const CONVERGED: f64 = 1e-9;
-/// Largest elevation of a wave, above and below the contact line, as a fraction of the height of the [`Side`] there.
+/// Largest elevation of a wave above or below the contact line that is computed, as a fraction of the distance from the
+/// contact line to the upper or lower end of the [`Side`].
 const ROOM: f64 = 0.8;
-/// Largest sine of the angle between two segments of a side.
+/// Largest sine of the angle between two segments of the wall at which their joint counts as smooth, so that a side
+/// goes on over it.
 const SMOOTH: f64 = 1e-3;
 
 /// The smooth part of the wall around the contact line: the wall's radius, divided by the radius of the surface at
@@ -747,14 +749,14 @@ fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     waves
 }
 
-/// Largest relative distance of the frequency (first) and of the rise (second) of one wave from the straight line
-/// through the other waves.
+/// Largest relative distance of one wave from the straight line through the other waves at which the wave is not an outlier:
+/// for the frequency, and for the rise of the centre of mass.
 const OUTLIER: [f64; 2] = [5e-4, 3e-3];
 
-/// Removes waves whose frequency or rise lies off the straight line through the other waves, because the truncation has
-/// a resonance there. Each wave comes with the index of its slosh angle. With u, the square of the angle's sine, the
-/// shift of omega^2 over u and the excess of the rise over u are almost linear in u. The slope of each line is the
-/// median over all pairs of waves with different angles.
+/// Removes waves whose frequency or rise lies off the straight line through the other waves, because the liquid of the
+/// truncated expansion has a resonance there. Each wave comes with the index of its slosh angle. With u, the square of the
+/// angle's sine, the shift of omega^2 over u and the excess of the rise over u are almost linear in u. The slope of each line
+/// is the median over all pairs of waves with different angles.
 fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave)> {
     for (i, allowed) in OUTLIER.into_iter().enumerate() {
         let point = |wave: &LargeWave| {
@@ -1034,9 +1036,9 @@ mod tests {
         [energy, solver.moments(x).unwrap()[1]]
     }
 
-    /// Along a family of periodic motions dE = omega dJ holds, with the energy E and the action J, which is the mean of
-    /// twice the kinetic energy divided by omega. At the phase 0 the liquid is at rest, so that its height gives the
-    /// whole energy. The truncation used here has no resonance at these angles.
+    /// Along a family of periodic motions dE = omega dJ holds, with the energy E and the action J, which is the mean of twice
+    /// the kinetic energy divided by omega. At the phase 0 the liquid is at rest, so that its height gives the whole energy.
+    /// The expansion in this test has no resonance at these slosh angles.
     #[test]
     fn energy_and_action_of_planar_waves_belong_to_their_frequency() {
         for (contour, fill) in [(cylinder(), 0.6), (sphere(), 0.6), (sphere(), 0.35)] {

@@ -34,7 +34,8 @@ pub struct Capillary {
     pub unknown: bool,
 }
 
-/// Largest contribution of capillarity to omega^2, relative to gravity, of a mode whose shape phi_n it changes.
+/// Largest contribution of capillarity to omega^2, relative to the contribution of gravity, at which the formula for a
+/// flat surface counts as valid for a mode whose shape phi_n capillarity changes.
 const LARGEST_SHARE: f64 = 0.1;
 
 /// Returns the specific force, m/s², below which [`flat`] is not valid for a mode whose shape phi_n changes;

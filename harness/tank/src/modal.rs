@@ -442,7 +442,7 @@ const WANTED: f64 = 2e-7;
 const ENOUGH: f64 = 1e-6;
 const WORST: f64 = 1e-2;
 const ROUNDING: f64 = 1e-10;
-/// Rounding error of beta, which is larger than that of other quantities because its integrand is
+/// Rounding error of beta. It is larger than the rounding errors of other quantities, because the integrand of beta is
 /// not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
@@ -492,8 +492,8 @@ fn estimate(before: f64, last: f64) -> f64 {
     last.max((before * last * last).cbrt())
 }
 
-/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. If `wall` is that of a full closed
-/// tank, without a free surface, the result has only the effective inertia and no modes.
+/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. If `wall` is the wall of a full closed
+/// tank, there is no free surface, and the result has only the effective inertia and no modes.
 ///
 /// # Errors
 /// If the estimated error is above 1e-2.

@@ -24,7 +24,8 @@ const ROWS: [[f64; 8]; 13] = [
     [1.05, 4.4189, 3.7385, 0.8008, 7.105, 4.104, -0.210, 11.9],
 ];
 
-/// Largest relative errors of the slosh mass: of its frequency and of its energy, at the rows of the table and between them.
+/// Largest relative errors of the slosh mass over all rows of the table and between the rows: of its frequency,
+/// and of its energy.
 pub(crate) const ERRORS: [f64; 2] = [5e-4, 4e-3];
 
 /// Slosh angles at which the error of a forced response near resonance reaches 3 % or 3 degrees. Each row has h/R and

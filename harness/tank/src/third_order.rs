@@ -226,7 +226,8 @@ impl Overlaps {
         self.amplitude * self.amplitude * self.excited.iter().map(elevation).sum::<f64>()
     }
 
-    /// Returns T, omega, and the first-order amplitude b of the potential divided by that of the elevation, with g = 1.
+    /// Returns T, omega, and the first-order amplitude b of the potential divided by the first-order amplitude a of the
+    /// elevation, with g = 1.
     fn wave(&self, depth: f64) -> [f64; 3] {
         let t_1 = self.k * (self.k * depth).tanh();
         // eta_t = G_0 Phi

@@ -10,7 +10,7 @@ use crate::common::{
     xml, zipped,
 };
 
-/// Returns a DOCTYPE that defines ten entities, each of which expands to ten times the one before:
+/// Returns a DOCTYPE that defines ten entities. Each entity expands to ten times the entity before it:
 /// 10^10 characters in all.
 fn entity_bomb() -> String {
     let mut entities = "<!ENTITY e0 \"xxxxxxxxxx\">".to_string();

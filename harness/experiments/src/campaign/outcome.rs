@@ -633,7 +633,7 @@ fn modelled(
     if is_sweep && schedule.rows.is_none() {
         return Ok(linear.simulate(run.step, recorded, start));
     }
-    // jumps of the torque must not be taken for slopes
+    // the torque is passed with its slopes, so that a jump between two rows is not interpolated by a straight line
     let column = |name| torque.column(name).unwrap_or_default();
     let rates = linear.simulate_ramps(column("time"), column(TORQUE), column(SLOPE), start);
     let rows = rates.into_iter().enumerate().filter(|(k, _)| schedule.is_row(*k));

@@ -47,7 +47,7 @@ pub const BUILT_IN: &[(&str, &str)] = plans! {
     "bench_as_built" "monte_carlo" "low_thrust" "slew"
 };
 
-/// Time between the rows of a result, s, unless the plan states it: the sampling period of the thesis's IMU at 50 Hz.
+/// Time between the rows of a result, s, if the plan does not state it: the sampling period of the thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
 /// Names that a plan usually varies. Runs that vary only these have the file names `<model>_<fill>mm_<amplitude>`, which
 /// are a documented interface.

@@ -289,7 +289,7 @@ impl Profile {
     }
 }
 
-/// Time between two torque commands of a profile unless the user states one, s: 50 Hz, as on the thesis's bench.
+/// Time between two torque commands of a profile, s, if the user does not state it: 50 Hz, as on the thesis's bench.
 pub const SAMPLE: f64 = 0.02;
 /// Largest error of linear interpolation between the commands of a profile, relative to its amplitude, at which the
 /// user's interval between commands is kept. For a sine of frequency f the error is (2π f · interval)²/8. The value

@@ -11,12 +11,12 @@
 //! ```
 //!
 //! p is the pressure relative to the gas, at the height z above the bottom, and a is the acceleration of the tank minus
-//! that of gravity in the direction φ. The formula for p follows in the frame of the tank from Φ_t + g η + a r cos φ = 0
-//! at the surface, and p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ decreases with depth as its cosh. A
-//! mode that the model does not include is assumed to follow the acceleration immediately, g α_n + a = 0, and
-//! contributes nothing. The integral of p over the wall is the force of the pendulums and of the liquid that moves with
-//! the tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the least-squares fit over the disc: ∫ J_1(ξ
-//! r/R) r² dr = R³ J_1(ξ)/ξ².
+//! the acceleration of gravity, in the direction φ. The formula for p follows in the frame of the tank from Φ_t + g η +
+//! a r cos φ = 0 at the surface, and p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ decreases with depth
+//! as its cosh. A mode that the model does not include is assumed to follow the acceleration immediately, g α_n + a =
+//! 0, and contributes nothing. The integral of p over the wall is the force of the pendulums and of the liquid that
+//! moves with the tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the least-squares fit over the disc:
+//! ∫ J_1(ξ r/R) r² dr = R³ J_1(ξ)/ξ².
 
 use std::collections::BTreeMap;
 

@@ -25,7 +25,7 @@ const SAME: f64 = 1e-13;
 const REST: f64 = 1e-13;
 /// Torque in excess of static friction, N·m, up to which the hub counts as sticking.
 const TOUCH: f64 = 1e-12;
-/// Longest time between two checks whether a sticking hub breaks away, s.
+/// Longest time that a hub sticks before the next check whether it breaks away, s.
 const LOOK: f64 = 5e-3;
 
 /// State: θ, ω, then s and s' of the linear liquid or u and u' of the spherical one. Time is a state because ode_solvers 0.6.2

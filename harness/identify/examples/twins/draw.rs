@@ -20,7 +20,7 @@ use signals::recording::Columns;
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 use crate::habits::Written;
 
-/// Relative range of the twins' true parameters about the nominal bench.
+/// Relative range about the values of the nominal bench within which a twin's true parameters are drawn.
 const SPREAD: f64 = 0.3;
 /// A MEMS gyro: white noise, rad/s/√Hz; standard deviation of its drift, rad/s; correlation time of the
 /// drift, s; resolution, rad/s.

@@ -24,7 +24,7 @@ pub struct Bound {
     pub not_determined: bool,
     /// True if the bound depends on the solver's errors; `std` and `std_alone` are then NaN.
     pub decided_by_solver: bool,
-    /// Names of the unknowns that the recordings cannot distinguish from this one.
+    /// Names of the other unknowns that the recordings cannot distinguish from this unknown.
     pub inseparable_from: Vec<String>,
     /// Smallest standard deviation of an unbiased estimate of this unknown if all other unknowns were known.
     pub std_alone: f64,

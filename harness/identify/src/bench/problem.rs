@@ -41,7 +41,7 @@ const FRICTION_WIDTH: f64 = 10.0;
 pub const LEAST_FRICTION: f64 = 1e-4;
 /// Prior standard deviation of ln ω_s, where ω_s is the Stribeck speed, and the largest factor between ω_s and its start value.
 const SPEED: (f64, f64) = (1.5, 30.0);
-/// Smallest and largest ratio of a known value to its nominal value.
+/// Smallest and largest ratio of a known value to its nominal value that the fit allows.
 const WIDEST: (f64, f64) = (0.6, 1.6);
 
 struct List<'a> {
@@ -164,7 +164,7 @@ pub fn system<'a>(
         let unknown = list.parameter(friction::SIGMA0, 100.0);
         list.add_parameter(Unknown { bounds: (0.1, 1000.0), ..unknown });
     }
-    // parameters are also estimated if a start or a prior of them is given
+    // a parameter is also estimated if the user gives its start or its prior
     for name in options.starts.iter().map(|s| &s.0).chain(options.known.iter().map(|k| &k.0)) {
         let is_listed = list.unknowns.iter().any(|u| u.name == *name);
         let is_of_bench = PARAMETERS.contains(&name.as_str()) || name == friction::ASYMMETRY;
@@ -488,7 +488,7 @@ pub fn problem<'a>(
 }
 
 /// Returns the possible intersample behaviours of the torque, the likeliest first: a torque that changes seldom is probably held.
-/// A nearly constant torque gets only one, because all of them give the same motion.
+/// For a nearly constant torque only one behaviour is returned, because all behaviours give the same motion.
 fn guessed(recordings: &[Recording]) -> Vec<Hold> {
     let square = |x: f64| x * x;
     let varies = |recording: &Recording| {

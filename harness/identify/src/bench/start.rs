@@ -175,11 +175,12 @@ impl Response {
 /// T = jΩ I0 W + jΩ m r² G(Ω) W + b W + c S − δ jΩ T,   G = (ω² + 2jζωΩ)/(ω² − Ω² + 2jζωΩ)
 /// ```
 ///
-/// S is the spectrum of the rate's sign. δ is a delay, which also absorbs the effect of dry friction on the phase and is not used
-/// further. The equation is linear in the unknowns except the slosh frequency ω and the damping ratio ζ, which are taken from a
-/// grid. The residual is divided by |jΩ(I0 + m r² G)|, which makes it a rate. Because nothing is simulated, the lines of a
-/// multisine cause no false minima. Because the equation contains dry friction, its loss at small amplitudes is not taken for
-/// damping of the slosh. Returns the root mean square of the residual divided by that of the hub's rate, and the bench.
+/// S is the spectrum of the rate's sign. δ is a delay, which also absorbs the effect of dry friction on the phase and is not
+/// used further. The equation is linear in the unknowns except the slosh frequency ω and the damping ratio ζ, which are taken
+/// from a grid. The residual is divided by |jΩ(I0 + m r² G)|, which makes it a rate. Because nothing is simulated, the lines
+/// of a multisine cause no false minima. Because the equation contains dry friction, its loss at small amplitudes is not
+/// taken for damping of the slosh. Returns the root mean square of the residual divided by the root mean square of the hub's
+/// rate, and the bench.
 fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<(f64, Response)> {
     let (step, torque, rate) = recording.even().ok()?;
     let n = rate.len();

@@ -19,7 +19,7 @@ use super::{Fit, Solution};
 const DRAWS: usize = 20_000;
 /// Smallest number of accepted draws from which quantiles are computed.
 const FEWEST: usize = 400;
-/// Number of grid points of the profile's coordinate; draws are uniform between two of them.
+/// Number of grid points over the range of the profile's coordinate; between two grid points draws are uniform.
 const PLACES: usize = 400;
 
 /// Quantities that are computed from the unknowns: their names, units and values at the minimum, and in `columns`

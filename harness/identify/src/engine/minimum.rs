@@ -15,7 +15,7 @@ pub struct Minimum {
     pub point: Point,
     /// Derivatives at the minimum; `None` if the last Jacobian belongs to another point.
     pub derivatives: Option<Derivatives>,
-    /// Distance to the minimum, standard deviations.
+    /// Newton decrement: estimated distance to the minimum, standard deviations.
     pub decrement: f64,
     pub free: Vec<bool>,
 }
@@ -23,7 +23,7 @@ pub struct Minimum {
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     pub sets: usize,
-    /// Distance to the minimum, standard deviations.
+    /// Newton decrement (estimated distance to the minimum, standard deviations) at which the search ends.
     pub decrement: f64,
     /// Sum of squares above which a minimum is of no use, so that the search is given up.
     pub above: f64,

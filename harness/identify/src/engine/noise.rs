@@ -113,8 +113,8 @@ mod tests {
     fn the_estimated_noise_is_the_simulated_noise_and_makes_the_innovations_white() {
         let (white, drift) = (4.07e-4, 7.85e-5);
         let (found, time, residual) = estimated(white, drift);
-        // expected error of the white noise 1/sqrt(2 N) = 0.2 %; with 27 correlation times that of the drift is 20 %; four
-        // of them are allowed
+        // the standard error of the white noise is 1/sqrt(2 N) = 0.2 %; with 27 correlation times the standard error of the drift
+        // is 20 %; four standard errors are allowed
         assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
         assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");
         let mut e = residual.clone();

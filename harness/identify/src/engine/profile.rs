@@ -13,7 +13,8 @@ pub const OPEN: f64 = Z * Z;
 /// Largest relative difference between the square root of the likelihood's rise and a straight line at which the likelihood
 /// still counts as a parabola.
 pub const PARABOLIC: f64 = 0.1;
-/// Shortest first step, longest first step and longest later step of a profile, in the coordinate.
+/// Limits of the steps of a profile, in the coordinate of the unknown: shortest first step, longest first step
+/// and longest later step.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
 /// Distance to the minimum, in standard deviations, at which the search for a point of the profile ends. It adds a hundredth of
 /// [`OPEN`] to the sum of squares.

@@ -57,7 +57,8 @@ pub struct Solution<'p> {
 }
 
 impl Solution<'_> {
-    /// Returns true if the residual of every signal is noise of the size that neighbouring rows show.
+    /// Returns true if the residual of every signal passes the tests for noise, and is not clearly larger than the
+    /// noise between neighbouring rows.
     pub fn is_noise(&self) -> bool {
         self.tests.iter().all(Tests::passed) && !self.fit.is_loud()
     }
@@ -484,7 +485,8 @@ impl Fit<'_> {
         starts.into_iter().map(|j| (j, [side(j, -1.0), side(j, 1.0)])).collect()
     }
 
-    /// Returns true if the residual at a point is noise of the size that neighbouring rows show.
+    /// Returns true if the residual of every signal at a point passes the tests for noise, and is not clearly larger than the
+    /// noise between neighbouring rows.
     pub fn is_noise(&self, point: &super::fit::Point) -> bool {
         self.tests(point).iter().all(Tests::passed) && !self.is_loud()
     }
@@ -515,10 +517,10 @@ impl Fit<'_> {
         Ok(None)
     }
 
-    /// Returns the minimum from a start. With `parts`, growing parts of the recordings are fitted one after the other;
-    /// without parts, the whole recordings with a noise that is less inflated each time. The smallest sum of squares over
-    /// each part is added to `own`; `best` has those of the best search so far. Returns `None` if the search approaches the
-    /// minimum of the best search.
+    /// Returns the minimum from a start. With `parts`, growing parts of the recordings are fitted one after the other; without
+    /// parts, the whole recordings with a noise that is less inflated each time. The smallest sum of squares over each part is
+    /// added to `own`; `best` has the smallest sums of squares of the best search so far. Returns `None` if the search approaches
+    /// the minimum of the best search.
     fn search_from(
         &mut self,
         z: &[f64],

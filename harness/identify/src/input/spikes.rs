@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_long_burst_of_noise_is_not_treated_as_spikes_and_is_searched_in_linear_time() {
-        // 15,000 rows with a thousand times the noise: a search that looks at all of them for each row took minutes
+        // 15,000 rows with a thousand times the usual noise: a search that looked at all suspect rows for each row took minutes
         let mut random = Random::new(9, 0);
         let burst = |k: usize| (100_000..115_000).contains(&k);
         let mut rate = || -> Vec<f64> {

@@ -91,7 +91,8 @@ fn identify_finds_damping_that_grows_with_the_amplitude() {
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [("slosh.zeta", 0.003), ("slosh.zeta_amplitude", 0.02)] {
         let p = &found.parameters[name];
-        // Four standard deviations as above; the standard deviation must be below a tenth of the value.
+        // The estimate is within four standard deviations of the true value, and the standard deviation is below a
+        // tenth of the value.
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.1 * truth, "{name}: {p:?}");
     }
 }
@@ -117,7 +118,8 @@ fn damping_of_breaking_waves_is_recovered() {
     {
         let p = &found.parameters[name];
         println!("{name}: {p:?}");
-        // Four standard deviations as above; the standard deviation must be below a quarter of the value.
+        // The estimate is within four standard deviations of the true value, and the standard deviation is below a
+        // quarter of the value.
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.25 * truth, "{name}: {p:?}");
     }
     // equally large waves of a liquid in which no waves break
@@ -420,7 +422,8 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
     let [drag] = &found.details.missing[..] else { panic!("{:?}", found.details.missing) };
     assert_eq!(drag.follows, "the rate's square against the motion");
-    // four standard deviations as above; the standard deviation must be below an eighth of the value
+    // the estimate is within four standard deviations of the true value, and the standard deviation is below an
+    // eighth of the value
     assert!((drag.factor + 0.02).abs() < 4.0 * drag.std && drag.std < 0.003, "{drag:?}");
     assert_eq!(found.fits, Some(false));
     let said = found.verdict.iter().find(|line| line.starts_with(DOES_NOT_FIT)).unwrap();
@@ -464,7 +467,7 @@ fn the_delay_is_uncertain_if_another_intersample_behaviour_fits_as_well() {
     let torque =
         Torque::Profile("lin-sweep:amplitude=0.05,duration=130,f0=2,f1=3".parse().unwrap());
     let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
-    // only viscous friction, which makes the fit fast
+    // the bench has only viscous friction, which makes the fit fast
     let asked =
         Options { sensor_errors: true, friction: vec!["viscous".into()], ..of_any_torque() };
     let found = identify(&fmu, std::slice::from_ref(&recording), &asked, &mut |_| {}).unwrap();
@@ -559,7 +562,7 @@ fn a_downward_sweep_shows_that_slosh_rotates() {
     assert_eq!(found.details.fit.model, "spherical");
     for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("slosh.zeta", 0.003)] {
         let p = &found.parameters[name];
-        // four standard deviations, as above
+        // a correct estimate exceeds four standard deviations in one of 3000 draws of the noise, and the seed is fixed
         assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
     }
 }
@@ -720,7 +723,8 @@ fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
         let off = recording.rate.iter().zip(&motion.rate).map(|(a, b)| (a - b).abs());
         let off = off.fold(0.0, f64::max);
         let largest = recording.rate.iter().fold(0.0, |m: f64, w| m.max(w.abs()));
-        // the largest error is where friction changes its sign: a thousandth of it is about 1e-5 rad/s
+        // the difference of the two motions is largest where friction changes its sign: a thousandth of the largest rate
+        // is about 1e-5 rad/s
         assert!(off < 1e-3 * largest, "{intersample:?}, {delay} s late: off by {off} of {largest}");
     }
 }

@@ -495,8 +495,8 @@ mod tests {
         points[1]
     }
 
-    /// The modes of the default tank are those of a cylinder of 0.9 m diameter with a depth of 0.6 m, to six digits; the
-    /// origin is at mid-depth.
+    /// The modes of the default tank have the parameters of a cylinder of 0.9 m diameter with a depth of 0.6 m, to six
+    /// digits. The origin of the tank is at mid-depth.
     #[test]
     fn modes_of_a_cylinder_are_drawn_as_that_cylinder() {
         let drawn = tank_with(&[]);

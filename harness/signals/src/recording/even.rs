@@ -58,9 +58,9 @@ pub fn even_with_gaps(
         100.0 * most_missing
     );
     let lost = time.windows(2).filter(|pair| pair[1] - pair[0] > 1.5 * usual).count();
-    // Number of steps, rounded to a whole number.
+    // Number of steps between the first and the last row, as a whole number.
     let count_of = ((last - first) / usual).round().max(1.0);
-    // Times with a wrong spacing must not produce an enormous grid.
+    // A table whose times have a wrong spacing must not produce an enormous grid.
     ensure!(
         count_of <= MOST_ROWS * rows as f64,
         "most rows are {usual:e} s apart, so that an even grid over the {:.3e} s of the recording would have {count_of:.1e} rows \

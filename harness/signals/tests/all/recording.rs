@@ -326,7 +326,7 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
             "t,state,armed,T_cmd,gyro z\n0,idle,false,100,0\n20,\"sweep, up\",true,250,1\n40,sweep,true,-300,-1.5\n",
             renamed,
         ),
-        // a column with events in a few rows, one of them the first
+        // a column of events, which has values in a few rows, the first row among them
         ("t,event,T_cmd,gyro z\n0,start,100,0\n20,,250,1\n40,,-300,-1.5\n", renamed),
         // Excel in other countries, with a typographic minus
         (

@@ -187,8 +187,9 @@ impl Walls {
 }
 
 impl<'a> Forced<'a> {
-    /// Prepares the computation of waves whose frequency is `ratio` times that of small waves; `zeta` is the damping
-    /// ratio of all modes. `degree` and `order` set the resolution. Returns `None` for a liquid with a hole.
+    /// Prepares the computation of waves whose frequency is `ratio` times the frequency of small waves; `zeta` is the damping
+    /// ratio of all modes. `degree` (of the harmonics) and `order` (largest multiple of the frequency) set the resolution.
+    /// Returns `None` for a liquid with a hole.
     pub fn new(
         walls: &'a Walls,
         space: Space,

@@ -2,9 +2,10 @@
 //! amplitude (backbones) are in tests/backbones.csv.
 //!
 //! Each row has the frequencies of a planar and of a rotary periodic wave at a slosh angle, divided by the frequency of
-//! small waves. A variational method (Luke's principle, with 8 planar and 10 rotary truncations) computed them, and its
-//! error is given, too; a second method, which marches in time, agrees within 0.12 %. Columns are empty at angles that
-//! the method did not reach. At h/R = 1 the planar branch is the one of large amplitudes, which begins at 4 degrees.
+//! small waves. They were computed by a variational method (Luke's principle, with expansions of 8 resolutions for planar
+//! and 10 for rotary waves), whose error is given, too; a second method, which marches in time, agrees within 0.12 %.
+//! Columns are empty at angles that the method did not reach. At h/R = 1 the planar frequencies belong to the branch of
+//! large amplitudes, which begins at 4 degrees.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 

@@ -117,9 +117,9 @@ fn unknown_coefficients_are_refused_with_a_reason() {
     );
 }
 
-/// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa, not those of a
-/// pendulum. Limits are stated at every depth: also at h/R = 0.5 and 0.4, where the series is valid up to 22 degrees,
-/// and in shallow liquid. The fold of rotary motion is stated, too.
+/// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa, and not the values of a
+/// pendulum. Limits are stated at every depth: also at h/R = 0.5 and 0.4, where the series is valid up to 22 degrees, and
+/// in shallow liquid. The fold of rotary motion is stated, too.
 #[test]
 fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     let at =
@@ -378,7 +378,7 @@ fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
         assert!(energy.frequency_limit >= energy.angle_limit, "{fill}");
     }
     assert!([0.09, 1.08].iter().all(|fill| at(*fill).energy.is_none()));
-    // A capsule is a sphere up to its joint, but its waves are not those of a sphere.
+    // A capsule is a sphere up to its joint, but its waves differ from waves in a sphere.
     let capsule = tank(include_str!("../../examples/capsule.toml"));
     let data = capsule.solve(0.3, 1).unwrap();
     assert!(amplitude_dependence(&capsule, &data).mode.is_none_or(|known| known.energy.is_none()));

@@ -429,8 +429,8 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
 fn damping_follows_from_capillarity_without_gravity() {
     let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
     let zeta = |g: f64| damped(shape, 0.6, 1e-6, g, Some(0.02)).modes[0].zeta;
-    // In a deep cylinder omega^2 = sigma xi^3/(rho R^3). The damping is 1.39 to 1.54 times that of the laminar layer, by
-    // Mikishev and Dorozhkin.
+    // In a deep cylinder omega^2 = sigma xi^3/(rho R^3). The damping by Mikishev and Dorozhkin is 1.39 to 1.54 times the damping
+    // of the laminar layer.
     let omega = (0.02 * 1.8412_f64.powi(3) / 1000.0 / 0.3_f64.powi(3)).sqrt();
     let layer = 1.8368 / 0.3 * (1e-6 / (8.0 * omega)).sqrt();
     assert!((1.35..1.55).contains(&(zeta(1e-9) / layer)), "{}", zeta(1e-9) / layer);
