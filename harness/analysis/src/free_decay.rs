@@ -123,7 +123,7 @@ impl Start {
             sum.norm_sqr()
         };
         let coarse = largest_line(time, &weighted, low, top)?;
-        // A parabola through the logarithms around the line.
+        // The frequency is the vertex of a parabola through the logarithms of the power around the largest line.
         let h = 0.25 / seconds;
         let [a, b, c] = [coarse - h, coarse, coarse + h].map(|f| power(f).max(1e-300).ln());
         let bend = a - 2.0 * b + c;
@@ -132,7 +132,7 @@ impl Start {
         if frequency * seconds < LEAST_PERIODS || deviation(signal) == 0.0 {
             return None;
         }
-        // phasor over Hann windows of two periods
+        // phasor of the oscillation, computed over Hann windows of two periods
         let half = 1.0 / frequency;
         let windows = ((seconds / half) as usize * 2).clamp(8, 4000);
         let mut points: Vec<(f64, Complex64)> = Vec::new();

@@ -183,7 +183,7 @@ mod tests {
         let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
         let tests = Tests::run(&time, &[&torque], &leaking, 1.0);
         assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");
-        // a burst of 20 s
+        // the innovations contain a burst of 20 s
         let mut burst = white.clone();
         burst[20_000..21_000].iter_mut().for_each(|e| *e *= 1.5);
         let tests = Tests::run(&time, &[&torque], &burst, 1.0);

@@ -51,7 +51,7 @@ pub fn fit<S>(
     rounds: usize,
     solve: impl Fn(DMatrix<f64>, DVector<f64>) -> Option<(DVector<f64>, S)>,
 ) -> Option<(Coefficients, S)> {
-    // Unknowns of B, T and A.
+    // The unknowns are the coefficients of A and B, and of T if it is not left out.
     let unknowns = if transient { 9 } else { 6 };
     let rows = 2 * lines.len();
     if rows < 2 * unknowns {

@@ -123,7 +123,7 @@ fn estimate(
         }
         transformed(&lags, angles).into_iter().take(chunk.len())
     });
-    // scale factor, because the transforms are not normalised
+    // factor by which the transforms are divided, because they are not normalised
     let unit = step / (length as f64 * input.len() as f64);
     response.map(|(h, power)| (h, power * unit)).unzip()
 }

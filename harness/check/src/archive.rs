@@ -212,7 +212,7 @@ pub fn duplicates(archive: &Archive, findings: &mut Findings) {
         // A file and a folder with equal names break the rule zip.file_and_folder, and not this rule.
         let folder = if name.ends_with('/') { "/" } else { "" };
         let names = seen.entry(host::archive::place(name) + folder).or_default();
-        // A repeated entry for a folder hides no content.
+        // A repeated entry for a folder does no harm, because it hides no content.
         if !(name.ends_with('/') && names.contains(&name)) {
             names.push(name);
         }

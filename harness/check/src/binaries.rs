@@ -34,7 +34,7 @@ fn platform(folder: &str) -> Option<Form> {
 }
 
 pub(crate) fn tuple(folder: &str) -> Option<Form> {
-    // architecture-system or architecture-system-ABI
+    // the name of a folder is architecture-system or architecture-system-ABI
     let mut parts = folder.splitn(3, '-');
     let (architecture, system) = (parts.next()?, parts.next()?);
     if !ARCHITECTURES.contains(&architecture) {

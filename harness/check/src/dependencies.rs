@@ -79,7 +79,8 @@ pub fn random_session<'f>(
                     None => continue,
                 }
             }
-            // Bounds are drawn more often than values between them.
+            // The bounds are drawn more often than the values between them, because special cases are
+            // often at the bounds.
             Value::Integer(_) if max - min <= 1e6 => {
                 let inside = min + ((max - min + 1.0) * random.f64()).floor();
                 let all = [min, max, max, inside];

@@ -66,7 +66,7 @@ fn missed_event<'f>(
     // A model without event indicators has no state events.
     *vary |= indicators.is_empty();
     for _ in 0..2 * STEPS {
-        // The inputs jump here, which is an event.
+        // All inputs jump at the beginning of each step, which is an event.
         session.instance.enter_event_mode()?;
         session.stimulate()?;
         session.leave_event()?;

@@ -191,7 +191,7 @@ fn check_pairs(
                 .and_then(|()| session.instance.enter_initialization_mode())
                 .is_ok()
         } else {
-            // Every second start begins at rest.
+            // In every second start the factors are measured at the initial state, without steps before it.
             session.initialise().is_ok()
                 && session.advance(if start % 2 == 0 { 3 } else { 0 }).is_ok()
         };

@@ -129,7 +129,7 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
-        // Another rule reports a failure of this run.
+        // If this ordinary run fails, another rule reports it, and this rule ends.
         fmu.running(interface)?.advance(STEPS)?;
         for start in [fmu.experiment().start + 1000.0, fmu.experiment().start - 3.0] {
             let mut session = fmu.session(interface)?;

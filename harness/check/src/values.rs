@@ -16,7 +16,7 @@ fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Value)> {
 }
 
 fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
-    // Another rule reports a failing initialisation.
+    // If an ordinary initialisation fails, another rule reports it, and this rule ends.
     fmu.running(fmu.first_interface()?)?;
     let mut session = fmu.session(fmu.first_interface()?)?;
     session.instance.setup_experiment(None, session.time, None)?;
@@ -397,7 +397,7 @@ pub fn contains_name(text: &str, name: &str) -> bool {
 }
 
 pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    // Another rule is about inputs.
+    // Inputs are left out, because another rule is about them.
     let reals =
         settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != Causality::Input);
     for (v, _) in reals {

@@ -393,7 +393,7 @@ impl Run {
         let mut time = Vec::with_capacity(rows);
         let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(rows)).collect();
         let inputs = self.inputs(instance.description())?;
-        // an FMU without an input is not driven
+        // if the FMU has no input, none is driven
         let mut cursors: Vec<_> = histories.iter().map(|history| history.cursor()).collect();
         let mut point = 0;
         inputs.drive(instance, self.start(), |instance, t, course| {

@@ -338,7 +338,7 @@ mod tests {
     fn the_equivalent_tank_has_the_bench_s_bond_number() {
         let same = WATER.bond(9.81, BENCH.0);
         let g = OXYGEN.acceleration(same, 2.0425);
-        // rounding errors of a few products
+        // the limit is the rounding error of a few products
         assert!((OXYGEN.bond(g, 2.0425) / same - 1.0).abs() < 1e-14);
         assert!((OXYGEN.radius(same, g) / 2.0425 - 1.0).abs() < 1e-14);
         let cube = OXYGEN.rotational_bond(0.3, 0.7, 0.7);

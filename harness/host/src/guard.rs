@@ -140,7 +140,7 @@ pub fn run<A: AsRef<OsStr>>(
     let readers = [start_reader(first, shown), start_reader(second, shown)];
     let started = Instant::now();
     let child = {
-        // The process is registered, so that [`end_all`] finds it.
+        // The process is started while the list is locked, so that [`end_all`] always finds it in the list.
         let mut running = lock(&RUNNING);
         let child =
             command.spawn().with_context(|| format!("{} cannot be run", program.display()))?;

@@ -112,7 +112,7 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
             "the description has no parameter {name} (allowed: parameters of its tanks and modes)"
         );
     }
-    // The derivative of a state may precede the state.
+    // The numbers of states are changed at the end, because the derivative of a state may precede the state.
     for node in variables.descendants().filter(|node| node.has_attribute("derivative")) {
         if let Some(new) = renumbered.get(node.attribute("derivative").unwrap_or_default()) {
             edits.set(&node, "derivative", new);

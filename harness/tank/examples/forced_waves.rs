@@ -61,7 +61,7 @@ impl Bob {
         let rate = |q: &[f64]| wave.ratio * first_harmonic(q)[1];
         let start = [wave.q[0][0], wave.q[1][0]];
         let v = [rate(&wave.q[0]), rate(&wave.q[1])];
-        // momentum from the velocity
+        // the momentum of the slosh mass, computed from its velocity
         let mut x = [start[0], start[1], v[0], v[1]];
         for _ in 0..50 {
             let r = self.rates(x, [0.0; 2]);

@@ -262,7 +262,8 @@ impl Contour {
     ) -> Vec<(&Segment, [f64; 2])> {
         let mut pieces = Vec::new();
         for segment in &self.segments {
-            // A curved surface may meet a straight wall twice.
+            // Several samples on each segment are compared with the surface, because a curved surface may meet
+            // a straight wall twice.
             let count = samples(segment).max(8);
             let parameter =
                 |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;

@@ -158,7 +158,7 @@ impl Liquid {
                 boundary.weights.push(weight * p[0] * speed);
             }
         };
-        // From the contact line downwards.
+        // The wall is followed from the contact line downwards, to the depth at which the liquid is taken as at rest.
         for segment in wall.segments.iter().rev() {
             let height = |t: f64| scaled(segment.curve.point_at(t))[1];
             let (mut from, to) = (segment.from, segment.to);
@@ -425,7 +425,7 @@ impl First {
             slope: empty(),
         };
         for (q, &rho) in liquid.rho.iter().enumerate() {
-            // r = rho + slope z + curve z^2/2
+            // lines of constant rho: r = rho + slope z + curve z^2/2
             let power = rho.powi(lines);
             let [slope, curve] = [inclination * power, bend * power];
             let grows = f64::from(lines) / rho;

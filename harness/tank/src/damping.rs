@@ -176,7 +176,7 @@ impl Nearest {
 
     fn new(shape: formula::Shape, share: f64, nu: f64, g: f64, layer: f64) -> Option<Nearest> {
         let correlation = shape.correlation(nu, g)?;
-        // 0/0 without viscosity
+        // Without viscosity correlation.zeta and layer are 0.
         let factor = if layer > 0.0 { correlation.zeta / layer } else { formula::UNMEASURED };
         let part = formula::Part { share, factor, weight: correlation.weight };
         Some(Nearest { shape, at_depth: true, part })

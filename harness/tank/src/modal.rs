@@ -565,7 +565,7 @@ fn approximate(
         let big_n = sum(surface.clone(), &|i| phi[i] * phi[i]);
         let a = sum(surface.clone(), &|i| phi[i] * radii[i]);
         let b = (sum(0..surface.start, &|i| phi[i] * pitch[i]) - a) / lambda;
-        // elevation per angle of the pendulum
+        // elevation of the surface per angle of the pendulum
         let scale = a / big_n;
         let mut shape: Vec<[f64; 2]> =
             mesh.along_surface(phi, 24).iter().rev().map(|[r, u]| [*r, scale * u]).collect();
@@ -667,7 +667,7 @@ mod tests {
         use crate::curve::Segment;
         let mut state = seed;
         let mut between = |a: f64, b: f64| {
-            // splitmix64
+            // the random number generator splitmix64
             state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
             let mut x = state;
             x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

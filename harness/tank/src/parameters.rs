@@ -411,7 +411,7 @@ impl ParameterSet {
         };
         let known = data.finite_amplitude.clone();
         let mut found = known.unwrap_or_else(|| finite_amplitude::amplitude_dependence(tank, data));
-        // The coefficients come from potential flow without surface tension.
+        // The coefficients of finite amplitude come from potential flow without surface tension.
         let stiff = modes[0].m * modes[0].lambda * liquid.gravity * MOST_CAPILLARY;
         if springs[0].first().is_some_and(|spring| spring.abs() > stiff) {
             found = FiniteAmplitude {

@@ -182,7 +182,7 @@ fn draw_tank(svg: &mut String, frame: &Frame, section: &Section) {
     for side in [section.wetted.clone(), mirrored(&section.wetted)] {
         if let (Some(first), Some(last)) = (side.first().copied(), side.last().copied()) {
             let mut area = side;
-            // to the axis or to the inner contact line
+            // the surface of the liquid ends at the inner contact line, or without one at the axis
             let inner = if (first[1] - section.z_surface).abs() < 1e-9 * last[0].abs() {
                 first[0]
             } else {

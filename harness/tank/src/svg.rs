@@ -54,7 +54,7 @@ fn first_path(text: &str) -> Result<String, Fault> {
 
 fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, Fault> {
     let mut segments: Vec<Segment> = Vec::new();
-    // in the coordinates of the drawing
+    // present point and start of the path, in the coordinates of the drawing
     let (mut here, mut start) = ([0.0, 0.0], [0.0, 0.0]);
     let mut control: Option<(Point, bool)> = None; // last control point, of a cubic
     let place = |p: Point| [scale * p[0], -scale * p[1]];
@@ -154,7 +154,7 @@ fn cubic_from_quadratic([a, b, c]: [Point; 3]) -> Segment {
 /// Creates the arc of an ellipse from `p` to `q`, counter-clockwise if `up` is true (SVG 2, appendix B.2.4).
 fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
     let (rx, ry) = (rx.abs(), ry.abs());
-    // scaled to the unit circle
+    // both points in coordinates in which the ellipse is a unit circle
     let (u, v) = ([p[0] / rx, p[1] / ry], [q[0] / rx, q[1] / ry]);
     let half = [0.5 * (v[0] - u[0]), 0.5 * (v[1] - u[1])];
     let square = dot(half, half);

@@ -92,7 +92,7 @@ impl Shape {
                 above(0.0, &[("radius", radius), ("height", height)]);
                 above(-height, &[("bottom", bottom)]);
                 above(-f64::MIN_POSITIVE, &[("top", top)]);
-                // lower edge of the cylindrical part
+                // height of the lower edge of the cylindrical part
                 let z = bottom.max(0.0);
                 let mut segments = vec![if bottom == 0.0 {
                     Segment::line([0.0, 0.0], [radius, 0.0])

@@ -22,7 +22,7 @@ fn our_own_fmu_breaks_no_rule() {
     assert_eq!(report.count_findings(Severity::Error), 0);
     let skipped: Vec<_> =
         report.outcomes.iter().filter_map(|o| o.findings.skipped.clone()).collect();
-    // None of its outputs and states has a range.
+    // One rule is skipped because no output and no state of our FMU has a range.
     assert_eq!(
         skipped,
         ["the FMU has no resources", "no variable that the FMU computes has a min or a max"]

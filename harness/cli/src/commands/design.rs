@@ -459,7 +459,7 @@ impl DesignArgs {
         let sigma = white_noise(real)?;
         let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
         let dry = real(friction::C)? + real(friction::D)?;
-        // describing function of the dry friction at this rate
+        // the dry friction is replaced by viscous friction with the same first harmonic at this rate (describing function)
         let mut bench = expected(real, 1.0)?;
         bench.friction =
             real(friction::B)? + real(hub::C)? + 4.0 * dry / (std::f64::consts::PI * rate);

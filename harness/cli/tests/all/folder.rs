@@ -178,7 +178,7 @@ fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
     successful(campaign(directory, &alone));
     let [one] = &rows("runs.csv")[..] else { panic!() };
     let same = |row: &csv::StringRecord| {
-        // the last column is the plan's hash
+        // the last column is left out, because it is the hash of the plan
         row.iter().take(row.len() - 1).map(String::from).collect::<Vec<_>>()
     };
     assert!(all.iter().any(|row| same(row) == same(one)), "{one:?}");

@@ -44,7 +44,7 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     let asked =
         ["identify", "data.csv", "--model", "frozen", "--also", "none", "--out", "result.json"];
     let said = hubslosh(folder, &asked).unwrap();
-    // The inertia of the liquid follows from the tank.
+    // The inertia of the liquid was computed from the tank and not estimated, which the verdict states.
     assert!(said.contains("the interval is valid only for this liquid"), "{said}");
     let asked = ["run", "--parameters", "result.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--columns", "omega", "--out", "twin.csv"]].concat()).unwrap();

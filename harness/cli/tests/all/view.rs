@@ -189,7 +189,7 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
         let shape: Vec<f64> =
             mode["shape"].as_array().unwrap().iter().map(|s| s.as_f64().unwrap()).collect();
         assert_eq!(shape[shape.len() - 1], 1.0);
-        // Simpson's rule
+        // integral over the radius by Simpson's rule
         let last = shape.len() - 1;
         let integral = |of: &dyn Fn(f64) -> f64| -> f64 {
             let weight = |i| if i == 0 || i == last { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };

@@ -68,7 +68,7 @@ fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals(
     assert!([" 5.11.</figcaption>", " 5.12.</figcaption>"].iter().all(|end| !page.contains(end)));
     assert!(!page.contains("No usable recordings"));
 
-    // the fit of friction and inertia
+    // the result of the fit of friction and inertia
     let bearing = std::fs::read_to_string(folder.join("out/friction.json")).unwrap();
     let bearing: serde_json::Value = serde_json::from_str(&bearing).unwrap();
     let truth = Bench::default();

@@ -6,7 +6,7 @@
 //! of which would have to be compiled again with coverage. `.ci/fuzz-readers 1000000` makes a million inputs for each
 //! reader; the tests here make some hundred. `HUBSLOSH_FUZZ_SEED` sets another seed.
 
-// the module of the command that reads parameter sets
+// the module of the command `hubslosh` that reads parameter sets
 #[allow(dead_code)]
 #[path = "../../src/set_file.rs"]
 mod set_file;

@@ -223,7 +223,7 @@ pub const KINDS: &[Kind] = &[
         description: "inertia × acceleration for `width` seconds from `start` on, as of a wheel whose speed changes linearly (thesis 2.7.1)",
         parameters: &[
             parameter("acceleration", 0.1, "rad/s²", "acceleration", Allowed::Any),
-            // hub.I + tank.m_liq tank.r² at the FMU's start values.
+            // inertia of the hub with its liquid, hub.I + tank.m_liq tank.r², at the FMU's start values
             parameter("inertia", 0.428054, "kg·m²", "inertia", Allowed::Positive),
             time("start", 1.0, "start of the torque"),
             time("width", 5.0, "length of the pulse"),

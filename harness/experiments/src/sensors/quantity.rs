@@ -185,7 +185,7 @@ impl Quantity {
                 let (g, a) = (motion[4], component_along(acceleration(motion, motion[3]), *angle));
                 let modal = |(n, angles): (usize, &[f64; 2])| {
                     let k = XI[n] / radius;
-                    // cosh kz / cosh kh without overflow
+                    // cosh kz / cosh kh, written so that it does not overflow
                     let falls = (k * (height - h)).exp() * (1.0 + (-2.0 * k * height).exp())
                         / (1.0 + (-2.0 * k * h).exp());
                     wall(n, radius) * (g * component_along(*angles, *angle) + a) * falls

@@ -52,7 +52,7 @@ fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
         let [out, along, wave] = ["out", "along", "wave_height"].map(|name| column(&table, name));
         let mut largest = 0.0f64;
         for ((out, along), wave) in out.iter().zip(along).zip(wave) {
-            // rounding errors of the arcsines of host and FMU
+            // the limit is the rounding error of the arcsines, in the harness and in the FMU
             assert!((out.hypot(*along) - wave).abs() < 1e-14, "{model}: {out}, {along}, {wave}");
             largest = largest.max(*wave);
         }

@@ -461,7 +461,7 @@ impl<V: Version> Fmu<V> {
         environment.begin_call();
         let component = make();
         calls.end();
-        // From here on no NULL pointer reaches the FMU.
+        // An instance that is NULL is refused here, so that no later call passes a NULL pointer to the FMU.
         let instance = Instance {
             fmu: self,
             component,

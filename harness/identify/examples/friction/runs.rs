@@ -42,7 +42,7 @@ pub const SETS: [Set; 3] = [
         seconds: 240,
         courses: [
             |t| 0.06 * (1.0 - (2.0 * t / 240.0 - 0.5).abs() * 2.0),
-            // a step forwards, then one backwards
+            // a step of the torque forwards, then a step backwards
             |t| match t {
                 _ if (5.0..65.0).contains(&t) => 0.03,
                 _ if (125.0..185.0).contains(&t) => -0.03,

@@ -196,7 +196,7 @@ impl Equations<'_> {
             }
             Liquid::Linear => {
                 let force = m * natural * natural * (y[2] - r * theta) + drag * (y[3] - r * omega);
-                // damping ratio 0.5 %
+                // torque of the appendage's spring and damper, with a damping ratio of 0.5 %
                 let spring = self.bench.appendage.map_or(0.0, |(inertia, frequency)| {
                     let natural = std::f64::consts::TAU * frequency;
                     let (angle, rate) = (y[4] - theta, y[5] - omega);
@@ -284,7 +284,7 @@ impl Equations<'_> {
         solver.integrate().expect("a smooth right-hand side");
         let mut end = *solver.y_out().last().expect("the end");
         if self.bench.liquid == Liquid::Spherical {
-            // the direction of the rod is normalised
+            // the rod's direction is divided by its length, which the integration changes slightly
             let length = (2..5).map(|i| end[i] * end[i]).sum::<f64>().sqrt();
             (2..5).for_each(|i| end[i] /= length);
             let along: f64 = (0..3).map(|i| end[2 + i] * end[5 + i]).sum();

@@ -125,7 +125,7 @@ impl Twin {
             drift: Vec::new(),
             bench,
         };
-        // a Gauss–Markov process
+        // the drift of the gyro's bias is a Gauss–Markov process
         let (_, drift, correlation, _) = GYRO;
         let keep = (-1.0 / (twin.rate * correlation)).exp();
         let mut now = drift * random.normal();
@@ -265,7 +265,7 @@ impl Twin {
             };
             angles.iter().map(|angle| angle + TAU * 0.1 + std * random.normal()).collect()
         });
-        // torque as recorded
+        // the torque that the recording contains
         let torque = tau.iter().map(|tau| self.torque_scale * tau).collect();
         Measured { torque, rate, angle }
     }

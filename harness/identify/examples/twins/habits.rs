@@ -197,7 +197,7 @@ fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
         let stamp = match habit {
             "ms-33hz" => format!("{time:.3}"),
             "us-33hz" => format!("{time:.6}"),
-            // time of day, across midnight
+            // times of day, across midnight, with or without dates
             "clock-times" | "dates" => {
                 let micros = ((time + 86_300.0) * 1e6).round() as u64;
                 let (day, micros) = (micros / 86_400_000_000, micros % 86_400_000_000);

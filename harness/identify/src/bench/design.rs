@@ -384,7 +384,7 @@ mod tests {
         let bound = |value: f64, std: f64| ("name".to_string(), value, std);
         let known = [bound(2.0, 0.02), bound(-1.0, 0.04)];
         let with_zero = [&known[..], &[bound(0.0, 1e-4)]].concat();
-        // geometric mean of 1 % and 4 %
+        // the geometric mean of 1 % and 4 % is 2 %
         assert!((merit(&known) - 0.02).abs() < 1e-15 && merit(&with_zero) == merit(&known));
     }
 
@@ -398,7 +398,7 @@ mod tests {
             speeds: [1600.0 * rpm, 200.0 * rpm, 3000.0 * rpm],
         };
         let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
-        // 146.6 rad/s of 444 rad/s are available
+        // of the change of speed of 444 rad/s, only 146.6 rad/s are available
         let factor = wheel.factor(&time, &vec![0.1; 1000]);
         assert!((factor - 146.6 / 444.0).abs() < 1e-3, "{factor}");
         let fast: Vec<f64> = time.iter().map(|t| 0.52 * (TAU * 3.0 * t).sin()).collect();

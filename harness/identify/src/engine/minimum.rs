@@ -232,7 +232,7 @@ impl Fit<'_> {
     ) -> Result<Minimum> {
         let n = point.z.len();
         let (mut damping, mut fresh, mut decrement, mut sets) = (1e-3, false, f64::INFINITY, 0);
-        // sum of squares at the last Jacobian
+        // sum of squares when the last Jacobian was computed
         let mut last = f64::INFINITY;
         loop {
             // If the residual is larger than the noise, distances and gains are relative to the standard deviation of the
@@ -390,7 +390,7 @@ mod tests {
             assert!(curvature.covariance(2).iter().all(|v| v.is_finite()));
             assert!(curvature.unresolved(&[0.0; 2]).is_empty());
         }
-        // the unit of a column changes nothing
+        // the unit of an unknown, and thus the size of its column, has no effect on the result
         for size in [1e-150, 1e-9, 1.0, 1e9, 1e150] {
             let line =
                 DMatrix::from_fn(5, 2, |k, j| if j == 0 { size } else { (k as f64 - 2.0) * size });

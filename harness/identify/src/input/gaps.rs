@@ -142,7 +142,7 @@ fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     if order < 4 {
         return None;
     }
-    // x_k = Σ a_i x_{k−i}, and the same backwards
+    // forward equations x_k = Σ a_i x_{k−i}, and the corresponding backward equations
     let mut windows: Vec<Vec<f64>> = Vec::new();
     for window in [left, right].into_iter().flat_map(|side| side.windows(order + 1)) {
         windows.extend([window.iter().rev().copied().collect(), window.to_vec()]);

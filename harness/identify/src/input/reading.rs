@@ -568,7 +568,7 @@ mod tests {
             said[0].contains("60 samples of tau_cmd are missing in 2 gaps of up to 1.02 s"),
             "{said:?}"
         );
-        // an unpredictable torque
+        // a torque that cannot be predicted in its gaps
         let mut jumps = sweep.clone();
         jumps.torque.iter_mut().for_each(|t| *t += 0.05 * random.normal());
         said.clear();
@@ -627,7 +627,7 @@ mod tests {
         // a gyro with a coarse resolution repeats values by chance
         let coarse: Vec<f64> = noisy.rate.iter().map(|w| (w / 1e-3).round() * 1e-3).collect();
         assert!(fresh(&coarse).is_none());
-        // a gyro with a clock of its own
+        // a gyro whose clock is independent of the clock of the rows
         let other: Vec<f64> =
             (0..noisy.rate.len()).map(|k| noisy.rate[(k as f64 / 1.37) as usize]).collect();
         let new = fresh(&other).unwrap().iter().filter(|new| **new).count();

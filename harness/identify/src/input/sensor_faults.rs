@@ -245,7 +245,7 @@ mod tests {
         // a hub at rest for 20 s, with a gyro whose resolution is coarser than its noise
         rate[..1000].fill(3e-4);
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
-        // a gyro with a coarse resolution
+        // a gyro with a resolution so coarse that it repeats values by chance
         rate.iter_mut().for_each(|w| *w = (*w / 5e-3).round() * 5e-3);
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
     }

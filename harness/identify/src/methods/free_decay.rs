@@ -137,7 +137,7 @@ fn problem<'a>(
     };
     let first: Vec<f64> = unknowns.iter().map(|u| u.start).collect();
     let mut constant = first.clone();
-    // damping that does not depend on the amplitude
+    // a second start, whose damping does not depend on the amplitude
     constant[2] = 0.0;
     Problem {
         system,

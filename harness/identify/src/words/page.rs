@@ -223,7 +223,7 @@ fn bode(signals: &Residual) -> Option<[Chart; 2]> {
         let mut last = None;
         let values = response.frequency.iter().zip(&response.response).map(|(f, h)| {
             let now = h.arg().to_degrees();
-            // continuous over ±180°
+            // 360° are added or subtracted, so that the phase is continuous
             let phase = last.map_or(now, |last: f64| now + 360.0 * ((last - now) / 360.0).round());
             last = Some(phase);
             (*f, phase)

@@ -389,7 +389,7 @@ fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
         held.fits.is_none() && words.contains("friction.b would fit better beyond a bound"),
         "{words}"
     );
-    // the result contains the settings
+    // the result also contains the settings that were not estimated
     let set = |name: &str| held.settings.get(name).map(String::as_str);
     assert_eq!(set("slosh.model"), Some("frozen"));
     assert_eq!(set("fluid.rho"), Some("1e-6"));

@@ -107,7 +107,7 @@ fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
         let limit = match name {
             // the hub rests for 4 s before the ramp breaks it away, which determines the bias to 5e-5 rad/s
             "gyro_bias[1]" => 1e-4,
-            // the other recordings may contain no rest
+            // the other recordings may contain no rest, so that they need not determine the bias
             "gyro_bias[2]" | "gyro_bias[3]" => f64::INFINITY,
             _ => 0.3 * truth.abs(),
         };

@@ -436,7 +436,7 @@ fn coverage_with_adaptive_solvers() {
                     "{rough} {deaf} tolerance {tolerance:e}, noise x {scale}: {judged} of 20 judged, {inside} of {given} \
                      intervals hold the truth"
                 );
-                // with an accurate solver every fit gets a verdict
+                // with an accurate tolerance of the solver, every fit gets a verdict
                 assert!(tolerance > 1e-6 || judged == 20, "{judged}");
                 // with 95 % intervals, fewer than 88 of 100 would contain the true value with a probability of 0.4 %
                 assert!(f64::from(inside as u32) >= 0.88 * f64::from(given as u32));

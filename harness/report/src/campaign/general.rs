@@ -36,7 +36,7 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
             let signals = &vectors[*stem];
             panels.push(Panel::new("time / s", &format!("{stem}{}", unit(signals[0]))));
             for signal in signals.iter().take(8) {
-                // all panels share one legend
+                // the colour depends on the number of curves in all panels, because all panels share one legend
                 let i = traces.len();
                 let curve = history.curve(signal);
                 traces.push(line(p, signal, colors::category(i), colors::dash(i), &curve));

@@ -378,7 +378,7 @@ fn torques(results: &Results) -> String {
     match profiles[..] {
         [] => "none".into(),
         [one] => one.into(),
-        // The parameters that all profiles have in common.
+        // Of several profiles, the name and the parameters that all have in common are shown.
         [first, ..] => {
             let (name, rest) = first.split_once(':').unwrap_or((first, ""));
             let same = |part: &&str| {

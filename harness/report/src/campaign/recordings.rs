@@ -143,7 +143,7 @@ fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
         return String::new();
     };
     let (factor, places, unit) = feature.difference;
-    // adding 0 avoids −0.0
+    // a rounded −0.0 becomes 0.0 by adding 0
     let unit_of_last = 10f64.powi(places as i32);
     let rounded = ((model - there) * factor * unit_of_last).round() / unit_of_last + 0.0;
     let text = format!("{rounded:+.places$} {unit}").replace('-', "\u{2212}");

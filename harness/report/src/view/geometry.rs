@@ -296,7 +296,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
     };
     Tank {
         prefix: String::new(),
-        // the tank stands on the platform
+        // the tank stands on the platform, so that its bottom is at z = 0
         position: [number(tank::R), 0.0, -bottom],
         q: [1.0, 0.0, 0.0, 0.0],
         outline,

@@ -77,7 +77,7 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let mut sorted = steps.clone();
     let middle = (steps.len() - 1) / 2;
     let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // The times are already even, without rounding.
+    // The times are already even, so that there was no rounding to be undone.
     if steps.iter().all(|step| *step > 0.0 && (step / usual).fract() == 0.0) {
         return None;
     }

@@ -95,7 +95,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
         return Ok(None);
     }
     let Some(colon) = field.find(':') else { return basic(field) };
-    // Python's logging writes decimal commas.
+    // A comma may be a decimal sign, because Python's module logging writes decimal commas.
     let bytes = field.as_bytes();
     let decimal = field.rfind(',').filter(|at| {
         *at > colon

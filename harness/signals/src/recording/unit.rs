@@ -236,7 +236,7 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
             found = each.collect();
             continue;
         }
-        // rads^-1 means rad/s.
+        // `rads^-1` is read as rad/s, although it has no separator.
         let left = term.letters.strip_suffix(['s', 'S']).filter(|_| is_single && exponent < 0);
         let left = left.map(|left| run(left, fold)).unwrap_or_default();
         let each = found.iter().flat_map(|a| {
@@ -406,7 +406,7 @@ pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<State
         }
         let is_foreign = |text: &str| {
             let minutes = dimension == Time.dimension() && text.eq_ignore_ascii_case("m");
-            // An index is not a unit: omega[1].
+            // An index in brackets, as in omega[1], is not a unit.
             let is_index = !text.contains(|c: char| c.is_alphabetic() || "%°".contains(c));
             minutes || !is_index && text.len() > 1 && !OFTEN_OTHERS.contains(&text) && is_unit(text)
         };

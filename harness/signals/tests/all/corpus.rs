@@ -115,7 +115,7 @@ fn spreadsheets() -> Vec<Case> {
     });
     let minus = |text: &str| text.replace('-', "\u{2212}");
     let french = lines("t;T_cmd;gyro z\n", |k| {
-        // µN·m, with narrow blanks as separators of thousands
+        // torques in µN·m, with narrow blanks as separators of thousands
         let torque = format!("{}\u{202f}000", torque(k)).replace("0\u{202f}000", "0\u{202f}000");
         let torque = if torque.starts_with("0\u{202f}") { "0".into() } else { torque };
         format!("{};{};{}", millis(k), minus(&torque), minus(&commas(&rate(k))))

@@ -132,7 +132,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
     let (unit, factor) = pick(dice, units);
     let name = pick(dice, names);
     let cells = si.iter().map(|value| match value / factor {
-        // a clock counts whole units
+        // times in a small unit are whole numbers, because a clock counts whole units
         count
             if signal == "time"
                 && (count - count.round()).abs() < 1e-6 * count.abs().max(1.0)
@@ -250,7 +250,7 @@ fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
         return vec![first, second];
     }
     if form == 3 {
-        // times in whole seconds, shared by many rows
+        // times in whole seconds, each of which several rows share
         let cells = ms.iter().map(|t| t.div_euclid(1000).to_string()).collect();
         *clear = false;
         let is_even = ms.windows(2).all(|t| t[0] / 1000 != t[1] / 1000);

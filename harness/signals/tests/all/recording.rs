@@ -106,9 +106,9 @@ fn a_recording_gives_equal_numbers_for_every_separator_decimal_mark_comment_and_
             "# t T_cmd gyro\n0 100 0\n20 250 1\n  40  -300   -1.5\n",
             "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro:deg/s",
         ),
-        // no header
+        // a file without a header, whose columns are given by their numbers
         ("csv", "0,100,0\n20,250,1\n40,-300,-1.5\n", "time=#1:ms,tau_cmd=#2:mNm,omega=#3:deg/s"),
-        // dates with and without an offset from UTC
+        // times that are dates with and without an offset from UTC
         (
             "csv",
             "t,T_cmd,gyro z\n2026-01-31T23:59:59.990Z,100,0\n2026-02-01T00:00:00.010Z,250,1\n2026-02-01T01:00:00.030+01:00,-300,-1.5\n",
@@ -197,7 +197,7 @@ fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
         // a stated unit must agree with the unit of the type
         let error = read_file(&path, &columns("time=time:min")).unwrap_err();
         assert!(error.contains("but another one is stated for it, of 60 s"), "{name}: {error}");
-        // files that `hubslosh run` and `view` write
+        // the file is also read by the reader of tables that `hubslosh run` has written
         let table = Table::read(&path, &["time", "omega"]).unwrap();
         assert_close(column(&table, "time"), &expected, name);
     }
@@ -328,7 +328,7 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
         ),
         // a column of events, which has values in a few rows, the first row among them
         ("t,event,T_cmd,gyro z\n0,start,100,0\n20,,250,1\n40,,-300,-1.5\n", renamed),
-        // Excel in other countries, with a typographic minus
+        // a file of Excel with the decimal commas of other countries, and with a typographic minus
         (
             "\u{feff}sep=;\nt;T_cmd;gyro z\n0,0;100;0\n20,0;250;1\n40,0;\u{2212}300;\u{2212}1,5\n",
             renamed,
@@ -354,7 +354,7 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
 fn recordings_with_clock_times_or_dates_in_many_notations_are_read() {
     let rows = |stamps: [&str; 3]| stamps.map(|stamp| format!("{stamp};0,1;2\n")).concat();
     let cases = [
-        // clock times across midnight
+        // clock times that pass midnight
         ["23:59:59.990", "00:00:00.010", "0:00:00.03"],
         ["23:59:59,990", "24:00:00,010", "24:00:00,030"],
         [

@@ -137,7 +137,7 @@ fn every_impossible_fill_has_a_clear_message() {
         ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", -1.0, "must be above 0"),
         ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", f64::NAN, "fill is NaN"),
         ("shape = { sphere = { radius = 1.0 } }", 2.1, "above the top of the tank, 2.000000 m"),
-        // a horizontal part of the wall at 0.5 m
+        // the free surface is at a horizontal part of the wall at 0.5 m
         (
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 0.5] }, { line = [1, 0.5, 2, 0.5] }, { line = [2, 0.5, 2, 1] }]",
             0.5,
@@ -440,7 +440,7 @@ fn points_are_straight_lines_or_a_spline() {
     let tank = Tank::parse(&format!("{text}\nspline = true"), folder.path()).unwrap();
     let lambda = tank.solve(1.0, 2).unwrap().modes[0].lambda;
     assert!((lambda - exact).abs() < 1e-7, "{lambda}");
-    // Two points make a cone.
+    // A contour of two points is a cone.
     std::fs::write(folder.path().join("two.csv"), "0,0\n1,2\n").unwrap();
     let cone = Tank::parse("density = 1.0\npoints = 'two.csv'", folder.path()).unwrap();
     let mass = cone.solve(1.0, 1).unwrap().m_liq;
@@ -590,7 +590,7 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
         let [low, high] = mode.interval;
         let expected = [n, mode.omega / core::f64::consts::TAU, mode.zeta, low, high, mode.laminar];
         for (found, expected) in row.iter().zip(expected) {
-            // The interval is printed with three digits.
+            // The ends of the interval are printed with three digits.
             assert!((found / expected - 1.0).abs() < 5e-3, "{row:?} {expected}");
         }
     }

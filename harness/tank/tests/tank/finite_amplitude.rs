@@ -238,7 +238,7 @@ fn files_for_the_fmus_have_the_angle_limits() {
     }
     let amplitude_dependence =
         |text: &str, fill: f64| limit(text, fill, Target::SloshTank, "tank.angle_limit[1]");
-    // s and kappa are left out at h/R 0.1.
+    // At h/R = 0.1 s and kappa are not known, so that the limit is the limit of a pendulum.
     assert!(amplitude_dependence(cylinder, 0.01).unwrap().to_degrees() < 0.5);
     assert!(amplitude_dependence("box = [0.8, 0.5]", 0.4).is_some());
 }
@@ -321,7 +321,7 @@ fn files_have_the_energy_terms_where_they_are_known() {
         set.values.iter().filter_map(number).collect()
     };
     for (fill, target, prefix, count) in [
-        // The third-order series is valid only below 5 degrees.
+        // At this fill the third-order series is valid only below 5 degrees, so that the file has no coefficients.
         (0.024, Target::SloshTank, "tank", 0),
         (0.025, Target::SloshTank, "tank", 6),
         (0.05, Target::Spacecraft { tank: 2 }, "tank[2]", 6),

@@ -295,7 +295,7 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);
         let warned = |words: &str| set.warnings.iter().any(|warning| warning.contains(words));
         assert_eq!(warned("3 points are too few for this tank"), few, "{:?}", set.warnings);
-        // the damping ratio of every fill
+        // the table has the damping ratio of every fill
         for (i, row) in table.rows.iter().enumerate() {
             let ratio = tank_damping(&tank, row, 1e-6, liquid).unwrap().modes[0].zeta;
             let name = format!("tank.fill.zeta[1,{}]", i + 1);

@@ -58,7 +58,7 @@ pub fn chapters(
     let has_friction = !friction.is_empty();
     let all: Vec<Recording> = friction.into_iter().chain(decays).collect();
     let mut settings = nominal::with_damping(day.settings.clone());
-    // The tank is empty in these runs.
+    // The tank is empty in friction runs and free decays.
     settings.extend(runs::empty());
     let options = Options {
         settings,
