@@ -486,7 +486,7 @@ impl<'a> Solver<'a> {
         // derivatives along the lines of constant rho
         let mut along = DMatrix::zeros(rows, nc);
         let mut kinetic = DMatrix::zeros(rows, nc);
-        // coefficients of the diagonal blocks
+        // coefficients, at each point, of the diagonal blocks of the matrix of derivatives
         let [mut pull, mut lift, mut bend, mut couple] = [0; 4].map(|_| DVector::zeros(rows));
         let [mut by_omega, mut push, mut swell] = [0; 3].map(|_| DVector::zeros(rows));
         for i in 0..rows {
@@ -822,7 +822,7 @@ fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
             let slope =
                 q * (1.0 / (1.0 - u).sqrt() + (kappa - 1.0) * u / 2.0 + 0.375 * kappa_2 * u * u);
             let inertia = 1.0 + slope * slope + (s - 1.0) * u + s_2 * u * u;
-            // (height(a) - height(q))/(a^2 - q^2)
+            // (height(a) - height(q))/(a^2 - q^2), with the height of the surface on which the slosh mass moves
             let rise = 1.0 / ((1.0 - u).sqrt() + (1.0 - a * a).sqrt())
                 + (kappa - 1.0) * (a * a + u) / 8.0
                 + kappa_2 * (a.powi(4) + a * a * u + u * u) / 16.0;

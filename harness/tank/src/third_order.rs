@@ -230,7 +230,7 @@ impl Overlaps {
     /// elevation, with g = 1.
     fn wave(&self, depth: f64) -> [f64; 3] {
         let t_1 = self.k * (self.k * depth).tanh();
-        // eta_t = G_0 Phi
+        // The last element follows from the first-order equation eta_t = G_0 Phi.
         [t_1, t_1.sqrt(), -t_1.sqrt() / t_1]
     }
 

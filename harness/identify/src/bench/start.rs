@@ -194,14 +194,14 @@ fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<(f64
     let (t, w, s) = (spectrum(&torque), spectrum(&rate), spectrum(&signs));
     let width = 1.0 / (n as f64 * step);
     let (first, last) = ((0.9 * band.0 / width) as usize, (1.1 * band.1 / width) as usize);
-    // only lines above the noise
+    // only spectral lines above the noise are used
     let floor = 9.0 * noise.powi(2) * 1.5 * n as f64;
     let lines: Vec<usize> =
         (first.max(1)..last.min(w.len() - 1)).filter(|&k| w[k].norm_sqr() > floor).collect();
     if lines.len() < 30 {
         return None;
     }
-    // 1500 lines are enough
+    // 1500 spectral lines are enough; of more lines, every n-th one is used
     let lines: Vec<usize> = lines.iter().copied().step_by((lines.len() / 1500).max(1)).collect();
     let all: f64 = lines.iter().map(|&k| w[k].norm_sqr()).sum();
     let try_mode = |frequency: f64, damping: f64, before: (f64, f64)| {

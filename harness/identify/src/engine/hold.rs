@@ -22,7 +22,7 @@ pub struct Rival {
     pub more: f64,
     /// Coordinates of its minimum minus the coordinates of the minimum with the chosen intersample behaviour.
     pub shift: Vec<f64>,
-    /// Its estimated delay, s, if a delay is estimated.
+    /// Delay, s, that was estimated with this intersample behaviour, if a delay is estimated.
     pub delay: Option<f64>,
     /// True if an output would precede its input with this delay.
     pub early: bool,

@@ -367,7 +367,7 @@ impl Fit<'_> {
                 let before = self.noise.clone();
                 self.renew_noise(&minimum.point);
                 if turn > 0 && self.noise.iter().zip(before).all(|(n, b)| n.white == b.white) {
-                    // the noise is at its lower limit
+                    // the noise no longer changes, because it is at its lower limit
                     break;
                 }
                 let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };

@@ -22,7 +22,7 @@ pub struct Free {
     /// True if the unknown has a separate value in each recording, for example an initial value.
     pub each: bool,
     pub start: f64,
-    /// Bounds; `None` for the FMU's min and max.
+    /// Bounds of the unknown; `None` if the FMU's min and max are its bounds.
     pub bounds: Option<(f64, f64)>,
 }
 

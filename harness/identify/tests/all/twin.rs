@@ -198,7 +198,7 @@ fn the_cause_of_a_misfit_is_named_with_the_option_that_estimates_it() {
     assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
     let lag = &found.measurement["actuator_lag"];
     assert!((lag.value - 0.03).abs() < 4.0 * lag.std && lag.std < 3e-3, "{lag:?}");
-    // with the lag estimated, inertia and friction are right
+    // if the lag is estimated, the estimates of inertia and friction are correct
     let inertia = &found.parameters["hub.I"];
     assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
 }
@@ -348,7 +348,7 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     assert!(speed.interval == [0.0, f64::INFINITY] && !speed.determined, "{speed:?}");
     let said = found.verdict.iter().any(|l| l.starts_with("friction.omega_s is not determined"));
     assert!(said, "{:?}", found.verdict);
-    // the intervals of tank and hub have two ends
+    // the intervals of the other parameters, of tank and hub, are closed at both ends
     for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("hub.I", 0.322414)] {
         let [low, high] = found.parameters[name].interval;
         assert!(low < truth && truth < high && high < 1.1 * low, "{name}: {low} {high}");
@@ -645,7 +645,7 @@ fn the_first_gyro_values_bound_an_initial_rate_that_friction_stops_at_once() {
     let first = &found.measurement["init.omega[1]"];
     assert!(first.interval[0] < 0.0 && first.interval[1] > 0.0, "{first:?}");
     assert!(first.value.abs() < spread && first.std < 2.0 * spread, "{first:?}");
-    // the asymmetry is still estimated
+    // the asymmetry of the friction is still determined
     assert!(found.parameters["friction.asymmetry"].std < 0.1);
 }
 
@@ -713,7 +713,7 @@ fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
         (Hold::BandLimited, 0.005),
     ] {
         let sensor_errors = SensorErrors { delay, ..SensorErrors::default() };
-        // the sampling of the gyro without its noise
+        // the gyro samples at its own rate, but without noise
         let settings = ["imu.arw", "imu.bias_instability"].map(|name| (name.into(), "0".into()));
         let twin =
             Twin { intersample, sensor_errors, settings: settings.to_vec(), ..Twin::default() };

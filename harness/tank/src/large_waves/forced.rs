@@ -404,7 +404,7 @@ fn drag_of_modes(solver: &Solver, m: usize) -> DMatrix<f64> {
     let mut drag = DMatrix::zeros(coupling.ncols(), coupling.ncols());
     for (n, value) in eigen.eigenvalues.iter().enumerate() {
         if *value > 1e-9 {
-            // normalised to the kinetic energy u_n^T u_n = 1
+            // the mode is normalised so that its kinetic energy u_n^T u_n is 1
             let u = coupling.tr_mul(&eigen.eigenvectors.column(n)) / value.sqrt();
             drag += &u * u.transpose() / value.sqrt();
         }

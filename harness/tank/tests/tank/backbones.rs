@@ -52,7 +52,7 @@ fn frequency_ratios(of: &EnergyTerms, angle: f64) -> [f64; 2] {
                 + (kappa - 1.0) * q.powi(3) / 2.0
                 + 0.375 * kappa_2 * q.powi(5);
             let inertia = 1.0 + slope * slope + (s - 1.0) * q * q + s_2 * q.powi(4);
-            // (height(a) - height(q))/(a^2 - q^2)
+            // (height(a) - height(q))/(a^2 - q^2), with the height of the surface on which the slosh mass moves
             let rise = 1.0 / ((1.0 - q * q).sqrt() + (1.0 - a * a).sqrt())
                 + (kappa - 1.0) * (a * a + q * q) / 8.0
                 + kappa_2 * (a.powi(4) + a * a * q * q + q.powi(4)) / 16.0;
