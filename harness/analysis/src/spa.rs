@@ -57,8 +57,8 @@ impl Estimate {
         each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
     }
 
-    /// Returns the rate of change of the response's error along the frequency, relative to the error, 1/Hz. It is
-    /// 2π times the root mean square of the lag, weighted with the squared window, which is (1/2 − 15/(4π²)) 2/3
+    /// Returns how fast the error of the response changes with the frequency, relative to the error, 1/Hz. It is 2π
+    /// times the root mean square of the lag, weighted with the squared window. The mean square is (1/2 − 15/(4π²)) 2/3
     /// M² for Hann's window.
     pub fn slope(&self) -> f64 {
         let pi = std::f64::consts::PI;

@@ -130,9 +130,9 @@ impl TransferFunction {
     /// the sense of least squares over its initial state.
     ///
     /// The initial state is needed because the measured band hardly determines the real pole, whose time constant may
-    /// be fitted as a minute or an hour. From rest, the torque's first half cycle would then leave an offset that the
-    /// model keeps for the whole record, whereas the hub loses it in seconds. MATLAB's `compare` estimates the initial
-    /// state for the same reason.
+    /// be fitted as a minute or an hour. If the model started from rest, the torque's first half cycle would leave an
+    /// offset of its rate for the whole record, whereas the offset of the hub's rate decays in seconds. MATLAB's
+    /// `compare` estimates the initial state for the same reason.
     pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
         let decay = self.pole_damping * self.pole_omega;
         let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();

@@ -5,7 +5,7 @@ use names::hubslosh;
 
 /// Returns the names of the parameters whose start values are not at rest, so that an FMU moves without any
 /// setting. HubSlosh begins with the liquid displaced, so that a first plot in any host shows a motion; if
-/// these parameters are 0, it begins at rest.
+/// these parameters are 0, HubSlosh begins at rest.
 pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     match description.model_name.as_str() {
         "HubSlosh" => vec![hubslosh::init::SLOSH_ANGLE.into()],

@@ -32,10 +32,10 @@ const LOCK: &str = ".lock";
 const UNFINISHED: &str = ".unfinished";
 const TABLE: &str = "runs.csv";
 
-/// Kind of folder: a campaign, or a study of `monte_carlo`. Messages use `name`; `noun`, the name with its article for
-/// readers who do not know the kind; and `elsewhere`, the advice if another program uses the folder. The file
-/// `definition` determines the runs. `is_published` is true for names of files that are published with the last run;
-/// other files are never removed, even if the manifest lists them.
+/// Kind of folder: a campaign, or a study of `monte_carlo`. Messages contain `name`, `noun` (the name with its article,
+/// for readers who do not know the kind) and `elsewhere` (the advice if another program uses the folder). The file
+/// `definition` determines the runs. `is_published` is true for names of files that are published with the last run; other
+/// files are never removed, even if the manifest lists them.
 #[derive(Debug)]
 pub struct Kind {
     name: &'static str,

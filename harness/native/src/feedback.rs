@@ -21,9 +21,9 @@ struct Linear {
     d: Vec<f64>,
     reference: Vec<f64>,
     feedforward: Vec<f64>,
-    /// Positions of an attitude quaternion (scalar first) among the measurements y. For this quaternion the error is
-    /// not r − y but the vector part of q⁻¹ ⊗ r, which is half of the small rotation about each body axis that remains,
-    /// by the shorter way.
+    /// Positions of an attitude quaternion q (scalar first) among the measurements y. For the attitude, the error is not r − y,
+    /// but the vector part of q⁻¹ ⊗ r. It is half of the remaining rotation about each body axis if this rotation is small; of
+    /// the two possible rotations the shorter one is used.
     quaternion: Option<[usize; 4]>,
     /// Working memory for the error e and the next state x, so that a cycle allocates nothing.
     error: Vec<f64>,

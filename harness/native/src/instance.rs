@@ -270,8 +270,8 @@ impl Instance {
 /// Returns the derivatives of `unknowns` with respect to each of `knowns`, known after known.
 ///
 /// Most states of a small craft belong to tanks that it does not have. Therefore the derivative in a direction that moves all
-/// knowns which had no effect in the last Jacobian of this FMU is requested first: if it is 0, so are their columns. `effective`
-/// has the value references of the other knowns; it is updated.
+/// knowns which had no effect in the last Jacobian of this FMU is requested first: if this derivative is 0, the columns of all
+/// these knowns are 0. `effective` has the value references of the other knowns; it is updated.
 fn jacobian(
     instance: &mut fmu::Instance,
     unknowns: &[u32],

@@ -19,8 +19,8 @@ pub struct FiniteAmplitude {
 
 /// Third-order coefficients of a mode.
 ///
-/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa, as in the FMUs, 1 for a pendulum; `error` is their
-///   estimated error relative to 1 + |s| and 1 + |kappa|.
+/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa, as in the FMUs, 1 for a pendulum; `error` is the
+///   estimated error of both, relative to 1 + |s| and 1 + |kappa|.
 /// - `planar`, `circular`: relative shift of omega^2 per squared slosh angle; a mode along one length of a box
 ///   has no circular motion.
 /// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At a slosh angle A the crest
@@ -36,8 +36,8 @@ pub struct Coefficients {
     pub planar: f64,
     pub circular: Option<f64>,
     pub wave_second: f64,
-    /// Slosh angle, rad, up to which the equivalent mass represents the mode: the smaller of the angles at which the
-    /// error of its frequency reaches 0.3 % and at which the error of a forced response reaches 3 %.
+    /// Slosh angle, rad, up to which the equivalent mass represents the mode: the smaller of two angles. At one the
+    /// error of the mass's frequency reaches 0.3 %, at the other the error of a forced response reaches 3 %.
     pub angle_limit: f64,
     pub angle_limit_from: LimitSource,
     pub frequency_limit: Option<f64>,

@@ -710,8 +710,9 @@ mod tests {
         }
     }
 
-    /// In a tank of 1.5 m the narrowest allowed free surface is 1.5 micrometres wide. Narrower are the surface between
-    /// two walls that lean towards each other, a micrometre apart at the brim, and the surface in the tip of a cone.
+    /// In a tank of 1.5 m the narrowest free surface that is accepted is 1.5 micrometres wide. The test has two
+    /// narrower surfaces: between two walls that lean towards each other and are a micrometre apart at the brim, and in
+    /// the tip of a cone.
     #[test]
     fn a_free_surface_without_width_is_refused_with_its_width() {
         let gap = |width: f64| {

@@ -314,9 +314,9 @@ fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
 }
 
-/// The first mode at the points of the surface, and its quantities that the higher orders need: its elevation f with
-/// int f^2 rho drho = 1; (U w)_z and (U w)_zz along the lines; U_r, U_z and U/r; ((U_r^2 + U_z^2) w)_z and (U^2/r^2
-/// w)_z along the lines; w_z and w_zz; and the slope dr/dz of the lines.
+/// Values at the points of the surface that the equations of higher order need. Of the first mode these are its
+/// elevation f with int f^2 rho drho = 1; (U w)_z and (U w)_zz along the lines; U_r, U_z and U/r; ((U_r^2 + U_z^2) w)_z
+/// and (U^2/r^2 w)_z along the lines; of the coordinates, w_z and w_zz, and the slope dr/dz of the lines.
 struct First {
     lambda: f64,
     f: Vec<f64>,

@@ -43,8 +43,8 @@ const DEEP: f64 = 0.999;
 /// Largest slosh angle, rad, at which the third order counts as valid. At 26 degrees the frequency of the circular wave
 /// in a cylinder with h/R = 0.613 differs by 4 % from fully nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
-/// Estimated angle limit of a mode, for tanks that nobody has compared with fully nonlinear flow, divided by the angle
-/// at which the second-order wave is [`STEEPEST`] of the first-order wave. It is the smallest ratio found in upright
+/// Ratio of the estimated angle limit of a mode to the slosh angle at which the second-order wave is [`STEEPEST`] of the
+/// first-order wave, for tanks that nobody has compared with fully nonlinear flow. It is the smallest ratio found in upright
 /// cylinders and in a sphere filled to h/R = 1.5, where the error of a forced response reaches 3 % at 2.6 degrees.
 const ESTIMATED_SHARE: f64 = 0.12;
 /// Largest second-order wave at the wall, relative to the first-order wave, at which the third order counts as valid.
@@ -59,8 +59,8 @@ const LARGEST_SHIFT_ERROR: f64 = 0.02;
 const ASSUMED: &str = "without them the FMUs model a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
 
-/// Slosh angle, rad. If the third order is valid only up to a smaller angle, a warning says so, and files for the FMUs
-/// leave its coefficients out.
+/// Smallest slosh angle, rad, up to which the third order has to be valid. If it is not valid up to this angle, a warning
+/// says so, and files for the FMUs leave its coefficients out.
 pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 impl Coefficients {
@@ -172,8 +172,9 @@ impl Coefficients {
         }
     }
 
-    /// Returns the slosh angle, rad, above which a pendulum in place of these coefficients is out of range, because its
-    /// shift of omega^2 differs too much from theirs. The error of s and kappa counts as part of the difference.
+    /// Returns the slosh angle, rad, above which a pendulum in place of these coefficients is out of range, because the shift
+    /// of omega^2 of the pendulum differs too much from the shift by these coefficients. The error of s and kappa counts as
+    /// part of the difference.
     fn pendulum_limit(&self) -> f64 {
         let [s, kappa] = [self.nonlinear_inertia, self.nonlinear_stiffness]
             .map(|x| self.error * (1.0 + x.abs()));
@@ -235,9 +236,9 @@ fn sphere_radius(contour: &Contour, wall: &Wall, depth: f64) -> Option<f64> {
     points.all(is_on).then_some(radius)
 }
 
-/// Computes coefficients that give the wave's energy, from fully nonlinear potential flow in this tank at this fill,
-/// and adds them to `data`, which already has the third-order coefficients. Does nothing if the tables of upright
-/// cylinders and spheres have given them. If the computation is not possible, a warning says why. It takes about 10 s.
+/// Computes coefficients that give the wave's energy, from fully nonlinear potential flow in this tank at this fill, and adds
+/// them to `data`, which already has the third-order coefficients. Does nothing if `data` already has such coefficients from
+/// the tables of upright cylinders and spheres. If the computation is not possible, a warning says why. It takes about 10 s.
 pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
     let Some(mut found) = data.finite_amplitude.clone() else { return };
     match &mut found.mode {
@@ -529,9 +530,9 @@ fn box_coefficients(
     known
 }
 
-/// Computes the coefficients of a body of revolution with any wall. `lambda`, 1/m, is the first mode's, from the
-/// boundary integral equation. For a ring, returns `Err` with the coefficients of a ring between vertical walls that
-/// has the same radii and the same lambda.
+/// Computes the coefficients of a body of revolution with any wall. `lambda`, 1/m, is the eigenvalue of the first mode from
+/// the boundary integral equation. For a ring, returns `Err` with the coefficients of a ring between vertical walls that has
+/// the same radii and the same lambda.
 fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<String>) -> Judged {
     let [Some(rough), Some(fine)] =
         DEGREES.map(|degree| contour_waves::waves(wall, degree, 1, 0.0))

@@ -22,10 +22,10 @@ impl Fluid {
     }
 }
 
-/// A mode with capillarity: the square `omega2` of its natural frequency, 1/s², and the centring stiffness `spring` at
-/// the slosh mass, N/m, which is slightly negative for a wetting liquid at a large Bond number. `outside` has one
-/// sentence for each range of the formula that the tank is outside of. `unknown` is true if the formula does not apply
-/// to this tank and its contribution exceeds 10 % of omega^2.
+/// A mode with capillarity: the square `omega2` of its natural frequency, 1/s², and the centring stiffness `spring` at the
+/// slosh mass, N/m, which is slightly negative for a wetting liquid at a large Bond number. `outside` has one sentence for
+/// each range of validity of the formula that the tank leaves. `unknown` is true if the formula does not apply to this
+/// tank and its contribution exceeds 10 % of omega^2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capillary {
     pub omega2: f64,
@@ -127,10 +127,10 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     Monotone::new(&places, &values).evaluate(bond.ln_1p())
 }
 
-/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2
-/// by the meniscus of a deep cylinder, times tanh(xi h/R), is added to the result of [`flat`]. At 90 degrees, and
-/// without surface tension, the result is exactly that of [`flat`]. For a contact angle outside 0 to 90 degrees the
-/// nearer limit is used.
+/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2 by
+/// the meniscus of a deep cylinder, times tanh(xi h/R), is added to the result of [`flat`]. At 90 degrees, and without
+/// surface tension, the result is exactly the result of [`flat`]. A contact angle below 0 degrees is treated as 0 degrees,
+/// an angle above 90 degrees as 90 degrees.
 pub fn cylinder(
     mode: &Mode,
     radius: f64,

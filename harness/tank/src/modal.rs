@@ -106,7 +106,8 @@ pub struct Axes {
 /// Damping of the modes of a tank with smooth walls, for the kinematic viscosity `nu`, m2/s, at the specific force
 /// `gravity` along the axis, m/s².
 ///
-/// - `shape`: the measured shape of the wetted wall, or `other`; then `parts` are the measured shapes of parts of the wall.
+/// - `shape`: the shape of the wetted wall if its damping was measured, otherwise `other`; `parts` then has the shapes with
+///   measured damping that parts of the wall have.
 /// - `correlation`: damping ratio of the first mode by the correlation of the shape, if the shape has one.
 /// - `taken`: sentence that explains the chosen damping ratio.
 /// - `modes`: in the order of their frequency; for a box along its first side, and `modes_y` along its second side.

@@ -369,8 +369,8 @@ mod tests {
         assert_eq!(at(1.0, false).0, 6.0);
     }
 
-    /// The points of each panel lie between its ends, and panels follow one another along the boundary. ds/dv is
-    /// the derivative of the arc length, normals point outwards, and the lengths of the panels add up to the
+    /// The test checks four properties: the points of each panel lie between its ends, and panels follow one another along the
+    /// boundary; ds/dv is the derivative of the arc length; normals point outwards; the lengths of the panels add up to the
     /// length of the boundary.
     #[test]
     fn panels_follow_one_another_along_the_whole_boundary() {
@@ -443,8 +443,9 @@ mod tests {
         }
     }
 
-    /// The foot of a point near an arc has the same polar angle as the point, and its distance is measured along the arc;
-    /// near a line, along the line. Each of the four iterations reduces the error to the ratio of distance to radius, 1e-1.
+    /// The foot of a point near an arc has the same polar angle as the point, and its distance is measured along the
+    /// arc; near a line, it is measured along the line. Each of the four iterations reduces the error to the ratio of
+    /// distance to radius, 1e-1.
     #[test]
     fn the_nearest_place_on_a_panel_is_found_for_every_point() {
         for wall in [sphere(), ring(), step()] {

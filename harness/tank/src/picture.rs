@@ -226,8 +226,8 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
 }
 
 /// Draws the section of the tank with its liquid and, for each mode, the free surface, scaled to equal largest
-/// elevations. For modes with more than 1 % of the mass it also draws the pendulum's hinge and slosh mass if they lie
-/// inside the drawing. The frequencies are those at the specific force `gravity`, m/s², unless the data have
+/// elevations. For modes with more than 1 % of the mass it also draws the pendulum's hinge and slosh mass if they
+/// lie inside the drawing. The frequencies hold at the specific force `gravity`, m/s², unless the data have
 /// frequencies with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);

@@ -113,8 +113,9 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
 /// Distance of the wall from a shape, relative to the wall's size, from which on it does not count as this shape.
 const FAR: f64 = 0.01;
 
-/// Distance of the wall from a shape, relative to the smaller of depth and largest radius, from which on it does not count
-/// as similar to this shape. A spheroid that differs by a few per cent from a sphere dissipates as much as the sphere.
+/// Distance of the wall from a shape, relative to the smaller of depth and largest radius, from which on the wall
+/// does not count as similar to this shape. A spheroid that differs by a few per cent from a sphere dissipates as
+/// much as the sphere.
 const NEAR: f64 = 0.1;
 
 const LEAST: f64 = 0.02;

@@ -70,9 +70,9 @@ pub struct Excited {
 }
 
 /// The first mode and the modes that its square excites; they do not depend on the depth. `k` is the first mode's wave
-/// number, 1/m, and `amplitude` is a per slosh angle, m: int psi x/int psi^2, with x along the motion. `fourth` is int
-/// psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of circular motion, `None` if the
-/// section has no circular motion.
+/// number, 1/m. `amplitude` is the amplitude a of the elevation per slosh angle, m: int psi x/int psi^2, with x along
+/// the motion. `fourth` is int psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of
+/// circular motion, `None` if the section has no circular motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
     pub k: f64,

@@ -27,8 +27,9 @@ const RANGE: usize = 2;
 /// larger ratios their covariance is set to 0.
 const RATIO: usize = 32;
 
-/// Tables of the covariance C_mn for coefficients of 1, for all pairs of averaging times: the number of pairs of differences
-/// at each lag divided by M_m M_n, the scale 1/(2 τ_m² τ_n²), and C_mn at each lag for each term.
+/// Tables from which the covariance of the Allan variances is computed, for all pairs of averaging times and for
+/// coefficients of 1: the number of pairs of differences at each lag divided by M_m M_n, the scale 1/(2 τ_m² τ_n²), and C_mn
+/// at each lag for each term.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,

@@ -422,9 +422,10 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
 
 /// `intermediate.inputs`: checks that inputs which are set in the intermediate update act within the step.
 ///
-/// With an input that changes linearly in time, the outputs must be closer to the outputs of steps 64 times as short
-/// than the outputs with a held input are. The short steps also use intermediate update, because an FMU may use the
-/// input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have no rate for any step size.
+/// The reference is a simulation with steps 64 times as short. Outputs with an input that changes linearly in time
+/// must be closer to the reference than outputs with a held input. The short steps also use intermediate update,
+/// because an FMU may use the input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have
+/// no rate for any step size.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     require_updates(subject)?;
     let inputs: Vec<Variable> = subject

@@ -388,8 +388,8 @@ impl Estimate {
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
-    /// Adds the uncertainties of the response and of its features. For a frequency, `slope` returns the rate of change of the
-    /// response's error along the frequency, relative to the error, 1/Hz.
+    /// Adds the uncertainties of the response and of its features. For a frequency, `slope` returns how fast the response's
+    /// error changes with the frequency, relative to the error, 1/Hz.
     fn with_uncertainties(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }

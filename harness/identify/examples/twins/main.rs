@@ -25,8 +25,9 @@ use habits::HABITS;
 use host::fmu::Fmu;
 use identify::bench::identification::Identification;
 
-/// Error of an estimate, in its standard deviations, above which it counts as wrong, if the model fits the recording and the
-/// interval does not contain the true value. An interval with an infinite end does not claim to know this end.
+/// Number of standard deviations. An estimate counts as wrong if its error exceeds this number of its standard deviations
+/// although the model fits the recording, and if its interval does not contain the true value. An infinite end of an
+/// interval makes no claim.
 const WRONG: f64 = 5.0;
 
 #[derive(Default)]

@@ -90,8 +90,8 @@ impl Curvature {
         self.solve(b, &all, 0.0).iter().zip(b).map(|(s, b)| s * b).sum()
     }
 
-    /// Returns the damped step (JᵀJ + λ D)⁻¹ b of the unknowns of `which` that `keep` lists, with the damping λ and the diagonal
-    /// D of JᵀJ. `b` and the step are in the scales of the matrix.
+    /// Returns the damped step (JᵀJ + λ D)⁻¹ b for those unknowns of the curvature that `keep` lists, with the damping λ and the
+    /// diagonal D of JᵀJ. `b` and the step are scaled in the same way as the matrix, whose diagonal is 1.
     fn solve(&self, b: &[f64], keep: &[usize], damping: f64) -> DVector<f64> {
         let damped = |more: f64| {
             let entry = |i: usize, j: usize| {
@@ -145,9 +145,9 @@ impl Curvature {
         (found.eigenvectors, inverse)
     }
 
-    /// Returns the directions that the curvature does not resolve, as unit vectors in its own scales. `errors` are the
-    /// independent relative errors of the derivatives. On average they contribute Σ v_i² errors_i² to the eigenvalue of
-    /// a unit eigenvector v.
+    /// Returns the directions that the curvature does not resolve, as unit vectors in the scaled unknowns. `errors` are
+    /// the independent relative errors of the derivatives. On average they contribute Σ v_i² errors_i² to the eigenvalue
+    /// of a unit eigenvector v.
     pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
         let Some(found) = self.eigen() else { return Vec::new() };
         let flat = FLAT * found.eigenvalues.max();

@@ -517,10 +517,10 @@ impl Fit<'_> {
         Ok(None)
     }
 
-    /// Returns the minimum from a start. With `parts`, growing parts of the recordings are fitted one after the other; without
-    /// parts, the whole recordings with a noise that is less inflated each time. The smallest sum of squares over each part is
-    /// added to `own`; `best` has the smallest sums of squares of the best search so far. Returns `None` if the search approaches
-    /// the minimum of the best search.
+    /// Returns the minimum that the search reaches from a start. With `parts`, growing parts of the recordings are fitted one
+    /// after the other. Without parts, the whole recordings are fitted several times, each time with a smaller factor of the
+    /// noise. The smallest sum of squares over each part is added to `own`; `best` has the smallest sums of squares of the best
+    /// search so far. Returns `None` if the search approaches the minimum of the best search.
     fn search_from(
         &mut self,
         z: &[f64],

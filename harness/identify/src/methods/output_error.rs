@@ -250,8 +250,8 @@ fn identify_whole(
     Ok(found)
 }
 
-/// Returns a start for `problem` from the minimum of another model. Unknowns that the other model lacks keep
-/// the problem's own start.
+/// Returns a start for `problem` from the minimum of another model. An unknown that the other model lacks starts at the
+/// start value in `problem`.
 fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
     let values = from.solution.fit.values(&from.solution.minimum.point.z);
     let mut start = problem.starts[0].clone();

@@ -333,9 +333,9 @@ fn intervals_in_a_flat_valley_of_the_likelihood_contain_the_true_friction() {
     assert!(said, "{:?}", found.verdict);
 }
 
-/// In a still slower motion the hub never comes near the Stribeck speed ω_s, so that the interval of ω_s has no upper end. It has
-/// no lower end either: for ω_s → ∞ the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d), and at any ω_s the same curve
-/// results from c + d in place of c and d = 0.
+/// The motion is so slow that the hub never comes near the Stribeck speed ω_s. Therefore the interval of ω_s has no upper end. It
+/// has no lower end either: for ω_s → ∞ the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d), and
+/// at any ω_s the same curve results from c + d in place of c and d = 0.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {

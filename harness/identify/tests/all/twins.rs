@@ -76,8 +76,8 @@ fn friction_coefficients_are_uncertain_if_a_gentle_torque_does_not_separate_them
 }
 
 /// The rates stay below a quarter of the Stribeck speed, and the encoder is so precise that the derivatives by friction.c,
-/// friction.d and friction.omega_s differ only by a millionth. A combination of the three that has no effect once counted as
-/// known exactly, so that friction.c was wrong by 68 of its reported standard deviations.
+/// friction.d and friction.omega_s differ only by a millionth. One combination of the three coefficients has no effect on the
+/// motion. It once counted as exactly known, so that friction.c was wrong by 68 of its reported standard deviations.
 #[test]
 #[ignore = "minutes of CPU time: .ci/run --nightly"]
 fn a_combination_of_friction_coefficients_without_effect_is_uncertain() {

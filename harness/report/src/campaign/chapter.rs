@@ -13,9 +13,9 @@ pub struct Chapter {
     pub illustrations: Vec<Illustration>,
 }
 
-/// A figure in a chapter of the report: the chart, whose colours are replaced by the page's, a caption that
-/// states what the figure shows, and the numbers of the corresponding figures about the bench in Rubaga's
-/// thesis. `equal` is true if both axes have the same scale.
+/// A figure in a chapter of the report: the chart, whose colours are replaced by the colours of the page, a
+/// caption that states what the figure shows, and the numbers of the corresponding figures about the bench
+/// in Rubaga's thesis. `equal` is true if both axes have the same scale.
 #[derive(Clone, Debug)]
 pub struct Illustration {
     pub chart: Chart,

@@ -7,9 +7,9 @@
 //! a.x + 2 zeta sum omega_n c_n u_n
 //! ```
 //!
-//! which is added to the equation of the elevation in `large_waves.rs`. A small wave then obeys eta'' + 2 zeta omega_n
-//! eta' + omega_n^2 eta = -force, as a slosh mass does. Newton's method finds the acceleration for a given first mode
-//! of the wave, because several waves can belong to one acceleration, but only one acceleration to a wave.
+//! which is added to the equation of the elevation in `large_waves.rs`. A small wave then obeys eta'' + 2 zeta omega_n eta' +
+//! omega_n^2 eta = -force, as a slosh mass does. Newton's method finds the acceleration for a given first mode of the wave,
+//! because one acceleration can cause several waves, whereas a given wave is caused by only one acceleration.
 
 use core::f64::consts::{PI, TAU};
 
@@ -312,8 +312,9 @@ impl<'a> Forced<'a> {
         None
     }
 
-    /// Computes one wave for each of the ascending `sizes`. The first mode of the wave is the size times `shape`: coefficients
-    /// of cos(tau) and sin(tau) along x, and then along y. The list ends where Newton's method does not converge.
+    /// Computes one wave for each of the ascending `sizes`. The first mode of each wave is its size times `shape`,
+    /// which has the coefficients of cos(tau) and sin(tau) along x, and then along y. The list ends where Newton's
+    /// method does not converge.
     pub fn waves(&self, shape: &[f64], sizes: &[f64]) -> Vec<(DVector<f64>, ForcedWave)> {
         let [nz, nc, pushes] = self.sizes();
         let mut found: Vec<(f64, DVector<f64>)> = Vec::new();

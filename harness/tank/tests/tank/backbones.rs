@@ -130,8 +130,8 @@ fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
 }
 
 /// At h/R = 0.8 and 1 the interpolated coefficients s and kappa give frequencies within 0.3 % of nonlinear potential flow
-/// up to 16 degrees. From 7 degrees on they are closer in planar motion than a pendulum. At h/R = 1 the planar branch
-/// splits near 2 to 3.5 degrees.
+/// up to 16 degrees. From 7 degrees on, these frequencies are closer to nonlinear flow in planar motion than the
+/// frequencies of a pendulum are. At h/R = 1 the planar branch splits near 2 to 3.5 degrees.
 #[test]
 fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     let is_bridged = |fill: f64| fill > BRIDGED[0] && fill < BRIDGED[1];
@@ -157,8 +157,8 @@ fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     }
 }
 
-/// In tanks other than cylinders the limit is a share of the angle at which the series breaks down. In cylinders of
-/// every depth, whose true limits are known, this estimate must be smaller than the true limit.
+/// In tanks other than cylinders the limit is estimated as a fraction of the angle at which the series breaks down. In
+/// cylinders of every depth, whose true limits are known, this estimate must be smaller than the true limit.
 #[test]
 fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
     let mut smallest = f64::INFINITY;

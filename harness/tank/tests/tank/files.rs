@@ -203,7 +203,7 @@ fn every_impossible_fill_has_a_clear_message() {
 }
 
 /// A contour counts as closed if the gap is at most 1e-6 of the tank's size, and a free surface is refused within 1e-6 of
-/// the tank's size from a shoulder. Both hold for small and large tanks, up to the largest size of 100 m.
+/// the tank's size from a shoulder. Both limits hold for small and large tanks, up to the largest size of 100 m.
 #[test]
 fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     for c in [0.01, 1.0, 50.0] {
@@ -274,9 +274,9 @@ fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     }
 }
 
-/// Compares volume and mass of the solved tank with the requested ones, and heights with closed forms. The volume is
-/// integrated twice, with 20 points per piece and with 5 points on smaller pieces, so that only rounding of the sums and of
-/// 60 bisections remains.
+/// Compares volume and mass of the solved tank with the requested volume and mass, and heights with closed forms. The
+/// volume is integrated by two rules, with 20 points per piece and with 5 points on smaller pieces, so that only the
+/// rounding errors of the sums and the error of 60 bisections remain.
 #[test]
 fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     let tanks = [

@@ -149,9 +149,9 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
 }
 
-/// In a sphere both models end at the angle at which their response differs by 3 % from forced waves of potential flow.
-/// Beyond the table the limit is an estimate; at h/R = 1.5 it is smaller than the 2.6 degrees at which a forced wave of
-/// the third-order model differs by 3 %.
+/// In a sphere, the third-order model and the model with the wave's energy are both valid up to the angle at which their
+/// response differs by 3 % from forced waves of potential flow. At fills outside the table the limit is an estimate; at h/R
+/// = 1.5 it is smaller than the 2.6 degrees at which a forced wave of the third-order model differs by 3 %.
 #[test]
 fn limits_of_a_sphere_follow_from_its_forced_waves() {
     let at = |fill: f64| coefficients_at("shape = { sphere = { radius = 1.0 } }", fill);
