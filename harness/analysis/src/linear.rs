@@ -275,7 +275,8 @@ mod tests {
             assert_eq!(lock_in.frequency.len(), grid.len());
             let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
             let (lock_in, spa) = (Features::find(&lock_in), Features::find(&spa));
-            // the estimate from the whole record does not depend on the direction: same limits as for the upward sweep
+            // the estimate from the whole record does not depend on the direction of the sweep, so that the limits of
+            // the upward sweep hold
             assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
             assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{law:?}: {spa:?}");
             // the sweep passed the resonance 125 s before the antiresonance, where its oscillation still has

@@ -12,7 +12,7 @@
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
 
-/// Swirl number above which motion counts as rotary; this is an ellipse with axes 1 : 3.7.
+/// Swirl number above which motion counts as rotary. An ellipse with the axis ratio 1 : 3.7 has this swirl number.
 pub const ROTARY: f64 = 0.5;
 
 /// Smallest slosh angle, rad, at which the swirl number is evaluated. At smaller angles the small radial part of a

@@ -103,7 +103,7 @@ impl At<'_> {
         let At { findings, place } = self;
         if findings.list.len() >= KEPT {
             findings.more += 1;
-            // An error replaces a warning in a full list, so that it is shown in any case.
+            // If the list is full, an error replaces a warning, so that the error is shown in any case.
             let is_hidden = severity == Severity::Error && !findings.has_error();
             if !is_hidden {
                 return;

@@ -79,7 +79,7 @@ functions! { Functions:
     get_directional_derivative "fmi2GetDirectionalDerivative", unsafe extern "C" fn(Component, Refs, usize, Refs, usize, *const f64, *mut f64) -> c_int;
 }
 
-// Functions that an FMU for Co-Simulation must export in addition.
+// Functions that an FMU for Co-Simulation must export in addition to `Common` and `Functions`.
 functions! { StepFunctions:
     set_real_input_derivatives "fmi2SetRealInputDerivatives", unsafe extern "C" fn(Component, Refs, usize, *const c_int, *const f64) -> c_int;
     get_real_output_derivatives "fmi2GetRealOutputDerivatives", unsafe extern "C" fn(Component, Refs, usize, *const c_int, *mut f64) -> c_int;

@@ -87,7 +87,7 @@ functions! { Functions:
     update_discrete_states "fmi3UpdateDiscreteStates", unsafe extern "C" fn(Component, *mut Byte, *mut Byte, *mut Byte, *mut Byte, *mut Byte, *mut f64) -> c_int;
 }
 
-// Functions that this host calls for Co-Simulation in addition.
+// Functions that this host calls in Co-Simulation, in addition to `Common` and `Functions`.
 functions! { StepFunctions:
     instantiate "fmi3InstantiateCoSimulation", unsafe extern "C" fn(*const c_char, *const c_char, *const c_char, Byte, Byte, Byte, Byte, Refs, usize, *mut c_void, Option<LogMessage>, Option<Intermediate>) -> Component;
     enter_step_mode "fmi3EnterStepMode", Call;

@@ -37,7 +37,7 @@ pub const OPTION: &str = "--guarded";
 pub const CALL: Duration = Duration::from_secs(8);
 /// Default limit of the memory that an FMU may allocate, bytes.
 pub const MEMORY: u64 = 320 << 20;
-/// Default limit of the size of a file, bytes; large tables extend it.
+/// Default limit of the size of a file, bytes. It is raised for large tables.
 pub const FILE: u64 = 64 << 20;
 /// Number of bytes of a process's output that are stored, each of stdout and stderr.
 pub const PRINTED: usize = 64 << 10;

@@ -340,8 +340,8 @@ impl Product {
 }
 
 impl Shape {
-    /// Creates the function from its zeros and poles. `exact` evaluates the loop gain from the state-space model; the constant
-    /// factor is the median of the ratios at the frequencies of the grid.
+    /// Creates the function from its zeros and poles. `exact` evaluates the loop gain from the state-space model. The constant
+    /// factor is the median, over the frequencies of the grid, of the exact gain divided by the gain of the zeros and poles.
     fn new(
         [zeros, poles]: [&[Complex]; 2],
         period: f64,

@@ -57,7 +57,8 @@ struct Part {
 const PART: usize = 16;
 /// A part of a panel is integrated with Gauss points if x lies outside the Bernstein ellipse whose semi-axes have this sum.
 const FAR: f64 = 2.3;
-/// The same limit for a whole panel, which is then integrated with its own points, without bisection.
+/// Limit of the same sum for a whole panel. If x lies outside the ellipse of this limit, the panel is integrated with its
+/// own points, without bisection.
 const FAR_WHOLE: f64 = 3.0;
 /// Number of iterations for the eigenvectors. For a few modes each iteration reduces the slowest error component to about a
 /// third.

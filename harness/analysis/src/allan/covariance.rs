@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 /// Number of lags per averaging time over which the sum for a covariance runs. Up to this number of
 /// samples per averaging time the sum includes every lag and is exact.
 const PER_TIME: usize = 8;
-/// Range of the lags in multiples of the sum of both averaging times. At lags above one such multiple only flicker noise
+/// The sum for a covariance runs over lags up to this multiple of τ_m + τ_n. At lags above τ_m + τ_n only flicker noise
 /// contributes, and its terms fall as the lag to the power −2.
 const RANGE: usize = 2;
 /// Largest ratio of two averaging times at which the Allan variances are treated as correlated. At

@@ -1,5 +1,5 @@
-//! Rules on FMUs 3.0. A model without a fault (model3.c, model3.xml) breaks no rule. Copies of it with one fault each
-//! break the intended rule.
+//! Rules on FMUs 3.0. A model without a fault (model3.c, model3.xml) breaks no rule. Each of its copies has one fault, and
+//! breaks the rule about this fault.
 
 use std::collections::BTreeSet;
 

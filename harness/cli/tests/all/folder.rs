@@ -275,7 +275,8 @@ fn a_full_disk_gives_an_error_with_the_file_and_leaves_the_last_results() {
     let plan = format!("title = \"A\"\nprofile = \"sine:duration=60\"\n{vary}");
     successful(campaign(directory, &plan));
     let before = published(directory);
-    // 4 KiB less than the report, which is larger than the FMU's binary and smaller than a run of a sweep
+    // the limit is 4 KiB below the size of the report, which is larger than the FMU's binary and smaller than a
+    // run of a sweep
     let room = before["report.html"].len() / 512 - 8;
     let sweep = "title = \"B\"\nprofile = \"exp-sweep:duration=2700\"\n";
     let short = format!("title = \"C\"\nprofile = \"sine:duration=61\"\n{vary}");

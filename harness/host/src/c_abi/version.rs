@@ -44,7 +44,7 @@ functions! { Common<B>:
     deserialize_fmu_state "fmi2DeSerializeFMUstate" "fmi3DeserializeFMUState", unsafe extern "C" fn(Component, *const u8, usize, *mut State) -> c_int;
 }
 
-// Functions that an FMU for Model Exchange must export in addition.
+// Functions that an FMU for Model Exchange must export in addition to `Common`.
 functions! { Exchange<B>:
     enter_continuous_time_mode "fmi2EnterContinuousTimeMode" "fmi3EnterContinuousTimeMode", Call;
     completed_integrator_step "fmi2CompletedIntegratorStep" "fmi3CompletedIntegratorStep", unsafe extern "C" fn(Component, B, *mut B, *mut B) -> c_int;

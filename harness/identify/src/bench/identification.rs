@@ -27,7 +27,8 @@ pub struct ModelFit {
     pub noise_white: f64,
     /// Number of simulations of all recordings. A simulation of a part of the rows counts as a fraction.
     pub simulations: f64,
-    /// True if the residual is more than noise and no small effect explains it.
+    /// True if the fit is below 90 % and the root mean square of the residual is more than twice the gyro's noise, so that the
+    /// search has probably ended in a wrong minimum.
     #[serde(skip)]
     pub poor: bool,
 }

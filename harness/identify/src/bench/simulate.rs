@@ -109,7 +109,7 @@ impl Setup {
     }
 
     /// Simulates the FMU as [`Setup::run`] does, with effects that the FMU does not model, and returns the quantities `read` of
-    /// the motion. If the gyro has a filter, the rate is its output.
+    /// the motion. If the gyro has a filter, the returned rate is the output of this filter.
     pub fn run_under(
         &self,
         fmu: &Fmu,

@@ -297,7 +297,7 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
 /// like power. First δ is estimated by least squares, then T as the median over the windows, because the liquid takes as much
 /// power as it gives back in most of them. T is divided into b, c and d for the speeds of the recording.
 fn friction(recordings: &[Recording]) -> Start {
-    // [power, mean of τ'ω, mean of |ω|], the first two divided by the third
+    // for each window: mean power and mean of τ'ω, both divided by the mean of |ω|, and this mean
     let mut windows: Vec<[f64; 3]> = Vec::new();
     for r in recordings {
         let width = ((20.0 / r.step()) as usize).max(3);

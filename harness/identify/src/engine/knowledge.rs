@@ -60,8 +60,8 @@ impl Fit<'_> {
         let mut covariance = curvature.covariance(n);
         let (noise, both): (Vec<f64>, Vec<f64>) =
             which.iter().map(|&j| solver.derivative[j]).unzip();
-        // directions that even exact derivatives do not resolve are a property of the model; the noise of
-        // the solver adds others
+        // the model itself causes directions that even exact derivatives do not resolve; the noise of the solver
+        // adds further unresolved directions
         let curved: Vec<f64> =
             both.iter().zip(&noise).map(|(b, n)| (b * b - n * n).max(0.0).sqrt()).collect();
         let (of_model, of_both) = (curvature.unresolved(&curved), curvature.unresolved(&both));

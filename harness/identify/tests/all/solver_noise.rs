@@ -408,8 +408,8 @@ fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
     assert!(off < 0.01 * size, "{off} {size}");
 }
 
-/// 20 simulated recordings of each kind: `cargo test --release -p identify --test all -- --ignored --nocapture
-/// coverage_with_adaptive_solvers`.
+/// Identifies 20 simulated recordings of each kind. It is run by `cargo test --release -p identify --test all
+/// -- --ignored --nocapture coverage_with_adaptive_solvers`.
 #[test]
 #[ignore = "two minutes: .ci/run --nightly"]
 fn coverage_with_adaptive_solvers() {

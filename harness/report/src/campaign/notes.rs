@@ -35,8 +35,8 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     }
 }
 
-/// Describes how far the sweep shifts the resonance in the last run of a group; if the runs differ in
-/// torque, it has the largest torque. Returns `None` without a resonance.
+/// Describes how far the sweep shifts the resonance in the last run of a group. If the runs of the group
+/// differ in torque, this run has the largest torque. Returns `None` without a resonance.
 fn swept_row(group: &Group) -> Option<Markup> {
     let run = group.runs.last()?;
     let (mode, exact) = (run.linear.modes.first()?, group.exact.last()?.f_res?);

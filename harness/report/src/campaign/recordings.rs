@@ -7,7 +7,7 @@ use experiments::rounding::thousandths;
 type Value = (f64, Option<f64>);
 
 /// A feature to compare: its heading, the function that reads it from a run with its standard deviation, its
-/// number of digits, and for a difference the factor, the digits and the unit.
+/// number of digits, and for differences between a model and the recording their factor, digits and unit.
 struct Feature {
     heading: [&'static str; 2],
     value: fn(&Outcome) -> Option<Value>,

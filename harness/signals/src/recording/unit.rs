@@ -71,7 +71,7 @@ const WORDS: &str = "sec=s second=s msec=ms milli=ms usec=us micro=us nsec=ns na
 type Product = (Dimension, f64);
 
 /// Finds the meanings of the unit symbol `name`, also with a prefix such as m for milli. If `fold` is true,
-/// upper and lower case are equal, which may give several meanings.
+/// upper and lower case are treated as equal, so that a symbol may have several meanings.
 fn symbol(name: &str, fold: bool) -> Vec<Product> {
     let same = |a: &str, b: &str| if fold { a.eq_ignore_ascii_case(b) } else { a == b };
     let mut found = Vec::new();

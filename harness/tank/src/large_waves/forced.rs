@@ -162,7 +162,7 @@ fn second_derivative(values: &[f64], tau: f64) -> f64 {
 /// Solver for forced waves in a tank.
 pub struct Forced<'a> {
     solver: Solver<'a>,
-    /// 2 zeta sum omega_n u_n u_n^T, as a matrix for the coefficients of the potential.
+    /// Damping matrix for the coefficients of the potential, 2 zeta sum omega_n u_n u_n^T.
     drag: DMatrix<f64>,
     omega: f64,
     ratio: f64,

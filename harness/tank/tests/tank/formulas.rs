@@ -376,7 +376,7 @@ fn a_cylinder_s_damping_names_its_source() {
     }
 }
 
-/// A tank outside the measured ranges of its shape's correlation says which ranges it leaves, at the effective specific force.
+/// Warnings name each measured range of a shape's correlation that the tank is outside of, at the effective specific force.
 #[test]
 fn the_damping_ratio_of_a_tank_names_each_measured_range_that_the_tank_leaves() {
     let number = damping::sphere_number(0.5, 1e-6, 9.81);
