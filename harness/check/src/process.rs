@@ -163,7 +163,7 @@ fn run(
                 }
             }
         }
-        // Only one rule reports this, because all other rules would report the same.
+        // Only the rule `OPENS` reports that the process ended while the FMU was loaded. All other rules would repeat it.
         None if is_lost && rule.id != OPENS => {
             findings.skip_for(OPENS, format!("the process ended while {doing}: {why}"));
         }

@@ -565,7 +565,7 @@ pub fn send_answer(content: &[u8]) {
 }
 
 /// Tells the parent that the guarded process has done its work and ends with this exit code.
-/// Without a parent it does nothing.
+/// If this process is not guarded, nothing is sent.
 pub fn done(code: u8) {
     send(DONE, &[code]);
 }

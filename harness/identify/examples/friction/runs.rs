@@ -21,7 +21,7 @@ pub struct Set {
     pub courses: [Course; 3],
 }
 
-/// Returns a sweep that is linear in frequency, `from` one value `to` another, Hz, within `seconds`, at the time `t`, s.
+/// Returns the value, at the time `t`, s, of a sweep whose frequency rises linearly from `from` to `to`, Hz, in `seconds`.
 fn sweep(t: f64, (from, to): (f64, f64), seconds: f64) -> f64 {
     (TAU * (from * t + (to - from) / (2.0 * seconds) * t * t)).sin()
 }

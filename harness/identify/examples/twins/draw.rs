@@ -49,8 +49,9 @@ pub struct Twin {
     gyro_bias: f64,
     pub encoder: Option<f64>,
     rate: f64,
-    /// Recorded divided by true value of the torque and of the time.
+    /// Ratio of recorded to true torque.
     torque_scale: f64,
+    /// Ratio of recorded to true time.
     clock: f64,
     drift: Vec<f64>,
 }

@@ -385,7 +385,7 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
         let unknown = Unknown { part: Part::Candidate, reach, ..list.nonnegative(name, 0.0) };
         all.extend((used && !is_set(name)).then(|| (Target::Parameter(name.into()), unknown)));
     }
-    // values that the user states may be wrong
+    // Values that the user states may be wrong, so they are candidate causes.
     for (name, value) in options.settings.iter().filter(|(n, _)| PARAMETERS.contains(&n.as_str())) {
         let stated = value.parse::<f64>().ok().filter(|value| *value > 0.0);
         if let Some(value) = stated.filter(|_| !(frozen && name.starts_with("slosh."))) {
