@@ -28,7 +28,8 @@ pub const LONGEST_LINE: f64 = 0.25;
 /// Order of the autoregressive model that predicts the torque in a gap. It is fitted to eight times
 /// as many samples on each side of the gap.
 pub const GAP_ORDER: usize = 32;
-/// Number of places with known torque at which the prediction is tried out, to estimate its error.
+/// Number of places at which samples of known torque are predicted as if they were missing, to estimate the error of the
+/// prediction.
 pub const GAP_TRIALS: usize = 12;
 /// Largest change of the hub's rate that the errors of all filled gaps may cause, relative to the gyro's noise.
 pub const GAP_KICK: f64 = 0.1;

@@ -1119,8 +1119,8 @@ mod tests {
         );
     }
 
-    /// At a corner of the wall the smooth side of the wall ends. A wall that is drawn in several smooth segments gives the
-    /// same waves as a wall of one segment.
+    /// The smooth side of a wall ends at the wall's first corner. A side that is drawn as several segments with smooth
+    /// joints has the same radii and derivatives as a side of one segment.
     #[test]
     fn a_side_ends_at_corners_and_goes_on_over_smooth_joints() {
         let joined = Contour::new(vec![

@@ -15,8 +15,8 @@ const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
 
-/// A shape that the wetted wall has and whose damping was measured, and the fill, m above the lowest point. The shape
-/// is made high enough for the fill.
+/// The shape of a wetted wall whose shape is one of those with measured damping, and the fill, m above the lowest point.
+/// The shape is made high enough for the fill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
     pub shape: Shape,

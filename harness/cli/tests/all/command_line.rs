@@ -439,8 +439,8 @@ fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_ref
     // The same torque through either input gives the same angle, to rounding.
     assert!((ext / cmd - 1.0).abs() < 1e-12 && ext > 1e-3, "{ext} {cmd}");
 
-    // With its slope, an edge is an edge: 0.1 N·m for 0.1 s, then 0. If lines joined the rows, the torque would
-    // fall during a step.
+    // With a column of slopes, the torque jumps at a row: 0.1 N·m for 0.1 s, then 0. Without this column, lines would
+    // join the rows, and the torque would fall gradually during a step.
     let edge = "time,tau_cmd,tau_slope\n0,0.1,0\n0.1,0,0\n0.2,0,0\n";
     assert!(run(edge, &[]).status.success());
     let table = read(&["theta", "tau_cmd"]);

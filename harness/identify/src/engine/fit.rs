@@ -24,7 +24,7 @@ pub struct Fit<'p> {
     /// True for central differences, because one-sided differences are wrong if the outputs are strongly curved in an unknown.
     pub central: bool,
     pub ends: Vec<(f64, f64)>,
-    /// The unknown whose profile is followed, if the likelihood along it was found not to be a parabola.
+    /// The unknown whose profile is followed, if −2 ln L along it was found not to be a parabola.
     pub bent: Option<usize>,
     /// For each unknown, the step of its finite difference, and the smallest step whose effect on the outputs exceeds the
     /// errors of the solver.

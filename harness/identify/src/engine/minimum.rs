@@ -15,7 +15,7 @@ pub struct Minimum {
     pub point: Point,
     /// Derivatives at the minimum; `None` if the last Jacobian belongs to another point.
     pub derivatives: Option<Derivatives>,
-    /// Newton decrement: estimated distance to the minimum, standard deviations.
+    /// Newton decrement: estimated distance of `point` to the exact minimum, in standard deviations.
     pub decrement: f64,
     pub free: Vec<bool>,
 }

@@ -56,8 +56,8 @@ pub enum Part {
 /// logarithm of the value.
 ///
 /// `start` and `bounds` are values. `prior` (mean and standard deviation of the knowledge before the recordings) and `reach`
-/// (plausible distance from the start) are in the coordinate. If `bent` is true, the likelihood along the unknown is no parabola,
-/// and its profile is followed.
+/// (plausible distance from the start) are in the coordinate. If `bent` is true, −2 ln L of the likelihood L is not a
+/// parabola along the unknown, and the profile of the likelihood is followed.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     pub name: String,

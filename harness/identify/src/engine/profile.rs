@@ -1,4 +1,4 @@
-//! The profile likelihood of one unknown along which the likelihood is no parabola.
+//! The profile likelihood of the bent unknown, along which −2 ln L of the likelihood L is not a parabola.
 
 use anyhow::Result;
 use nalgebra::DMatrix;
@@ -37,7 +37,7 @@ pub fn lowest(points: &[Point]) -> Option<&Point> {
 }
 
 impl Fit<'_> {
-    /// Finds the unknown along which the likelihood is least like a parabola, if the problem does not name one as bent. Returns
+    /// Finds the unknown along which −2 ln L is least like a parabola, if the problem does not name one as bent. Returns
     /// true if the profile of this unknown has to be followed.
     ///
     /// # Errors
@@ -129,7 +129,7 @@ impl Fit<'_> {
     }
 
     /// Returns the bent unknown and its profile through a minimum, in ascending order of the coordinate. Returns `None` if no
-    /// unknown is bent, or if the recordings determine the bent unknown so well that its likelihood is a parabola. Points of
+    /// unknown is bent, or if the recordings determine the bent unknown so well that −2 ln L is a parabola along it. Points of
     /// `beyond` outside the range of the profile are added.
     ///
     /// # Errors
@@ -143,8 +143,8 @@ impl Fit<'_> {
         let curvature = Curvature::new(&jacobian, places(&self.free));
         let covariance = curvature.with_flat(!self.problem.rough).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
-        // the unknown that compensates the bent one along the valley is a positive quantity, and not an error whose
-        // expected value is 0
+        // The unknown that compensates changes of the bent unknown `j` along the valley is a positive quantity, and not an error
+        // whose expected value is 0.
         let partner = |i: &usize| {
             let correlation = covariance[(*i, j)] / (std(*i) * std(j));
             !unknowns[*i].log

@@ -453,7 +453,7 @@ mod tests {
     fn a_constant_rate_is_a_bias_and_a_hub_that_turns_is_not_at_rest() {
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
-        // friction stops the mean rate that the first torque causes
+        // The first torque gives the hub a mean rate, which friction reduces to 0 with a time constant of 3 s.
         let first = rigid().rate[0];
         let from_rest = |offset: f64| {
             let mut all = rigid();

@@ -18,9 +18,9 @@ pub struct Faults {
 /// The value of a sensor while the hub is at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rest {
-    /// A rate is at this value (the gyro's bias), if it is known.
+    /// Of a gyro: its bias, because the true rate is 0; `None` if the bias is unknown.
     Rate(Option<f64>),
-    /// An angle may have any value. When the hub begins to turn, the angle starts with zero rate.
+    /// Of an encoder: any angle. When the hub begins to turn, the angle starts with zero rate.
     Angle,
 }
 

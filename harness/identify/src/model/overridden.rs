@@ -22,8 +22,8 @@ pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Returns a value close to `start` within the bounds, but different from `start`, because an FMU does not
-/// warn about a parameter that is set to its default.
+/// Returns a value close to `start` within the bounds. It differs from `start`, which may be the parameter's default,
+/// because an FMU does not warn about a parameter that is set to its default.
 pub fn near(start: f64, (low, high): (f64, f64), reach: f64) -> f64 {
     let by = 1e-6 * reach;
     if start + by <= high { start + by } else { (start - by).max(low) }

@@ -221,7 +221,7 @@ mod tests {
             // in the last case all halves are rounded up, which changes the step of the grid slightly
             assert!(worst < 2e-2 * quantum, "{step} {worst:e}");
         }
-        // two groups of rows are missing
+        // two groups of rows are missing, 84 rows in total
         let mut gaps = printed(1.0 / 33.0, 0..5000, 1e-3);
         gaps.drain(4000..4077);
         gaps.drain(1000..1007);

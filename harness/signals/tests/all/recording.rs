@@ -328,7 +328,7 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
         ),
         // a column of events, which has values in a few rows, the first row among them
         ("t,event,T_cmd,gyro z\n0,start,100,0\n20,,250,1\n40,,-300,-1.5\n", renamed),
-        // a file of Excel with the decimal commas of other countries, and with a typographic minus
+        // a file that Excel writes in a country with decimal commas, and with a typographic minus
         (
             "\u{feff}sep=;\nt;T_cmd;gyro z\n0,0;100;0\n20,0;250;1\n40,0;\u{2212}300;\u{2212}1,5\n",
             renamed,
