@@ -275,6 +275,14 @@ impl Tank {
         if n > 0 || self.diameter <= 0.0 {
             return given;
         }
+        let own = self.limits_of_cylinder(n);
+        [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
+    }
+
+    /// Returns the limits of mode `n` of an upright cylinder from its dimensions, rad. The function is not inlined, because the
+    /// compiler would then divide by the diameter before it is compared with 0, which sets a flag that hosts can trap.
+    #[inline(never)]
+    fn limits_of_cylinder(&self, n: usize) -> [f64; 2] {
         let fill = 2.0 * self.depth / self.diameter;
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let [planar, circular] = third_order::shifts(s, kappa);
@@ -287,7 +295,6 @@ impl Tank {
             }
             None => cylinder(fill, shifts).forced,
         };
-        let own = [own, swirl(fill, has_energy).unwrap_or(0.0)];
-        [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
+        [own, swirl(fill, has_energy).unwrap_or(0.0)]
     }
 }
