@@ -119,9 +119,9 @@ impl InstanceState {
 pub enum CType {
     Real,
     Integer,
-    /// Enumeration, in FMI versions that have functions of their own for it.
+    /// Enumeration. FMI 2.0 reads it as an Integer, FMI 3.0 by the functions of Int64.
     Enumeration,
-    /// Structural parameter, in FMI versions that have functions of their own for it.
+    /// Structural parameter of FMI 3.0, which is read by the functions of UInt64.
     Size,
     Boolean,
     String,

@@ -59,9 +59,9 @@ fn internal_steps_are_the_same_for_long_and_short_communication_steps() {
     assert_eq!(long, short);
 }
 
-/// Expected numbers of internal steps by slosh model and friction law, in the order of their numbers, at the
-/// tolerances 1e-5 and 1e-10. More steps would be slower, and fewer less exact. Because of rounding, a deviation of
-/// one in twenty is accepted.
+/// Expected count of internal steps: rows by slosh model and columns by friction law, each in the order of the
+/// enumeration, and in each pair for the tolerances 1e-5 and 1e-10. More steps would be slower, and fewer steps less
+/// exact. A deviation of one in twenty is accepted, because rounding changes the count.
 const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
     [[7, 12], [7, 12], [34, 56], [16, 29], [174, 194]],
