@@ -1021,27 +1021,13 @@ def verdict(rows: list[Row]) -> str:
     return f"{sum(row.passed for row in rows)} of {len(rows)} comparisons"
 
 
-def computed() -> float:
-    """Return the largest relative difference of our frequencies from published CFD results.
-
-    They are kept apart from the comparisons with measurements, because computations are no
-    measurements.
-    """
-    data = table("box_cfd.csv")
-    ours = [
-        frequency(tank("density = 1000\nbox = [1, 1]\n", h, 1)[0]) / math.sqrt(G)
-        for h in data["h_over_L"]
-    ]
-    return float(np.max(np.abs(ours / data["omega_sqrt_L_over_g"] - 1)))
-
-
 def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     """Return the comparisons as a Markdown table."""
     lines = [head, ("---",) * len(head), *rows]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
-def page(rows: list[Row], cfd: float) -> str:
+def page(rows: list[Row]) -> str:
     """Return the page: the template filled with the results."""
     results = markdown(
         ("experiment", "quantity", "measured ± its error", "computed ± its band", "result"),
@@ -1070,7 +1056,6 @@ def page(rows: list[Row], cfd: float) -> str:
                 for kind, those in of.items()
             ],
         ),
-        "computed": short(100 * cfd, 1),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
     for name, value in put.items():
@@ -1108,7 +1093,7 @@ def main() -> None:
             (BOOK / f"measured_{name}.svg").write_text(drawing, encoding="utf-8")
         print(f"{name}: {verdict(more)} pass")
     write_results(rows)
-    PAGE.write_text(page(read_results(), computed()), encoding="utf-8")
+    PAGE.write_text(page(read_results()), encoding="utf-8")
     print(f"{verdict(rows)} pass; wrote {PAGE}, {RESULTS} and the pictures in {BOOK}")
 
 
