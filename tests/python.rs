@@ -75,8 +75,8 @@ fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     pytest(&mut command, "the tests in Python failed");
 }
 
-/// Runs the tests of the package that take seconds each: type checkers; the code of pages, docstrings and notebooks
-/// with the wheel; 22 sweeps of 45 minutes with each of six slosh models.
+/// Runs the tests of the package that take seconds each: type checkers; the code of docstrings and notebooks with the wheel;
+/// 22 sweeps of 45 minutes with each of six slosh models.
 #[test]
 #[ignore = "minutes: .ci/long-tests"]
 fn long_tests_of_the_package_pass() {

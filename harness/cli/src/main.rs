@@ -233,7 +233,10 @@ fn guarded(cli: &Cli) -> Result<u8> {
             let within = match cli.has_memory_limit() {
                 true => {
                     let files = guard::FILE >> 20;
-                    format!(", uses at most {} MiB of memory and writes files of at most {files} MiB", cli.memory)
+                    format!(
+                        ", uses at most {} MiB of memory and writes files of at most {files} MiB",
+                        cli.memory
+                    )
                 }
                 false => String::new(),
             };

@@ -1,11 +1,9 @@
-"""The wheel: in an empty environment it runs the code of READMEs, pages, docstrings, notebooks."""
+"""The wheel runs docstrings and notebooks in an empty environment (pages: .ci/check_pages.py)."""
 
 import base64
 import csv
 import hashlib
-import re
 import subprocess
-import textwrap
 import zipfile
 from pathlib import Path
 
@@ -95,24 +93,6 @@ def test_the_wheel_tag_names_only_this_machine(wheel: Path) -> None:
     assert all(tag.platform != "any" for tag in tags)
 
 
-def python_in(page: Path) -> list[str]:
-    """Return the Python code blocks of a Markdown page."""
-    blocks = re.findall(r"^ *```python\n(.*?)^ *```", page.read_text(), re.DOTALL | re.MULTILINE)
-    assert blocks, f"{page} has no Python"
-    return [textwrap.dedent(block) for block in blocks]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
-def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path) -> None:
-    """The code runs in an empty folder, with only the wheel installed."""
-    for code in python_in(readme):
-        done = subprocess.run(
-            [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, f"{code}\n{done.stderr}"
-
-
 DOCTESTS = """
 import doctest, importlib, pkgutil, hubslosh
 found = doctest.TestResults(0, 0)
@@ -133,30 +113,6 @@ def test_the_examples_in_docstrings_give_the_shown_results(
 ) -> None:
     """The examples run in an empty folder, with the installed wheel."""
     run_with_wheel(["-c", DOCTESTS], wheel, tmp_path, request)
-
-
-def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str:
-    """Run the code of pages of the book as one program, and return its output."""
-    code = "\n".join(block for page in pages for block in python_in(ROOT / "book" / f"{page}.md"))
-    return run_with_wheel(["-c", code], wheel, folder, request)
-
-
-@pytest.mark.long
-def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
-    """All code blocks of the page run as one program."""
-    said = run_pages(("python_howto",), wheel, tmp_path, request)
-    assert "slosh.model expects one of frozen (1), linear (2), planar (3), spherical (4)" in said
-    for file in ("loop.png", "bode.png", "path.png", "slew/report.html"):
-        assert (tmp_path / file).stat().st_size > 1000, file
-
-
-@pytest.mark.long
-def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, request) -> None:
-    """The worked example runs first, then three pages, each of which answers a question."""
-    pages = ("spacecraft", "which_damping", "how_many_modes", "is_it_slosh")
-    assert "slosh of tank 1, slosh of tank 2" in run_pages(pages, wheel, tmp_path, request)
-    for file in ("tank.svg", "margins.png", "slew.png"):
-        assert (tmp_path / file).stat().st_size > 1000, file
 
 
 @pytest.mark.long

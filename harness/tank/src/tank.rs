@@ -465,7 +465,9 @@ fn revolution(segments: Vec<Segment>, shape: Option<Shape>) -> Result<Geometry, 
 fn rectangle(lengths: [f64; 2]) -> Result<Geometry, Problems> {
     let [length_x, length_y] = lengths;
     if let Some(bad) = lengths.iter().find(|l| !(**l > 0.0 && l.is_finite())) {
-        return Err(format!("box: a length is {bad} m; both side lengths must be above 0 m.").into());
+        return Err(
+            format!("box: a length is {bad} m; both side lengths must be above 0 m.").into()
+        );
     }
     if let Some(long) = lengths.iter().find(|l| **l > crate::contour::LARGEST) {
         return Err(format!(

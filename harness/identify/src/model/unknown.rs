@@ -92,7 +92,10 @@ impl Question {
         for setting in &self.settings {
             if setting.recording.is_some_and(|n| n >= records.len()) {
                 let name = setting.named().0;
-                problems.push(format!("--set {name}: there is no recording of this number (there are {} recordings)", records.len()));
+                problems.push(format!(
+                    "--set {name}: there is no recording of this number (there are {} recordings)",
+                    records.len()
+                ));
             }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
