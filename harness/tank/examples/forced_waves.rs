@@ -119,19 +119,26 @@ fn summary(wave: &ForcedWave, share: f64) -> [f64; 4] {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [shape, motion, degree, order, fills @ ..] = &arguments[..] else {
-        println!("usage: forced_waves sphere|cylinder line|circle|swirl DEGREE ORDER FILL...");
+        println!("usage: forced_waves sphere|cylinder line|circle DEGREE ORDER FILL...");
+        println!("       forced_waves sphere|cylinder swirl DEGREE ORDER FILL RATIO,PUSH,ZETA...");
         return;
     };
     let height = if shape == "cylinder" { ", height = 4.0" } else { "" };
     let text = format!("density = 1000.0\nshape = {{ {shape} = {{ radius = 1.0{height} }} }}");
     let tank = Tank::parse(&text, std::path::Path::new("")).unwrap();
     let resolution = [degree, order].map(|number| number.parse().unwrap());
+    let filled = |fill: &String| Filled::new(&tank, fill.parse().unwrap());
+    if motion == "swirl" {
+        let forcing = |text: &String| {
+            let mut parts = text.split(',').map(|part| part.parse().unwrap());
+            core::array::from_fn(|_| parts.next().unwrap())
+        };
+        let forcings: Vec<[f64; 3]> = fills[1..].iter().map(forcing).collect();
+        filled(&fills[0]).swirl(resolution, &forcings);
+        return;
+    }
     for fill in fills {
-        let liquid = Filled::new(&tank, fill.parse().unwrap());
-        match motion.as_str() {
-            "swirl" => liquid.swirl(resolution),
-            _ => liquid.steady(motion == "circle", resolution),
-        }
+        filled(fill).steady(motion == "circle", resolution);
     }
 }
 
@@ -141,7 +148,6 @@ const ZETA: f64 = 0.01;
 struct Filled {
     fill: f64,
     share: f64,
-    lambda: f64,
     walls: Walls,
     shifts: [f64; 2],
     bobs: Vec<Bob>,
@@ -166,7 +172,6 @@ impl Filled {
         Filled {
             fill,
             share: data.modes[0].m / data.m_liq,
-            lambda: data.modes[0].lambda,
             walls: Walls::new(tank, fill).unwrap(),
             shifts: [known.planar, known.circular.unwrap()],
             bobs: [third]
@@ -206,33 +211,44 @@ impl Filled {
         }
     }
 
-    /// Prints rotary waves of potential flow. Their computation starts from a rotary wave of the slosh mass with the wave's
-    /// energy, at a stroke of 0.0082 R and at 1.01 times the frequency of small waves.
-    fn swirl(&self, resolution: [usize; 2]) {
-        let (ratio, bob) = (1.01, self.bobs[self.bobs.len() - 1]);
-        let push = 0.0082 * self.lambda * f64::powi(ratio, 2);
-        let circle = |turn: f64| -> Vec<f64> {
-            (0..PHASES).map(|i| 0.24 * (TAU * i as f64 / PHASES as f64 + turn).cos()).collect()
-        };
-        let q = [circle(1.8), circle(1.8 - PI / 2.0)];
-        let start = ForcedWave { q, push: [[push, 0.0], [0.0; 2]], ratio };
-        let Some(start) = bob.steady(&start, 300) else { return };
-        let ([x, x_turn], [y, y_turn]) = (phase(&start, 0), phase(&start, 1));
-        let (sin, cos) = (y_turn - x_turn).to_radians().sin_cos();
-        let forced = Forced::new(&self.walls, Space::All, resolution, [ratio, ZETA]).unwrap();
-        let sizes = [0.3, 0.6, 0.8, 0.9, 1.0].map(|part| part * x);
-        let waves = forced.waves(&[1.0, 0.0, y / x * cos, -y / x * sin], &sizes);
-        let Some((mut last, _)) = waves.last().cloned() else { return };
-        for part in [1.0, 1.01, 0.97, 0.93, 0.89] {
-            let Some((next, wave)) = forced.along_x(&last, part * x) else { continue };
-            last = next;
-            let show = |wave: &ForcedWave| {
-                let [[x, x_turn], [y, y_turn]] = [0, 1].map(|axis| phase(wave, axis));
-                format!("{:.2} {x_turn:.1} {:.2} {y_turn:.1}", degrees(x), degrees(y))
+    /// Prints the rotary wave for each forcing: frequency ratio, acceleration over g, and damping ratio. Newton's method starts
+    /// from the amplitudes and phases of the last slosh mass in rotary motion.
+    fn swirl(&self, resolution: [usize; 2], forcings: &[[f64; 3]]) {
+        for &[ratio, push, zeta] in forcings {
+            let bob = Bob { zeta, ..self.bobs[self.bobs.len() - 1] };
+            let periods = (1.5 / zeta) as usize;
+            let circle = |turn: f64| -> Vec<f64> {
+                (0..PHASES).map(|i| 0.15 * (TAU * i as f64 / PHASES as f64 + turn).cos()).collect()
             };
-            let [.., push] = summary(&wave, self.share);
-            let end = bob.steady(&wave, 300).map(|end| show(&end));
-            println!("{} {ratio} {push:.6} {} | {end:?}", self.fill, show(&wave));
+            let q = [circle(PI / 2.0), circle(0.0)];
+            let start = ForcedWave { q, push: [[push, 0.0], [0.0; 2]], ratio };
+            let start = bob.steady(&start, periods).unwrap();
+            let [[x, x_turn], [y, y_turn]] = [0, 1].map(|axis| phase(&start, axis));
+            let part = |size: f64, turn: f64| {
+                let (sin, cos) = turn.to_radians().sin_cos();
+                [size * cos, -size * sin]
+            };
+            let shape = [part(x, x_turn), part(y, y_turn)].concat();
+            let forced = Forced::new(&self.walls, Space::All, resolution, [ratio, zeta]).unwrap();
+            let waves = forced.waves(&shape, &[0.3, 0.6, 0.8, 1.0]);
+            let Some((near, _)) = waves.last() else { continue };
+            let Some(wave) = forced.on_a_line(near, push) else {
+                println!("{} {ratio} {push} {zeta} none", self.fill);
+                continue;
+            };
+            let show = |wave: &ForcedWave| {
+                let [sine, turn, force, _] = summary(wave, self.share);
+                let [y, y_turn] = phase(wave, 1);
+                let angle = degrees(sine);
+                format!("{angle:.3} {turn:.2} {force:.4} {:.3} {y_turn:.2}", degrees(y))
+            };
+            let end = bob.steady(&wave, periods).map(|end| show(&end));
+            println!(
+                "{} {ratio:.4} {push:.6} {zeta} {} | {}",
+                self.fill,
+                show(&wave),
+                end.unwrap_or_default()
+            );
         }
     }
 }

@@ -335,14 +335,24 @@ impl<'a> Forced<'a> {
         waves
     }
 
-    /// Computes the wave whose first mode along x is `size` cos(tau), in a tank that moves along x only. `x` holds the
-    /// unknowns of a wave close to it, from which Newton's method starts.
-    pub fn along_x(&self, x: &DVector<f64>, size: f64) -> Option<(DVector<f64>, ForcedWave)> {
-        let held =
-            [Held::Wave(0, size), Held::Wave(1, 0.0), Held::Push(2, 0.0), Held::Push(3, 0.0)];
-        let x = self.refine(x.clone(), &held)?;
-        let wave = self.measure(&x)?;
-        Some((x, wave))
+    /// Computes the wave in a tank that moves along x with the acceleration `push` cos(tau), in units of g. `x` holds the unknowns
+    /// of a wave close to it. The accelerations change from those of this wave to `push` in several steps if one step
+    /// does not converge. Only for `Space::All`.
+    pub fn on_a_line(&self, x: &DVector<f64>, push: f64) -> Option<ForcedWave> {
+        let [nz, nc, pushes] = self.sizes();
+        let from = x.rows(nz + nc + 1, pushes).into_owned();
+        let to = [push, 0.0, 0.0, 0.0];
+        [1, 4, 16].iter().find_map(|&steps| {
+            let mut x = x.clone();
+            for step in 1..=steps {
+                let part = f64::from(step) / f64::from(steps);
+                let held: Vec<Held> = (0..pushes)
+                    .map(|n| Held::Push(n, from[n] + part * (to[n] - from[n])))
+                    .collect();
+                x = self.refine(x, &held)?;
+            }
+            self.measure(&x)
+        })
     }
 
     fn measure(&self, x: &DVector<f64>) -> Option<ForcedWave> {
