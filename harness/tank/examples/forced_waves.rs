@@ -9,9 +9,18 @@
 //! divided by the frequency of small waves; the acceleration over g; and the wave's largest slosh angle, phase (degrees) and
 //! force over the weight of the slosh mass. Then follow the errors of the third-order slosh mass in angle (%), phase
 //! (degrees) and force (%), and the same errors of the slosh mass with the wave's energy, if its coefficients are known. In
-//! the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills follow. With
-//! `swirl` the tank moves on a line while its liquid rotates; each row then has angle and phase along the line and across
-//! it. A fill takes about a minute.
+//! the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills follow. A fill takes
+//! about a minute.
+//!
+//! With `swirl` the tank moves on a line while its liquid rotates. After one fill follow the forcings: frequency ratio,
+//! acceleration over g and damping ratio, for example
+//!
+//! ```text
+//! cargo run --release -p hubslosh-tank --features studies --example forced_waves -- cylinder swirl 9 4 0.5 1.001,0.0014,0.003
+//! ```
+//!
+//! Each row has the forcing; the largest slosh angle, the phase along the line and the force; amplitude and phase
+//! across the line; and, after `|`, the same five numbers of the slosh mass. A forcing takes about 15 seconds.
 use std::f64::consts::{PI, TAU};
 
 use formulas::energy_terms::EnergyTerms;

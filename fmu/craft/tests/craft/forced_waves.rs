@@ -1,14 +1,16 @@
 //! Forced waves near resonance, compared with fully nonlinear potential flow in cylinders and spheres.
 //!
-//! forced_waves.csv was computed by `harness/tank/examples/forced_waves.rs`, with a damping ratio of 0.01 on every mode of
-//! the liquid. Each row contains the motion of the tank (on a line or on a circle), its frequency divided by the frequency
-//! of small waves, and its acceleration divided by g. Then follow angle and phase of the wave (in degrees) and the force
-//! divided by the weight of the slosh mass. The last columns are the slosh mass divided by the mass of the liquid, and the
-//! coefficients and the limit of this motion (degrees) that `hubslosh tank` writes for this tank. The column `finer` has
-//! the change of the acceleration, %, that the same wave needs if the flow has harmonics up to degree 11 and multiples of
-//! the frequency up to 5 in place of 9 and 4. It is at most 0.7 % in cylinders up to 0.65 R and in spheres up to 1.05 R,
-//! but 7 to 54 % for waves of 6 and 8 degrees in a cylinder of 2 R, and up to 8 % for waves of 4 degrees in a sphere of
-//! 1.5 R.
+//! forced_waves.csv was computed by `harness/tank/examples/forced_waves.rs`, with the damping ratio `zeta` on every mode
+//! of the liquid. In each row the tank moves on a line or on a circle, or on a line while its liquid rotates (`swirl`).
+//! Then follow the frequency of this motion divided by the frequency of small waves, and the acceleration along x divided
+//! by g; the largest slosh angle and the phase along x; amplitude and phase along y (all in degrees); the largest force
+//! divided by the weight of the slosh mass; the slosh mass divided by the mass of the liquid; and the coefficients and
+//! limits (degrees, 0 if unknown) that `hubslosh tank` writes for this tank.
+//!
+//! The column `finer` shows what changes if the flow has harmonics up to degree 11 and multiples of the frequency up to 5
+//! in place of 9 and 4: in rows of swirl the change of the angle, %, and in other rows the change of the acceleration,
+//! %, that the same wave needs. It is at most 0.7 % in cylinders up to 0.65 R and in spheres up to 1.05 R, but 7 to 54 %
+//! for waves of 6 and 8 degrees in a cylinder of 2 R, and up to 8 % for waves of 4 degrees in a sphere of 1.5 R.
 
 use std::f64::consts::TAU;
 
