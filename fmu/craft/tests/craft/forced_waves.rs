@@ -11,6 +11,11 @@
 //! in place of 9 and 4: in rows of swirl the change of the angle, %, and in other rows the change of the acceleration,
 //! %, that the same wave needs. It is at most 0.7 % in cylinders up to 0.65 R and in spheres up to 1.05 R, but 7 to 54 %
 //! for waves of 6 and 8 degrees in a cylinder of 2 R, and up to 8 % for waves of 4 degrees in a sphere of 1.5 R.
+//!
+//! The file has no swirl in deep cylinders, because resolutions of the flow differ there. For example, at 1.227 R, a
+//! frequency ratio of 0.9985, an acceleration of 0.001 g and a damping ratio of 0.003, degrees from 9 to 14 give angles from
+//! 6.87 to 7.16 degrees and amplitudes across the line from 3.38 to 4.45 degrees; degree 14 gives 7.10 and 4.44, and
+//! SloshTank 7.13 and 4.55.
 
 use std::f64::consts::TAU;
 
