@@ -96,8 +96,8 @@ pub enum Convergence {
     Decay,
 }
 
-/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and n + 1, or n
-/// + 1 and n + 2. Terms after n are not computed but predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
+/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and n + 1, or
+/// n + 1 and n + 2. Terms after n are not computed but predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
 /// divided by its tolerance.
 ///
 /// For the prediction the slower of two decays over two orders is used: t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)),
