@@ -453,7 +453,11 @@ fn warnings_name_breaking_parameters_without_effect() {
             "has almost no effect on mode 1: the steepness of its wave reaches 1.541 at",
         ),
         (SloshModel::Spherical, 1.55, ""),
-        (SloshModel::Spherical, 2.43, "steepness reaches 2.420 at an amplitude of 1.571"),
+        (
+            SloshModel::Spherical,
+            2.43,
+            "steepness of its wave reaches 2.420 at an amplitude of 1.571",
+        ),
         (SloshModel::Frozen, 0.0, ""),
     ] {
         (p.slosh.model, p.slosh.breaking_steepness) = (model, onset);
