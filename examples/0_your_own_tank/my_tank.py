@@ -56,7 +56,7 @@ def summary(runs: dict[str, hubslosh.Run]) -> str:
     end = max((time for time, torque in TORQUE if torque), default=0)
     late = runs["spherical"]["time"] > end
     error, wave = pointing_error(runs)[late], 1e3 * runs["spherical"]["wave_height"][late]
-    # amplitude about the mean, because the mean angle may differ from that of a rigid liquid
+    # amplitude about the mean, because sloshing and rigid liquid may have other mean angles
     swing = (error.max() - error.min()) / 2
     answer = (
         f"After the manoeuvre the liquid swings the craft by ±{swing:.0f} millidegrees,\n"

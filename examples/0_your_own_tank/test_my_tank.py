@@ -6,7 +6,7 @@ from my_tank import MY_TANK, compare, summary
 
 
 def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> None:
-    """With sloshing liquid, the numbers are those of the README.
+    """The numbers of the run with sloshing liquid are printed in the README.
 
     A rigid craft is at rest after the manoeuvre, except for rounding errors.
     """

@@ -72,7 +72,7 @@ def test_mass_properties_and_margins_equal_a_hand_calculation(spacecraft: str) -
 
 
 def test_the_definition_of_the_craft_has_the_numbers_of_the_readme() -> None:
-    """The craft is defined in at most ten lines; its mass at 60 % is that of the README."""
+    """The craft is defined in at most ten lines; the README states its mass at 60 %."""
     assert len(str(telecom.craft).splitlines()) <= 10
     at = telecom.craft.mass_properties("60%")
     assert at.mass == pytest.approx(2503.1, abs=0.1)

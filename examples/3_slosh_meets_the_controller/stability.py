@@ -46,7 +46,7 @@ SLOW = Cycle(0.1, 1, "10 Hz, 150 ms")
 
 
 class Bench:
-    """The bench at rest: its FMU, and linear models of it."""
+    """The FMU of the bench, and linear models of the bench at rest."""
 
     def __init__(self, fmu: str | Path = "HubSlosh", parameters: dict | None = None) -> None:
         """Store the FMU, and parameters that are set in addition to `VISCOUS`."""

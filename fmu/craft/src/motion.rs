@@ -98,7 +98,7 @@ fn hold_upper_rows(matrix: &mut Mat6) {
     }
 }
 
-/// Where the states at the start of the expansion are stored. A step copies them only if they are needed.
+/// The place that holds the states at the start of the expansion. A step copies these states only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
     /// The states are in `state.kept`, because the step continues the expansion of an earlier step.

@@ -136,8 +136,9 @@ pub enum Coupling {
     /// `added_mass` is a constant matrix M, in which each bob is a point mass at its hinge, and `bias` is the total force and
     /// torque plus M [a; w'] with the given a and w'. For simulators of the carrying craft that solve with a constant matrix.
     Lumped = 2,
-    /// As `Lumped`, for a carrying craft that is simulated as a plain rigid body with M included in its mass, centre of mass and
-    /// inertia. `bias` therefore also contains the centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
+    /// `added_mass` is the constant matrix M of `Lumped`, for a carrying craft that is simulated as a rigid body with M
+    /// included in its mass, centre of mass and inertia. `bias` therefore also contains the centrifugal and gyroscopic terms
+    /// of M, w x (w x S) and w x (I w).
     RigidBody = 3,
 }
 

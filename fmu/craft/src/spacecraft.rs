@@ -1,5 +1,5 @@
-//! A spacecraft with sloshing tanks, in free flight or on a pivot: its steps for Co-Simulation, and its derivatives for Model
-//! Exchange.
+//! A spacecraft with sloshing tanks, in free flight or on a pivot: its steps for Co-Simulation, and its derivatives
+//! for Model Exchange.
 
 use alloc::boxed::Box;
 use alloc::string::String;

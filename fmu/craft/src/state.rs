@@ -131,8 +131,8 @@ pub enum BallState {
     /// Detached liquid that slides on the wall without drag, because the wall force is so small that the reaction of the
     /// drag would push the wall away from the liquid.
     Light = 4,
-    /// As `Light`, after the pendulums could not take over the liquid because the energy would have increased. The next attempt
-    /// is made when the liquid is nearest to the tank's axis.
+    /// Detached liquid that slides without drag, like `Light`, because the pendulums could not take it over without an increase
+    /// of the energy. The next attempt is made when the liquid is nearest to the tank's axis.
     Held = 5,
 }
 

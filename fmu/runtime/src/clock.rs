@@ -1,5 +1,5 @@
-//! The clock of an instance. Only this module compares times of the host, with one tolerance that allows for their rounding
-//! errors.
+//! The clock of an instance. Only this module compares times of the host, with one tolerance that allows
+//! for their rounding errors.
 //!
 //! A host may multiply (k h), accumulate (t += h) or convert counters, may start at 1e9 s, and its time may have errors of a
 //! few units in the last place. The simulation must not depend on these errors: in Co-Simulation the host's time is only a

@@ -1,5 +1,5 @@
-//! Limits of one command, which are checked before anything is allocated or started, so that a mistyped number gives a
-//! message.
+//! Limits of one command, which are checked before anything is allocated or started, so that a mistyped
+//! number gives a message.
 
 use anyhow::{Result, ensure};
 

@@ -9,8 +9,8 @@
 //! divided by the frequency of small waves; the acceleration over g; and the wave's largest slosh angle, phase (degrees) and
 //! force over the weight of the slosh mass. Then follow the errors of the third-order slosh mass in angle (%), phase
 //! (degrees) and force (%), and the same errors of the slosh mass with the wave's energy, if its coefficients are known. In
-//! the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills follow. A fill takes
-//! about a minute.
+//! the command, 9 is the degree of the harmonics, 4 the largest multiple of the frequency, and the fills
+//! follow. A fill takes about a minute.
 //!
 //! With `swirl` the tank moves on a line while its liquid rotates. After one fill follow the forcings: frequency ratio,
 //! acceleration over g and damping ratio, for example

@@ -1,7 +1,7 @@
 //! A PD controller with a low-pass filter: t_f tau' = -k_p theta - k_d omega - tau.
 //!
-//! Its output is a state, so no input acts on it at once. A loop with this controller therefore has
-//! one result, independent of the order in which a master reads outputs and sets inputs.
+//! The output tau is a state, so that no input acts on tau at once. A loop with this controller therefore
+//! has one result, independent of the order in which a master reads outputs and sets inputs.
 
 use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};

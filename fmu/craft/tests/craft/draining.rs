@@ -103,7 +103,7 @@ fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     }
 }
 
-/// By Newton and Euler the momentum is m V + w x S + S' + f r_out. S' is computed from differences of the centre of
+/// The momentum of the craft is m V + w x S + S' + f r_out by Newton's and Euler's laws. S' is computed from differences of the centre of
 /// mass in the outputs.
 #[test]
 fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {

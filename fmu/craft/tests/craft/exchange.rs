@@ -1,5 +1,5 @@
-//! Tests of Model Exchange, in which the importer integrates the states: a craft, and a tank on a rigid body of the importer's
-//! own model.
+//! Tests of Model Exchange, in which the importer integrates the states: a craft, and a tank on a rigid body of
+//! the importer's own model.
 
 use craft::{
     Inputs, Mount, Parameters, Ramp, STATES, TANK_STATES, TankInputs, TankParameters, index,

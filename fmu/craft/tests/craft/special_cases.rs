@@ -1,5 +1,5 @@
-//! Special cases in which the motion has a simpler description: motion about one axis, and parameters at the ends of their
-//! ranges.
+//! Special cases in which the motion has a simpler description: motion about one axis, and parameters at
+//! the ends of their ranges.
 
 use craft::{Inertia, Inputs, Mount, Parameters, Ramp, STATES, TankInputs, TankParameters, index};
 

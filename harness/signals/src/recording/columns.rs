@@ -133,7 +133,7 @@ impl Columns {
         if let Some(rate) = rate {
             ensure!(
                 rate > 0.0 && rate.is_finite(),
-                "--rate {rate}: it must be a positive number of rows a second"
+                "rate {rate}: it must be a positive number of rows a second"
             );
         }
         Ok(Columns { rate, ..self })

@@ -398,7 +398,11 @@ fn read_as(
         problems.join("; "),
         header.names.join(", "),
         if let File::Text(layout) = &file { &layout.texts } else { "" },
-        if timeless { "; --rate HZ takes equally spaced rows without times" } else { "" }
+        if timeless {
+            "; --columns rate=HZ, of gyro --rate HZ, reads equally spaced rows without times"
+        } else {
+            ""
+        }
     );
     let time = header.full[places[0]].as_str();
     let timed = counted.is_none();
@@ -484,7 +488,7 @@ fn read_as(
         }
         Stamps::Unknown(why) => bail!(
             "column {time}: {why} (allowed: times that grow from row to row; log them with more digits, or leave them out and give the \
-             rows a second, if these are even and complete: --rate HZ)"
+             rows a second, if these are even and complete: --columns rate=HZ, of gyro --rate HZ)"
         ),
     }
     let columns = complete(&signals, columns, rows_signal, done)?;

@@ -418,7 +418,10 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
 fn a_file_without_times_is_read_only_with_a_stated_rate() {
     let text = "tau_cmd,omega\n0.1,0\n0.25,1\n-0.3,2\n";
     let error = read_text("csv", text.as_bytes(), "").unwrap_err();
-    assert!(error.contains("; --rate HZ takes equally spaced rows without times)"), "{error}");
+    assert!(
+        error.contains("; --columns rate=HZ, of gyro --rate HZ, reads equally spaced rows without"),
+        "{error}"
+    );
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("a.csv");
     std::fs::write(&path, text).unwrap();
