@@ -13,7 +13,8 @@
 
 pub const MODES: usize = 10;
 
-/// Zeros xi_n of J1', the derivative of the Bessel function J1, with 17 digits. The table has `MODES` zeros.
+/// Zeros xi_n of J1', the derivative of the Bessel function J1. They are the dimensionless wave numbers of the slosh modes
+/// that move liquid from side to side.
 pub const XI: [f64; MODES] = [
     1.841_183_781_340_659_5,
     5.331_442_773_525_032_5,
@@ -27,8 +28,9 @@ pub const XI: [f64; MODES] = [
     30.601_922_972_669_094,
 ];
 
-/// One slosh mode as a pendulum with its hinge on the tank's axis: `mass`, kg, `length`, m, height `hinge` of the hinge
-/// above the bottom, m, and `wave`, the elevation of the wave at the wall per slosh angle, 2 R/(xi_n^2 - 1), m/rad.
+/// The pendulum that represents one slosh mode: its `mass`, kg; its `length`, m; the height `hinge` of its hinge above the
+/// bottom, m; and `wave`, the elevation of the liquid at the wall per slosh angle, m/rad, which is 2 R/(xi_n^2 - 1) in a
+/// cylinder of the radius R.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
     pub mass: f64,
@@ -37,8 +39,9 @@ pub struct Pendulum {
     pub wave: f64,
 }
 
-/// Returns the pendulum of mode `n`, which counts from 0 and is below [`MODES`], in a cylinder of diameter `d`, m, filled to
-/// the height `h`, m, with `m_liq` kg of liquid.
+/// Returns the pendulum that represents slosh mode `n` of an upright cylinder, where the first mode has the number 0 and `n`
+/// is below [`MODES`]. The cylinder has the diameter `d`, m, is filled to the height `h`, m, and contains `m_liq` kg of
+/// liquid.
 pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     let (xi, radius) = (XI[n], d / 2.0);
     let tanh = libm::tanh(2.0 * xi * h / d);
@@ -52,10 +55,12 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
-/// Returns diameter and fill height, m, of the upright cylinder whose first mode has a pendulum with this
-/// `length`, m, and `mass`, kg, with a liquid of `density`, kg/m3. The equations of the module's head give d^4 = 8
-/// xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
-/// fill, so that tanh is limited to 0.995.
+/// Returns the diameter and the fill height, m, of the upright cylinder whose first slosh mode has a pendulum of this
+/// `length`, m, and `mass`, kg, if the liquid has the `density`, kg/m3.
+///
+/// The equations at the head of this file, solved for the diameter d and the height h, give d^4 = 8 xi^2 (xi^2 - 1) length
+/// mass/(density pi) and tanh(2 xi h/d) = d/(2 xi length). In a deep tank the length hardly depends on the fill, so that the
+/// height cannot be found from it; tanh is therefore limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     let xi = XI[0];
     let d4 = 8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (density * core::f64::consts::PI);
@@ -64,8 +69,9 @@ pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     (d, h)
 }
 
-/// Returns the transverse inertia of liquid that fills a cylinder of diameter `d` and height `h`, m, under a
-/// lid, about its centre of mass and divided by its mass, m2.
+/// Returns the moment of inertia, divided by the mass, m2, of liquid that completely fills a closed cylinder of the diameter
+/// `d` and the height `h`, m, about an axis through its centre across the cylinder. The value is below that of a rigid body,
+/// because a part of the liquid does not take part in the rotation.
 pub fn capped_inertia(d: f64, h: f64) -> f64 {
     const ZEROS: usize = 400;
     let radius = d / 2.0;
@@ -78,8 +84,8 @@ pub fn capped_inertia(d: f64, h: f64) -> f64 {
     h * h / 12.0 - 0.75 * radius * radius + 16.0 * radius * radius * radius / h * (sum + rest)
 }
 
-/// Returns zero `n` of J1', which counts from 1. Zeros that are not in the table are computed by
-/// McMahon's expansion (DLMF 10.21.20).
+/// Returns the zero number `n` (counted from 1) of J1'. Zeros beyond the table [`XI`] are computed by McMahon's asymptotic
+/// expansion (DLMF 10.21.20).
 fn zero(n: usize) -> f64 {
     if n <= MODES { XI[n - 1] } else { mcmahon(n) }
 }
@@ -91,9 +97,11 @@ fn mcmahon(n: usize) -> f64 {
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// Returns the mass, kg, the height of the centre of mass above the bottom, m, and the transverse inertia about the centre
-/// of mass, kg m2, of the rigid liquid. The modes `kept` are pendulums, and the rigid liquid is chosen so that mass, centre
-/// of mass and inertia of the whole liquid are exact while every pendulum hangs along the tank's axis.
+/// Returns the liquid that does not slosh as a rigid body: its mass, kg, the height of its centre of mass above the bottom,
+/// m, and its transverse moment of inertia about this centre, kg m2. The arguments are the tank's diameter `d` and fill
+/// height `h`, m, the mass `m_liq` of the whole liquid, kg, and the pendulums `kept` that the model uses. The rigid body is
+/// chosen so that mass, centre of mass and inertia of the whole liquid are exact while all pendulums hang along the tank's
+/// axis.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();
@@ -110,8 +118,8 @@ pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// The reference values have six digits and are those of the tank in `fmu/craft/tests/six.json`: R = 0.45 m, filled 0.6 m
-    /// deep with a liquid of 1000 kg/m3.
+    /// The expected values, with six digits, are those of the tank in `fmu/craft/tests/six.json`, which has a radius of 0.45
+    /// m and is filled 0.6 m deep with a liquid of 1000 kg/m3.
     #[test]
     fn the_cylinder_equals_the_reference_records() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
@@ -129,8 +137,8 @@ mod tests {
         }
     }
 
-    /// The fourth root in the formula for the diameter has an error of some units in the last place. atanh near 1 amplifies
-    /// this error by 1/(1 - tanh^2) = 20.
+    /// The diameter is a fourth root, which is wrong by some units in the last place. The height follows from atanh near 1,
+    /// which amplifies this error by 1/(1 - tanh^2) = 20, so that the tolerance for the height is larger.
     #[test]
     fn tank_dimensions_are_recovered_from_the_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
@@ -154,8 +162,7 @@ mod tests {
         }
     }
 
-    /// The expected values were computed by hand for R = 1 m and h = 1 m, with tanh(xi_2) = 0.99995313
-    /// and tanh(xi_2/2) = 0.99037.
+    /// The expected values were computed by hand for a tank of 1 m radius that is filled 1 m deep.
     #[test]
     fn the_second_mode_has_its_mass_length_and_hinge() {
         let second = pendulum(1, 2.0, 1.0, 3.0);
@@ -177,8 +184,8 @@ mod tests {
         assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
     }
 
-    /// In cylinders of 2 m diameter that are 20 m and 1e6 m deep, modal mass, length and the depth of the hinge below
-    /// the surface are equal.
+    /// The modal mass, the pendulum length and the depth of the hinge below the surface are equal in cylinders of 2 m
+    /// diameter that are 20 m and 1e6 m deep, because the wave does not reach the bottom.
     #[test]
     fn the_pendulum_of_a_deep_cylinder_does_not_depend_on_the_depth() {
         let [deep, deeper] = [20.0, 1e6].map(|h| (h, pendulum(0, 2.0, h, h)));
@@ -188,8 +195,8 @@ mod tests {
         assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
     }
 
-    /// The function returns diameter and depth of a cylinder from length and mass of the first mode, which do not depend on
-    /// the depth in deep liquid.
+    /// In deep liquid the pendulum does not depend on the depth, so that no depth can be computed from it. The function then
+    /// returns the depth at which tanh(2 xi h/d) is 0.995.
     #[test]
     fn a_pendulum_of_a_very_deep_cylinder_is_assigned_a_depth_at_which_tanh_is_0_995() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
@@ -198,9 +205,9 @@ mod tests {
         assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
     }
 
-    /// A thin film has no height, so that its inertia per mass is that of a disk, R^2/4. The integral that replaces the last
-    /// zeros of the sum is then too small by 8/(12 pi end^3) with end = 400 pi + 1.6. In a long column the inertia per mass
-    /// tends to h^2/12 - 3 R^2/4.
+    /// A film of liquid that is much thinner than wide has the inertia per mass of a disk, R^2/4, and a long column tends to
+    /// h^2/12 - 3 R^2/4. For the film the result is too small by 8/(12 pi end^3), end = 400 pi + 1.6, because an integral
+    /// replaces the terms of the sum after the first 400.
     #[test]
     fn the_inertia_of_a_capped_cylinder_has_the_limits_of_a_disk_and_of_a_long_column() {
         let film = capped_inertia(2.0, 1e-12);
@@ -215,8 +222,7 @@ mod tests {
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
 
-    /// McMahon's expansion approximates the zeros of J1'. Its first omitted term is about 1e4/(8 b)^5, where b is the
-    /// leading term of the expansion. At the tenth zero this is 1e-8.
+    /// At the tenth zero, the last one of the table, the expansion has an error of 1e-8, the size of its first omitted term.
     #[test]
     fn mcmahon_s_zeros_continue_the_table() {
         let tenth = mcmahon(10);

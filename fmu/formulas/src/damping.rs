@@ -19,16 +19,16 @@ use libm::{cosh, exp, log, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
-/// Damping of a slosh mode divided by the damping of the laminar layer at the wall, for a tank of a shape
-/// without measurements. It lies between the values of measured cylinders, 1.49 (Stephens) and 1.39 to
-/// 1.54 (Mikishev and Dorozhkin).
+/// Damping ratio of a slosh mode divided by the damping ratio of the laminar layer at the wall, for a tank of a shape that
+/// nobody has measured. It lies between the values of measured cylinders: 1.49 by Stephens, and 1.39 to 1.54 by Mikishev and
+/// Dorozhkin.
 pub const UNMEASURED: f64 = 1.45;
 
 pub const SCATTER: f64 = 0.3;
 
-/// Quantities of a slosh mode on which its damping depends: the ratio `beta` of wall shear to volume, 1/m; `lambda`,
-/// 1/m, which gives the frequency sqrt(g lambda) without capillarity (1/l of the pendulum); and the natural frequency
-/// `omega` with capillarity, rad/s.
+/// The quantities of a slosh mode on which its damping depends: the wall factor `beta`, 1/m, which is the ratio of wall shear
+/// to liquid volume; the wave number `lambda`, 1/m, from which the natural frequency without surface tension follows as
+/// sqrt(g lambda); and the natural frequency `omega` with surface tension, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     pub beta: f64,
@@ -37,8 +37,8 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// Returns mode `n`, which counts from 0, of an upright cylinder of this radius and depth, m. The
-    /// specific force `g`, m/s2, must include the equivalent of a centring stiffness, k l/m.
+    /// Returns mode `n` (the first mode is 0) of an upright cylinder with this radius and depth of liquid, m. Surface tension
+    /// acts like an increase of gravity. Therefore `g`, m/s2, is the sum of the specific force and this equivalent increase.
     pub fn from_cylinder(n: usize, radius: f64, depth: f64, g: f64) -> Mode {
         let lambda = XI[n] / radius * tanh(XI[n] * depth / radius);
         Mode { beta: cylinder_beta(n, radius, depth), lambda, omega: sqrt(g * lambda) }
@@ -49,8 +49,8 @@ impl Mode {
     }
 }
 
-/// Shapes of tanks for which the damping of the first mode was measured. Lengths are in m. Cylinder and torus are
-/// upright, and the apex of the cone is at its bottom. `radius` of a cone is the radius of its free surface, and its half
+/// The shapes of tanks for which the damping of the first mode was measured. Cylinder and torus stand upright, and the apex
+/// of the cone is at its bottom. Lengths are in m; the `radius` of a cone is the radius of its free surface, and its half
 /// angle is in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
@@ -61,9 +61,9 @@ pub enum Shape {
     Other,
 }
 
-/// Damping ratio `zeta` of a first mode by a published correlation. `weight` says how far the correlation replaces the estimate
-/// for unmeasured shapes, [`UNMEASURED`] laminar layers: it is 1 within the range of the measurements, and falls smoothly to 0
-/// where a similarity number is outside this range by the factor [`BEYOND`].
+/// Damping ratio `zeta` of the first slosh mode by a published correlation, and the `weight`, 0 to 1, of this value against
+/// the estimate for unmeasured shapes, [`UNMEASURED`]. The weight is 1 within the range of the measurements. It falls
+/// smoothly to 0 where the tank is outside this range by the factor [`BEYOND`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correlation {
     pub zeta: f64,
@@ -72,12 +72,13 @@ pub struct Correlation {
 
 pub const BEYOND: f64 = 2.0;
 
-/// Half angle of a cone, degrees, from which on its correlation is not used. Cones were measured only up to 45 degrees.
+/// Largest half angle of a cone, degrees, for which the correlation still has some weight. Cones were measured only up to 45
+/// degrees.
 const WIDEST: f64 = 50.0;
 
 const SHALLOW: f64 = 0.4;
 
-/// Returns 0 for t <= 0, 1 for t >= 1, and in between a cubic with continuous slope.
+/// Returns a smooth transition from 0 for `t` <= 0 to 1 for `t` >= 1: a cubic polynomial whose slope is 0 at both ends.
 pub fn smooth_step(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -89,12 +90,13 @@ fn weight(number: f64, [low, high]: [f64; 2]) -> f64 {
 }
 
 impl Shape {
-    /// Returns the published correlation of the first mode's damping ratio, at the viscosity `nu`, m2/s, and the specific
-    /// force `g`, m/s2, which must include the equivalent of a centring stiffness. `None` if the shape was not measured.
+    /// Returns the damping ratio of the first slosh mode by the published correlation for this shape; `None` if the shape was
+    /// not measured. `nu` is the kinematic viscosity, m2/s, and `g` the specific force, m/s2, to which the equivalent of a
+    /// stiffness by surface tension was added.
     ///
-    /// For a cylinder Mikishev and Dorozhkin's formula is used from h/R = 0.5 on. For smaller fills this formula gives less
-    /// damping than the laminar layer, so that the formula of Stephens, Leonard and Perry is used. At 0.5 the two formulas
-    /// differ by 7 %; between 0.4 ([`SHALLOW`]) and 0.5 the result changes from one to the other.
+    /// In a cylinder the formula of Mikishev and Dorozhkin is used from h/R = 0.5 on. For smaller fills this formula gives
+    /// less damping than wall friction alone, so that the formula of Stephens, Leonard and Perry is used. The two formulas
+    /// differ by 7 % at 0.5; between 0.4 ([`SHALLOW`]) and 0.5 the result changes smoothly from one to the other.
     pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
         let (zeta, weight) = match *self {
             Shape::Cylinder { radius, depth } => {
@@ -123,8 +125,8 @@ impl Shape {
         Some(Correlation { zeta, weight })
     }
 
-    /// Returns the shape with its depth replaced by the nearest measured depth: 0.1 to 1.9 radii of a sphere, and 0.1 to 0.9
-    /// of the height of a torus.
+    /// Returns the same shape with the depth limited to the measured range, which is 0.1 to 1.9 radii in a sphere and 0.1 to
+    /// 0.9 of the height in a torus.
     #[must_use]
     pub fn at_measured_depth(self) -> Shape {
         match self {
@@ -140,9 +142,9 @@ impl Shape {
     }
 }
 
-/// A measured shape of a wetted wall, or of a part of the wall. `share` is the fraction of the wetted area that has this shape, 0
-/// to 1. `factor` is the damping ratio of the shape's first mode by its correlation, divided by the damping ratio of the laminar
-/// layer at its wall. `weight` is [`Correlation::weight`].
+/// A part of the wetted wall that has a measured shape. `share` is its fraction of the wetted area, 0 to 1. `factor` is the
+/// damping ratio of the shape's first mode by its correlation, divided by the damping ratio of the laminar layer at its wall.
+/// `weight` is [`Correlation::weight`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     pub share: f64,
@@ -150,24 +152,23 @@ pub struct Part {
     pub weight: f64,
 }
 
-/// Fraction of the wetted wall from which on the correlation of a measured shape affects the interval of an estimate. If other
-/// shapes have at least this fraction, the estimate has the interval of a wall of several shapes.
+/// Fraction of the wetted wall that a measured shape needs in order to have its full effect on the interval of an estimate.
 const COUNTS: f64 = 0.05;
 
-/// Damping by a correlation divided by the damping of the laminar layer. Below this ratio the correlation is not used, because no
-/// wall can have less damping than its laminar layer.
+/// Smallest ratio of a correlation's damping to the damping of the laminar layer at which the correlation still has some
+/// weight. A ratio below 1 is not physical, because every wall dissipates at least as much as its laminar layer.
 const BELOW: f64 = 0.8;
 
 impl Part {
-    /// Returns the factor f that the shape contributes: the factor of its correlation, but at least 1. If the correlation's
-    /// factor is between 1 and [`BELOW`], the result changes smoothly to [`UNMEASURED`], because no wall has less damping
-    /// than its laminar layer.
+    /// Returns the factor that this part of the wall contributes to the mean. It is the factor of the correlation while this
+    /// is at least 1. As the factor falls from 1 to [`BELOW`], the result changes smoothly to [`UNMEASURED`], because no wall
+    /// can have less damping than its laminar layer.
     fn shape_factor(&self) -> f64 {
         let trusted = self.weight * smooth_step((self.factor - BELOW) / (1.0 - BELOW));
         UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
     }
 
-    /// Returns true if the damping by the shape's correlation differs from that of [`UNMEASURED`] laminar layers by more
+    /// Returns true if the correlation of the shape and the estimate for unmeasured shapes ([`UNMEASURED`]) differ by more
     /// than the scatter of measured damping ratios.
     pub fn disagrees(&self) -> bool {
         let (low, high) = (self.factor.min(UNMEASURED), self.factor.max(UNMEASURED));
@@ -183,8 +184,8 @@ impl Part {
     }
 }
 
-/// Damping ratios as multiples f of the damping ratio of a laminar wall layer: the expected value `factor` for all modes,
-/// and the expected intervals for the first mode and for the higher modes.
+/// Damping ratios of a tank, each divided by the damping ratio of the laminar layer at its wall: the estimate `factor`, which
+/// holds for all modes, the `interval` of the first mode, and the wider interval of the higher modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub factor: f64,
@@ -192,17 +193,18 @@ pub struct Estimate {
     pub interval_of_others: [f64; 2],
 }
 
-/// Estimates the factor f of a tank whose wetted wall consists of the shapes `parts`. The rest of the wall has
-/// [`UNMEASURED`]. `near` contains these shapes and those that the wall resembles.
+/// Estimates the damping of a tank as a multiple of the damping of the laminar layer at its wall. `parts` are the measured
+/// shapes of which the wetted wall consists; the rest of the wall counts as [`UNMEASURED`]. `near` are the measured shapes
+/// that the tank resembles, for example the sphere for a spheroid that is almost round.
 ///
-/// f is the mean over the wall. Each shape contributes its factor in proportion to its share. The factor is moved towards
-/// [`UNMEASURED`] if the correlation has less than full weight or gives less damping than the laminar layer. All modes
-/// have the same f.
+/// The result is the mean over the wall, in which each shape has its factor in proportion to its share of the wetted area.
+/// The factor is moved towards [`UNMEASURED`] if the correlation has less than its full weight or gives less damping than the
+/// laminar layer.
 ///
-/// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the interval of the first
-/// mode is the scatter of measured tanks. Otherwise it extends from the laminar layer to 1.3 times the largest factor
-/// of all parts and near shapes. If the share of the shape falls to 95 %, the interval changes continuously from the
-/// former to the latter.
+/// If the whole wall is one shape whose correlation agrees with [`UNMEASURED`], the interval of the first mode is the scatter
+/// of measured tanks. Otherwise it extends from the laminar layer to 1.3 times the largest factor of all parts and near
+/// shapes. While the share of the shape falls from 100 % to 95 %, the interval changes continuously from the first rule to
+/// the second.
 pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
     let mean = |sum: f64, part: &Part| sum + part.share * (part.shape_factor() - UNMEASURED);
     let factor = match parts {
@@ -231,15 +233,16 @@ pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
     nu / sqrt(g * radius * radius * radius)
 }
 
-/// Returns the damping ratio of the laminar layer at the wetted wall of any tank, beta sqrt(nu/(8 omega)). The wall factor
-/// `beta`, 1/m, depends on the mode's shape (cylinder: Case and Parkinson 1957, box: Keulegan 1959).
+/// Returns the damping ratio of the laminar layer at the wetted wall, beta sqrt(nu/(8 omega)). `beta` is the wall factor of
+/// the mode, 1/m, `nu` the kinematic viscosity, m2/s, and `omega` the natural frequency, rad/s. Sources: Case and Parkinson
+/// (1957) for cylinders, Keulegan (1959) for boxes.
 pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
     beta * sqrt(nu / (8.0 * omega))
 }
 
-/// Returns the wall factor beta (1/m) of mode `n` of an upright cylinder, which gives the damping of the laminar layer
-/// at the wall; modes count from 0. With x = h/R it is beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - x)/sinh(2 xi x) (Case
-/// and Parkinson, J. Fluid Mech. 2 (1957) 172).
+/// Returns the wall factor beta, 1/m, of slosh mode `n` (the first mode is 0) of an upright cylinder with this radius and
+/// depth of liquid, m. The damping ratio of the laminar layer is proportional to it. With x = h/R, beta R = (xi^2 +
+/// 1)/(xi^2 - 1) + 2 xi (1 - x)/sinh(2 xi x) (Case and Parkinson, J. Fluid Mech. 2 (1957) 172).
 pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     let (xi, x) = (XI[n], depth / radius);
     let u = 2.0 * xi * x;
@@ -247,8 +250,8 @@ pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     ((xi * xi + 1.0) / (xi * xi - 1.0) + shallow) / radius
 }
 
-/// Returns the damping ratio of the first mode of an upright cylinder by one formula at any depth:
-/// [`mikishev_dorozhkin`] from h/R = 0.5 on and [`stephens`] for smaller fills.
+/// Returns the damping ratio of the first slosh mode of an upright cylinder, by [`mikishev_dorozhkin`] if the depth is at
+/// least half the radius, and otherwise by [`stephens`].
 pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     if depth >= 0.5 * radius {
         mikishev_dorozhkin(radius, depth, nu, g)
@@ -257,17 +260,17 @@ pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     }
 }
 
-/// Returns an upper bound of the damping ratio of the first mode of an upright cylinder at Bond numbers of 10 to 100, where
-/// the contact line dissipates more than at large Bond numbers. The formula `0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5))`
-/// is quoted for drop-tower tests (Salzman, Labus and Masica, NASA TN D-4132). Since the report could not be obtained, the
-/// value is not used as an estimate.
+/// Returns an upper bound of the damping ratio of the first slosh mode of an upright cylinder at Bond numbers of 10 to 100,
+/// where the moving contact line dissipates more than it does at large Bond numbers. The formula `0.83 (nu^2/(g R^3))^(1/4)
+/// (1 + 8.2 Bo^(-3/5))` is quoted for drop-tower tests (Salzman, Labus and Masica, NASA TN D-4132). It is not used as an
+/// estimate, because the report itself could not be obtained.
 pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
     0.83 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + 8.2 * pow(bond, -0.6))
 }
 
-/// Returns the damping ratio of the first mode of an upright cylinder by Mikishev and Dorozhkin (Dodge 2000):
-/// 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x) (1 + (1 - x)/cosh 1.84 x)]. Here x is h/R. For x below 0.5 the formula gives
-/// less than the damping of the laminar layer.
+/// Returns the damping ratio of the first slosh mode of an upright cylinder by Mikishev and Dorozhkin (Dodge 2000), 0.79
+/// sqrt(Re) [1 + (0.318/sinh 1.84 x) (1 + (1 - x)/cosh 1.84 x)] with the fill x = h/R and the viscosity number Re = nu/sqrt(g
+/// R^3). For x below 0.5 the formula gives less damping than the laminar layer.
 #[allow(clippy::approx_constant)] // 0.318 is a number of the correlation, not 1/pi
 pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
@@ -277,9 +280,9 @@ pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     0.79 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + bottom)
 }
 
-/// Returns the damping ratio of the first mode of an upright cylinder by Stephens, Leonard and Perry (NASA TN
-/// D-1367): `(5.23/2 pi) sqrt(Re) tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]`, which is 1.493 times the
-/// laminar layer's at every depth.
+/// Returns the damping ratio of the first slosh mode of an upright cylinder by Stephens, Leonard and Perry (NASA TN D-1367),
+/// `(5.23/2 pi) sqrt(Re) tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]` with the fill x = h/R and the viscosity number Re =
+/// nu/sqrt(g R^3). The result is 1.493 times the damping of the laminar layer at every depth.
 pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
     let bracket = 1.0 + if x > 100.0 { 0.0 } else { 2.0 * (1.0 - x) / sinh(3.68 * x) };
@@ -291,35 +294,36 @@ pub fn sphere_number(radius: f64, nu: f64, g: f64) -> f64 {
     1e4 * inverse_reynolds(2.0 * radius, nu, g)
 }
 
-/// Returns the damping ratio of the first mode of a sphere by Mikishev and Dorozhkin, with the exponent of Sumner and
-/// Stofan (NASA TN D-1991). Up to half full it is (0.131/2 pi) B^0.359/x with B = 1e4 nu/sqrt(g D^3); above, this value
-/// is multiplied by x (1 + 0.46 (2 - x))/(1.46 (2 - x)). The formula is unbounded at both ends, so that x = h/R is
-/// limited to 0.1 to 1.9.
+/// Returns the damping ratio of the first slosh mode of a sphere by Mikishev and Dorozhkin, with the exponent of Sumner and
+/// Stofan (NASA TN D-1991). With the fill x = h/R and the viscosity number B = 1e4 nu/sqrt(g D^3) it is (0.131/2 pi)
+/// B^0.359/x up to half full, and this value times x (1 + 0.46 (2 - x))/(1.46 (2 - x)) above. The formula has no bound for an
+/// empty and for a full sphere, so that x is limited to 0.1 to 1.9.
 pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = (depth / radius).clamp(0.1, 1.9);
     let by_fill = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
     0.131 / TAU * pow(sphere_number(radius, nu, g), 0.359) * by_fill
 }
 
-/// Returns the damping ratio of the first mode of a cone with its apex at the bottom, by a fit of SLOSH-ML to
-/// a figure: (4.964/2 pi) C5 C4^(-1/2) sqrt(Re) with C5 = 1.0037 + 0.0126 b and C4 = 1.001 - 0.0031 b -
-/// 0.0003 b^2. `radius` is the radius of the free surface, m, and b is `half_angle` in degrees. C4 falls to 0 at 53
-/// degrees, so b is limited to 0 to 45.
+/// Returns the damping ratio of the first slosh mode of a cone with its apex at the bottom. `radius` is the radius of the
+/// free surface, m, and `half_angle` the angle b between axis and wall, degrees. The formula, a fit by the program SLOSH-ML
+/// to a published figure, is (4.964/2 pi) C5 C4^(-1/2) sqrt(Re) with C5 = 1.0037 + 0.0126 b and C4 = 1.001 - 0.0031 b -
+/// 0.0003 b^2. Since C4 falls to 0 at 53 degrees, b is limited to 45.
 pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     let b = half_angle.clamp(0.0, 45.0);
     let (c5, c4) = (1.0037 + 0.0126 * b, 1.001 - 0.0031 * b - 0.0003 * b * b);
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Returns the viscosity number Re = nu/sqrt(g R^3) of a torus, divided by the viscosity number of the only torus whose damping
-/// was measured. `tube_radius` is the radius of the torus's cross-section, m.
+/// Returns how the viscosity number Re = nu/sqrt(g a^3) of a torus compares with that of the only torus whose damping was
+/// measured: the ratio of both numbers. `tube_radius` is the radius a of the torus's cross-section, m.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
 
-/// Returns the damping ratio of the first mode of a torus by SLOSH-ML, whose authors measured one size of tank:
-/// sqrt(Re/Re_0) (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi with y = h/2a, the radius a = `tube_radius`
-/// of the cross-section, m, and Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
+/// Returns the damping ratio of the first slosh mode of a torus whose cross-section has the radius a = `tube_radius`, m. With
+/// y = `depth`/(2 a) and the viscosity number Re of the torus it is sqrt(Re/Re_0) (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 -
+/// 1.6759 y + 0.3865)/(2 pi). The polynomial is the fit of SLOSH-ML, whose authors measured one size of tank, with Re_0 =
+/// 3.3e-6/sqrt(9.81 0.0635^3).
 pub fn torus(tube_radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let y = 0.5 * depth / tube_radius;
     let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;
@@ -331,18 +335,19 @@ pub fn covered(radius: f64, width: f64) -> f64 {
     w * (2.0 - w)
 }
 
-/// Returns the ratio of the liquid's motion at a ring baffle to its motion at the surface, exp(-1.84 d/R), for the first
-/// mode of an upright cylinder. The ring is `depth` (m) below the surface, and `radius` (m) is the radius of the cylinder.
+/// Returns how much of the first mode's motion at the surface is left at a ring baffle `depth` m below the surface of an
+/// upright cylinder of this `radius`, m: the ratio exp(-1.84 depth/radius).
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
     // The limit keeps a division by this ratio finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))
 }
 
-/// Returns the damping ratio that a flat ring baffle adds in an upright cylinder (Miles 1958): `2.83 exp(-4.60 d/R)
-/// alpha^(3/2) (eta/R)^(1/2)`, where alpha is the fraction of the cross-section that the ring covers, and `amplitude`, m, is
-/// the amplitude eta of the wave at the wall.
+/// Returns the damping ratio that a flat ring baffle adds to the first slosh mode of an upright cylinder (Miles 1958): `2.83
+/// exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)`. The ring lies at the `depth` d below the surface and covers the fraction alpha
+/// of the cross-section, which follows from its `width`; `amplitude` is the height eta of the wave at the wall. All lengths
+/// are in m.
 ///
-/// The ratio grows with the root of the amplitude, so that it is constant only at a constant amplitude.
+/// Since the ratio grows with the root of the amplitude, a decaying wave loses less and less energy per period.
 pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
     let alpha = covered(radius, width);
     2.83 * exp(-4.60 * depth / radius) * alpha * sqrt(alpha) * sqrt(amplitude / radius)
@@ -352,8 +357,7 @@ pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Water in the bench's tank, R = 0.0815 m, has Re = 9.1312e-7/sqrt(9.81 R^3). The expected values were computed by
-    /// hand to four digits.
+    /// The expected values, with four digits, were computed by hand for water in the bench's tank of 81.5 mm radius.
     #[test]
     fn correlations_have_their_published_coefficients() {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
@@ -377,8 +381,8 @@ mod tests {
         );
     }
 
-    /// In shallow liquid the sign and magnitude of every term matter. The expected values at x = 0.2, 1 and 2 have twelve
-    /// digits and were computed from the published formula by another program.
+    /// In shallow liquid the correlation changes visibly if a term has a wrong sign or size. The expected values, with twelve
+    /// digits, were computed from the published formula by another program.
     #[test]
     fn the_bottom_term_of_mikishev_and_dorozhkin_matters_in_shallow_liquid_and_changes_sign_above_the_radius()
      {
@@ -420,8 +424,6 @@ mod tests {
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
-    /// The damping ratio of a torus is a polynomial of fourth order in the depth, multiplied by the root of its viscosity number
-    /// divided by the viscosity number of the measured torus.
     #[test]
     fn the_damping_of_a_torus_equals_the_fit_and_grows_with_the_root_of_the_viscosity_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
@@ -487,8 +489,8 @@ mod tests {
         );
     }
 
-    /// At the ends of the measured range of viscosity numbers the weight of the correlation falls from 1 to 0, so that
-    /// wall friction replaces it.
+    /// At the ends of the measured range of viscosity numbers the weight of a correlation falls from 1 to 0, so that the
+    /// estimate for unmeasured shapes replaces it.
     #[test]
     fn a_damping_correlation_gets_weight_0_outside_the_range_of_its_measurements() {
         let (r, g) = (2.0, 9.81);
@@ -570,9 +572,9 @@ mod tests {
         [factor, low, high]
     }
 
-    /// The expected numbers are the damping of a tank's first mode divided by the damping of its laminar wall layer, and lower
-    /// and upper limits of this ratio. If the correlation agrees with 1.45 layers, the limits are ±30 % of the correlation;
-    /// otherwise they include both estimates.
+    /// The rows contain the damping of a tank's first mode divided by the damping of its laminar wall layer, and the limits
+    /// of this ratio. If the correlation agrees with the estimate for unmeasured shapes, 1.45, the limits are ±30 % of the
+    /// correlation. Otherwise they include both estimates.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [
@@ -590,8 +592,8 @@ mod tests {
         is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 
-    /// The damping divided by that of the laminar layer is 1.45 for a tank without a correlation, and for a tank whose
-    /// correlation has a low weight or gives less damping than the layer.
+    /// The estimate for unmeasured shapes, 1.45 times the laminar layer, is used without a correlation, and also if the
+    /// correlation has a low weight or gives less damping than the laminar layer.
     #[test]
     fn unmeasured_shapes_have_1_45_times_the_laminar_damping() {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);
@@ -602,8 +604,8 @@ mod tests {
         is_near(numbers(&[part(1.0, 3.45, 0.25)]), [1.95, 1.0, 1.3 * 3.45]);
     }
 
-    /// A third of the wall has 4 times the damping of the laminar layer, half of it 1.15 times and the rest 1.45 times. The
-    /// result is the mean of these factors, and its interval includes the largest factor.
+    /// A third of the wall has 4 times the damping of the laminar layer, one half has 1.15 times, and the rest is unmeasured
+    /// (1.45 times). The estimate is the mean of these factors, and its interval includes the largest factor.
     #[test]
     fn a_wall_of_several_shapes_has_the_mean_of_their_damping() {
         let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];

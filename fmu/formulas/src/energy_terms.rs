@@ -21,9 +21,10 @@ use crate::third_order;
 
 pub const DEPTHS: [f64; 2] = [0.25, third_order::BRIDGED[0]];
 
-/// Each row contains h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle, degrees, at which the slosh mass was
-/// compared with potential flow. In this table the frequency of circular motion is defined by omega^2 (1 + t A^2 + t_2
-/// A^4) = (dz/dA)/A, so that t and t_2 are two and three times the t and t_2 of the equations above.
+/// Coefficients from fully nonlinear potential flow. Each row contains h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest
+/// slosh angle, degrees, at which the slosh mass was compared with potential flow. In this table t and t_2 are defined by the
+/// frequency of circular motion, omega^2 (1 + t A^2 + t_2 A^4) = (dz/dA)/A, so that they are two and three times the t and
+/// t_2 of the equations at the head of the file.
 const ROWS: [[f64; 8]; 7] = [
     [0.25, 111.6366, 67.2399, 48.6774, -3776.617, -2326.024, -1494.947, 8.0],
     [0.3, 38.3052, 21.5892, 15.4987, -429.434, -236.528, -188.836, 12.5],
@@ -34,8 +35,9 @@ const ROWS: [[f64; 8]; 7] = [
     [0.65, 2.1267, 2.1867, 0.6731, -4.250, -0.965, -2.221, 18.0],
 ];
 
-/// Coefficients of the first mode at one depth: `pair` is (s, kappa), `next` is (s_2, kappa_2), and `rotary` is (t, t_2).
-/// `compared` is the largest slosh angle, rad, of the comparison with potential flow.
+/// Large-wave coefficients of the first slosh mode at one depth, with the symbols of the equations at the head of the file:
+/// `pair` is (s, kappa), `next` is (s_2, kappa_2), and `rotary` is (t, t_2). `compared` is the largest slosh angle, rad, at
+/// which a slosh mass with these coefficients was compared with potential flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyTerms {
     pub pair: [f64; 2],
@@ -44,13 +46,13 @@ pub struct EnergyTerms {
     pub compared: f64,
 }
 
-/// Returns the coefficients for which the slosh mass has the energy of a large wave in an upright cylinder filled to h/R =
+/// Returns the coefficients with which the slosh mass has the energy of a large wave in an upright cylinder filled to h/R =
 /// `fill`; `None` if the fill is outside [`DEPTHS`].
 ///
-/// Between the rows kappa, kappa_2 and the shifts of the frequency are interpolated, and the other coefficients follow from
-/// them. An error of the interpolation therefore changes the energy and not the frequency. The shifts to third order are
-/// interpolated as differences from the third order of potential flow, which is known at every depth. Beyond the last row
-/// s_2 and t_2 are extrapolated.
+/// Between the depths of the table, kappa, kappa_2 and the changes of the frequency with the amplitude are interpolated, and
+/// the other coefficients follow from them. An error of the interpolation therefore appears in the energy and not in the
+/// frequency. The frequency is interpolated as a difference from third-order theory, which is known at every depth. Above the
+/// last depth of the table s_2 and t_2 are extrapolated.
 pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     if !(DEPTHS[0]..=DEPTHS[1]).contains(&fill) {
         return None;
@@ -105,9 +107,10 @@ fn shifts_of_third_order(fill: f64) -> [f64; 2] {
     third_order::shifts(s, kappa)
 }
 
-/// Returns the six quantities of a row that are interpolated over the depth: the logarithms of kappa - 1 and -kappa_2, the
-/// differences of both shifts from the third order, and the logarithms of the shifts by the fourth power of the angle. The
-/// logarithms exist because these quantities do not change their sign.
+/// Converts a row of the table to the six quantities that are interpolated over the depth: the logarithms of kappa - 1
+/// and -kappa_2, the differences between table and third-order theory for the frequency of planar and of circular motion, and the
+/// logarithms of the frequency changes with the fourth power of the angle. Logarithms are possible because these quantities
+/// never change their sign.
 fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     let [planar, circular] = shifts_of_third_order(fill);
     [
@@ -120,8 +123,9 @@ fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     ]
 }
 
-/// Interpolates y at `x` between the points i - 1 and i. If `is_cubic` is true, by a cubic whose slopes at both points are
-/// those of the parabola through the nearest three points; otherwise by a straight line.
+/// Interpolates y at `x`, which lies between point `i` - 1 and point `i`; `point` returns the pair (x, y) of a point. If
+/// `is_cubic` is true, the curve is a cubic whose slope at each end is the slope of the parabola through the three nearest
+/// points. Otherwise it is a straight line.
 fn interpolate_segment(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_cubic: bool) -> f64 {
     let [[x_0, y_0], [x_1, y_1]] = [point(i - 1), point(i)];
     let (h, secant) = (x_1 - x_0, (y_1 - y_0) / (x_1 - x_0));

@@ -5,11 +5,12 @@
 //! data. In each interval they are then limited so that the Bernstein coefficients of the quintic are monotone, which is
 //! sufficient for a monotone curve.
 
-/// Writes the slopes and second derivatives of a curve through points with ascending `x` to `slope` and `curvature`.
+/// Computes the slopes and second derivatives of a smooth curve through the points (`x`, `y`), and writes them to `slope` and
+/// `curvature`. The values of `x` must ascend.
 ///
-/// If `within` is true, the curve stays between its two points in every interval, so that it has its maxima and
-/// minima at points. Otherwise the intervals next to a turning point of the data are not limited, because the true
-/// maximum lies between points.
+/// If `within` is true, the curve stays between the values of its two points in every interval, so that all its maxima and
+/// minima are at points. Otherwise intervals next to a maximum or minimum of the data are not limited, because the true
+/// extremum usually lies between two points.
 ///
 /// # Panics
 /// If the lengths of the slices differ.
@@ -59,8 +60,8 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     }
 }
 
-/// Returns the first and the second derivative, at `x0`, of the polynomial through up to five points,
-/// by Fornberg's recurrence (1988).
+/// Returns the first and the second derivative, at `x0`, of the polynomial through the points (`x`, `y`), of which there are
+/// at most five. The method is Fornberg's recurrence (1988).
 fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     let mut weights = [[0.0; 5]; 3];
     weights[0][0] = 1.0;
@@ -88,8 +89,9 @@ fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     (sum(1), sum(2))
 }
 
-/// Returns the coefficients, in powers of t from 0 to 1, of the quintic between two points at the distance `h`, each given
-/// as `[value, slope, second derivative]`.
+/// Returns the six coefficients of the quintic polynomial between two points, each given as `[value, slope, second
+/// derivative]`. The points are `h` apart; the polynomial is in powers of t, which runs from 0 at the first point to 1 at the
+/// second.
 pub fn quintic(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 6] {
     let (rise, d_0, d_1) = (y_1 - y_0, d_0 * h, d_1 * h);
     let (s_0, s_1) = (0.5 * s_0 * h * h, 0.5 * s_1 * h * h);
@@ -135,8 +137,6 @@ mod tests {
         }
     }
 
-    /// Slope and curvature of the interpolant of exp(x) at its points equal the derivatives of the polynomial through
-    /// the five nearest points.
     #[test]
     fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
         let y = X.map(libm::exp);
@@ -175,9 +175,9 @@ mod tests {
     }
 
     /// Returns the differences between neighbouring Bernstein coefficients of the quintic between two points, divided by
-    /// their distance h. With the slope d and the second derivative s, the first two differences are d/5 and d/5 + h s/20 at
-    /// the left point, the last two follow in the same way from the right point, and the middle one is the rest of the rise.
-    /// If all differences have the sign of the rise, the curve is monotone.
+    /// their distance `h`. If all differences have the sign of the rise, the quintic is monotone. With the slope d and the
+    /// second derivative s at the left point, the first two differences are d/5 and d/5 + h s/20; the last two follow in the
+    /// same way from the right point, and the middle one is the rest of the rise.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };
@@ -191,8 +191,8 @@ mod tests {
         .map(|step| sign * step)
     }
 
-    /// The curve is monotone between points that jump by factors of up to 1e4, that rise and fall smoothly, or that turn.
-    /// The tolerance is 1e-11: the last digit of the largest value, divided by the smallest distance between points.
+    /// Tests data that jump by factors of up to 1e4, that rise and fall smoothly, and that turn. The tolerance of 1e-11 is
+    /// the last digit of the largest value divided by the smallest distance between points.
     #[test]
     fn the_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;

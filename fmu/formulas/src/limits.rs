@@ -26,8 +26,8 @@ use crate::cylinder::XI;
 use crate::energy_terms::energy_terms;
 use crate::third_order;
 
-/// Reason why a pendulum does not represent the liquid of a tank in its present state.
-/// [`LimitedBy::ITEMS`] describes each reason.
+/// Reason why a pendulum does not represent the liquid of a tank in its present state. [`LimitedBy::ITEMS`] describes each
+/// reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LimitedBy {
@@ -54,8 +54,7 @@ impl LimitedBy {
         LimitedBy::Contact,
     ];
 
-    /// Names and descriptions of all reasons why a pendulum does not represent the liquid, in the
-    /// order of their numbers.
+    /// Names and descriptions of the reasons, in the order of their numbers.
     pub const ITEMS: [(&str, &str); 8] = [
         ("none", "In range"),
         (
@@ -82,33 +81,33 @@ impl LimitedBy {
     }
 }
 
-/// Largest relative error of a slosh model's natural frequency within the model's range, compared with fully nonlinear potential
-/// flow.
+/// Allowed relative error of a slosh model's natural frequency, compared with fully nonlinear potential flow. The slosh angle
+/// at which the error reaches this value is the end of the model's range.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of the model's natural frequency at which the error of a forced response is 3 %, if the response is wrong
-/// only because the model's frequency changes with the slosh angle in another way than the liquid's frequency.
+/// Relative error of a slosh model's natural frequency at which the error of a response to forcing near resonance reaches 3
+/// %. It applies if the response is wrong only because frequency and amplitude are related differently in model and liquid.
 pub const FORCED: f64 = 8.5e-4;
 
-/// Relative error of the third order's frequency at the slosh angle at which the error of a forced response is 3 %. It is used
-/// for a tank in which only free motion was compared with potential flow, and is the smallest error that was found in upright
-/// cylinders with h/R of 0.4 and more.
+/// Relative error of the third-order model's frequency at the slosh angle at which the error of a forced response reaches 3
+/// %. It is used for tanks in which only free motion was compared with potential flow. The value is the smallest that was
+/// found in upright cylinders with h/R of 0.4 and more.
 pub const FORCED_UNCOMPARED: f64 = 1.7e-4;
-/// Ratio of two slosh angles at which the error of a forced response is 3 %: the angle of the model with [`energy_terms`],
-/// divided by the angle of the third order. It is used for a tank in which only free motion was compared with potential flow, and
-/// is the smallest ratio that was found in upright cylinders.
+/// Ratio by which a model with [`energy_terms`] may have larger slosh angles than the third-order model before the error of a
+/// forced response reaches 3 %. It is used for tanks in which only free motion was compared with potential flow. The value is
+/// the smallest that was found in upright cylinders.
 pub const ENERGY_UNCOMPARED: f64 = 1.06;
-/// Largest slosh angle, rad, at which the error of a forced response of the third order was below 3 %
-/// in any upright cylinder.
+/// Largest slosh angle, rad, at which the third-order model had a forced response with an error below 3 % in any upright
+/// cylinder.
 pub const LARGEST_FORCED: f64 = 9.3 * PI / 180.0;
-/// Largest slosh angle, rad, at which the error of a forced response with [`energy_terms`] was below 3 %
-/// in any upright cylinder.
+/// Largest slosh angle, rad, at which a model with [`energy_terms`] had a forced response with an error below 3 % in any
+/// upright cylinder.
 pub const LARGEST_FORCED_ENERGY: f64 = 10.2 * (PI / 180.0);
 
-/// Each row contains h/R and two slosh angles of planar motion in an upright cylinder, degrees. At the first angle the
-/// frequency of the third order has the error [`FREQUENCY`] (the frequency of rotary motion has it at larger angles,
-/// except where the branch folds), and at the second angle the error of a forced response is 3 %. In
-/// [`third_order::BRIDGED`] the coefficients are interpolated. `harness/tank/tests/tank/backbones.rs` computes the
-/// first angle from `harness/tank/tests/backbones.csv`.
+/// Limits of the third-order model for planar motion in an upright cylinder. Each row contains h/R and two slosh angles,
+/// degrees: the angle at which the natural frequency has the error [`FREQUENCY`], and the angle at which the error of a
+/// forced response is 3 %. (In rotary motion the frequency reaches this error at larger angles, except where the branch
+/// folds.) In the range [`third_order::BRIDGED`] the coefficients are interpolated. `harness/tank/tests/tank/backbones.rs`
+/// computes the first angle from `harness/tank/tests/backbones.csv`.
 const THIRD_ORDER: [[f64; 3]; 12] = [
     [0.25, 4.41, 1.3],
     [0.3, 7.11, 2.4],
@@ -124,24 +123,24 @@ const THIRD_ORDER: [[f64; 3]; 12] = [
     [2.5, 22.06, 11.1],
 ];
 
-/// Each row contains h/R and the slosh angle, degrees, at which the branch of rotary motion folds. The first row is
-/// the depth of the secondary resonance. At h/R = 1 and 2.5 the computation ended at this angle, so that the fold may
-/// be at a larger angle.
+/// Slosh angles at which the branch of rotary motion folds because of a secondary resonance. Each row contains h/R and the
+/// angle, degrees. The first row is the depth of the resonance itself. At h/R = 1 and 2.5 the computation ended at this
+/// angle, so that the true fold may be at a larger angle.
 const FOLD: [[f64; 2]; 6] =
     [[0.8314, 0.5], [0.9, 4.6], [1.0, 7.0], [1.227, 9.4], [2.0, 10.8], [2.5, 10.4]];
 
-/// Largest slosh angles, rad, of a model of the first mode. Up to `frequency` the error of its natural frequency is at most
-/// [`FREQUENCY`], and up to `forced` the error of a forced response near resonance is at most 3 %.
+/// Largest slosh angles, rad, at which a model of the first mode is valid: up to `frequency` its natural frequency has at
+/// most the error [`FREQUENCY`], and up to `forced` its response to forcing near resonance has an error of at most 3 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleLimit {
     pub frequency: f64,
     pub forced: f64,
 }
 
-/// Returns the limit of a model of the first mode in an upright cylinder filled to h/R = `fill`. `shifts` are the model's
-/// relative changes of omega^2 per squared slosh angle in planar and in circular motion: 0 for a linear mode, -1/8 and 1/2
-/// for a pendulum, and `None` for a motion that the model does not have. If they differ from the shifts of the third order,
-/// the difference adds to the error of the third order.
+/// Returns the largest valid slosh angles of a model of the first mode in an upright cylinder filled to h/R = `fill`.
+/// `shifts` describes the model: the relative change of the squared natural frequency per squared slosh angle in planar and
+/// in circular motion. A linear mode has 0 and 0, a pendulum -1/8 and 1/2; `None` stands for a motion that the model cannot
+/// make. A difference between these shifts and those of third-order theory adds to the error of third-order theory.
 pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     let (s, kappa) = third_order::coefficients(fill);
     let own = |error: f64, column: usize| {
@@ -150,24 +149,25 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     AngleLimit { frequency: own(FREQUENCY, 1), forced: own(FORCED, 2) }
 }
 
-/// Each row contains h/R and the slosh angle, degrees, at which the error of a forced planar response of the model
-/// with [`energy_terms`] is 3 %. From h/R = 0.6 on the error is smaller than 3 % up to 15 degrees, the largest
-/// angle that was compared.
+/// Limits of the model with [`energy_terms`] in planar motion. Each row contains h/R and the slosh angle, degrees, at which
+/// the error of a forced response is 3 %. From h/R = 0.6 on the error stays below 3 % up to 15 degrees, the largest angle
+/// that was compared.
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 
-/// Each row contains h/R and the slosh angle, degrees, at which the error of a forced rotary response of the third order is
-/// 3 %. In shallower liquid planar motion has the smaller limit.
+/// Limits of the third-order model in rotary motion. Each row contains h/R and the slosh angle, degrees, at which the error
+/// of a forced response is 3 %. Shallower liquid has no row, because planar motion has the smaller limit there.
 const ROTARY: [[f64; 2]; 6] =
     [[0.65, 9.3], [0.8, 7.7], [1.0, 4.8], [1.227, 5.9], [2.0, 7.2], [2.5, 7.2]];
 
-/// Like [`ROTARY`], for the model with [`energy_terms`].
+/// Limits of the model with [`energy_terms`] in rotary motion, in rows as in [`ROTARY`].
 const ROTARY_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.8], [0.35, 4.0], [0.4, 5.0], [0.5, 7.5], [0.6, 9.6], [0.7, 10.2]];
 
-/// Returns the slosh angle, rad, above which rotary motion in an upright cylinder filled to h/R = `fill` is out of range,
-/// because the error of a forced response is 3 % or the branch folds. The model is that with [`energy_terms`] if
-/// `has_energy` is true, otherwise the third order. `None` in shallow liquid, where planar motion has the smaller limit.
+/// Returns the largest valid slosh angle, rad, of rotary motion in an upright cylinder filled to h/R = `fill`. At this angle
+/// the error of a forced response is 3 %, or the branch of rotary motion folds. `has_energy` is true for the model with
+/// [`energy_terms`] and false for the third-order model. The result is `None` in shallow liquid, where planar motion has the
+/// smaller limit.
 pub fn swirl(fill: f64, has_energy: bool) -> Option<f64> {
     let forced = match has_energy && energy_terms(fill).is_some() {
         true => Some(interpolate(fill, ROTARY_ENERGY)),
@@ -176,16 +176,17 @@ pub fn swirl(fill: f64, has_energy: bool) -> Option<f64> {
     [forced.map(f64::to_radians), swirl_fold(fill)].into_iter().flatten().reduce(f64::min)
 }
 
-/// Returns the limit of a slosh mass with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`; `None` at
-/// depths without these coefficients.
+/// Returns the largest valid slosh angles of a model with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`;
+/// `None` at depths without these coefficients.
 pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
     let compared = energy_terms(fill)?.compared;
     Some(AngleLimit { frequency: compared, forced: interpolate(fill, FORCED_ENERGY).to_radians() })
 }
 
-/// Returns the slosh angle, rad, up to which the relative error of a model's frequency is at most `error`. If the model's
-/// `shifts` equal the `exact` shifts to third order, this is `limit`. Otherwise it is at most the angle at which the
-/// difference of the shifts causes this error.
+/// Returns the slosh angle, rad, up to which the frequency of a model has at most the relative `error`. `limit` is this angle
+/// for the third-order model. `shifts` and `exact` are the changes of the squared frequency per squared slosh angle, in
+/// planar and circular motion, of the model and of third-order theory. If they differ, the result is at most the angle at
+/// which this difference alone causes the error.
 pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]) -> f64 {
     let off = shifts.iter().zip(exact);
     let off = off.filter_map(|(shift, exact)| Some((shift.as_ref()? - exact).abs()));
@@ -193,9 +194,9 @@ pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 
-/// Returns a column of the table [`THIRD_ORDER`] at h/R = `fill`, interpolated and converted from degrees to rad. In
-/// shallower liquid than in the table the power law through the first two rows is continued, and in deeper liquid the value
-/// of the last row is used.
+/// Returns an angle of the table [`THIRD_ORDER`], rad, interpolated at h/R = `fill`; `column` is 1 or 2. In liquid shallower
+/// than the first row, the power law through the first two rows is continued; in liquid deeper than the last row, the last
+/// value is used.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {
@@ -207,8 +208,8 @@ fn degrees_at(fill: f64, column: usize) -> f64 {
     degrees.to_radians()
 }
 
-/// Returns the slosh angle, rad, at which the branch of rotary motion in an upright cylinder folds because of a secondary
-/// resonance; `None` in liquid so shallow that there is no secondary resonance.
+/// Returns the slosh angle, rad, at which the branch of rotary motion in an upright cylinder filled to h/R = `fill` folds
+/// because of a secondary resonance; `None` in liquid that is too shallow for this resonance.
 pub fn swirl_fold(fill: f64) -> Option<f64> {
     (fill >= FOLD[0][0]).then(|| interpolate(fill, FOLD).to_radians())
 }
@@ -219,12 +220,13 @@ fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
     y_0 + (y_1 - y_0) * (x - x_0) / (x_1 - x_0)
 }
 
-/// Largest spin number Omega^2 R/g at which pendulums represent the liquid of a tank that spins about its axis. Omega is the
-/// spin rate, and R the radius of the free surface.
+/// Largest spin number Omega^2 R/g at which a pendulum represents the liquid of a tank that spins about its axis. Omega is
+/// the spin rate, and R the radius of the free surface.
 pub const SPIN_NUMBER: f64 = 0.3;
 
-/// Quantities of a tank's first mode that limit its spin. `factor` is 4 (1 + C_0): if it exceeds omega_0^2/Omega^2, the
-/// slower wave is among the inertial waves. `ratio` is R/l.
+/// Limits of the spin rate Omega of a tank, for a first mode with the natural frequency omega_0. `factor` is 4 (1 + C_0) with
+/// the gyroscopic coefficient C_0 of the mode: if it exceeds omega_0^2/Omega^2, the slower of two waves has become an
+/// inertial wave. `ratio` is the radius of the free surface divided by the pendulum length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinLimit {
     factor: f64,
@@ -232,11 +234,11 @@ pub struct SpinLimit {
 }
 
 impl SpinLimit {
-    /// Creates the limits for a pendulum of this length, m, in a tank with this radius of the free surface, m. The radius is
-    /// 0 if it is unknown; the liquid then counts as deep.
+    /// Creates the spin limits of a tank from the pendulum `length` of its first mode, m, and the `radius` of its free
+    /// surface, m. If the radius is 0, it is unknown, and the liquid counts as deep.
     ///
-    /// The gyroscopic coefficient of the liquid is C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1), with the wave number k and tanh
-    /// kh = 1/(k l). It is 0.418 in deep liquid and 0.837 in shallow liquid.
+    /// The gyroscopic coefficient is C_0 = (1 + 2 k h/sinh 2 k h)/((k R)^2 - 1), where the wave number k follows from tanh k
+    /// h = 1/(k l). It is 0.418 in deep and 0.837 in shallow liquid.
     pub fn new(length: f64, radius: f64) -> SpinLimit {
         let deep = 1.0 / XI[0];
         let ratio = if radius > 0.0 { radius / length } else { XI[0] };
@@ -251,25 +253,25 @@ impl SpinLimit {
         SpinLimit { factor: 4.0 * (1.0 + gyroscopic), ratio }
     }
 
-    /// Returns the gyroscopic coefficient C_0 of the first mode. Seen from a tank that spins at the rate Omega, a wave of
-    /// the first mode has the frequencies C_0 Omega +- sqrt(C_0^2 Omega^2 + omega_0^2), to the first order in Omega. For a
-    /// pendulum, which does not take part in the spin, C_0 would be 1.
+    /// Returns the gyroscopic coefficient C_0 of the first mode. In a tank that spins at the rate Omega, a wave of this mode
+    /// has two frequencies, which are C_0 Omega +- sqrt(C_0^2 Omega^2 + omega_0^2) to first order in Omega, seen from the
+    /// tank. A pendulum would have C_0 = 1, because it does not take part in the spin.
     pub fn gyroscopic_coefficient(&self) -> f64 {
         self.factor / 4.0 - 1.0
     }
 
-    /// Returns R/l, the radius of the free surface divided by the pendulum length. R/l times Omega^2/omega_0^2 is the
-    /// spin number Omega^2 R/g.
+    /// Returns the radius R of the free surface divided by the pendulum length l. Multiplied by Omega^2/omega_0^2 it gives
+    /// the spin number Omega^2 R/g.
     pub fn radius_over_length(&self) -> f64 {
         self.ratio
     }
 
-    /// Returns true if a pendulum does not represent liquid that spins with its tank at `rate`, rad/s, about the tank's
-    /// axis. `omega2`, 1/s^2, is the squared natural frequency without spin.
+    /// Returns true if a pendulum does not represent liquid that spins with its tank at the `rate`, rad/s, about the tank's
+    /// axis. `omega2` is the squared natural frequency without spin, 1/s2.
     ///
-    /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the
-    /// inertial waves of the liquid. Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by
-    /// more than 2 %, and the surface is 0.075 R lower at its centre.
+    /// There are two limits. Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2), the wave that runs with the spin becomes an inertial
+    /// wave of the liquid. Beyond Omega^2 R/g = 0.3, the gyroscopic formula for the frequencies errs by more than 2 %, and
+    /// the surface is 0.075 R lower at its centre.
     pub fn is_exceeded(&self, rate: f64, omega2: f64) -> bool {
         let rate2 = rate * rate;
         rate2 * self.factor > omega2 || rate2 * self.ratio > SPIN_NUMBER * omega2
@@ -332,9 +334,9 @@ mod tests {
         assert!((compared.to_radians() / LARGEST_FORCED_ENERGY - 1.0).abs() < 1e-12);
     }
 
-    /// In fully nonlinear potential flow the frequency of planar motion differs from a pendulum's by 0.3 % at the slosh
-    /// angles 1.6, 3.5, 8.3 and 7.8 degrees for h/R = 0.25, 0.35, 1.227 and 2. The term of the next order changes these
-    /// angles by at most 0.3 degrees.
+    /// Compares with the slosh angles at which the frequency of planar motion in fully nonlinear potential flow differs by
+    /// 0.3 % from a pendulum's frequency. Terms beyond third order, which the limit leaves out, change these angles by at
+    /// most 0.3 degrees.
     #[test]
     fn the_range_of_a_pendulum_ends_where_the_third_order_differs_from_it() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {
@@ -357,9 +359,9 @@ mod tests {
         assert_eq!(swirl_fold(9.0), swirl_fold(2.5));
     }
 
-    /// An upright tank with R = 0.3 m and h = 0.4 m at 5 m/s2 that spins at 9 rad/s is out of range: 2 Omega/omega_0 is 3.3
-    /// (the limit 1/sqrt(1 + C_0) is between 0.7 and 0.9), and Omega^2 R/g is 4.86 (the limit is 0.3). At 0 and 0.1 rad/s
-    /// the tank is in range.
+    /// The example is an upright tank of 0.3 m radius, filled 0.4 m deep, at 5 m/s2. At a spin rate of 9 rad/s it is far
+    /// beyond both limits: 2 Omega/omega_0 is 3.3 (limit 0.7 to 0.9), and Omega^2 R/g is 4.86 (limit 0.3). At 0 and 0.1 rad/s
+    /// it is within both.
     #[test]
     fn a_spinning_tank_is_out_of_range_where_inertial_waves_occur_or_the_paraboloid_is_deep() {
         let limit = |fill: f64| {

@@ -1,8 +1,8 @@
 //! Range of linear slosh theory, by the wave height at the wall divided by the radius R of the free surface (Rubaga's
 //! thesis, section 2.3.5, after Dodge).
 
-/// Class of a wave by its height at the wall divided by the radius R of the free surface. Below 0.15 linear theory is valid;
-/// above 0.25 computed heights and forces are only indications.
+/// Class of a wave by its height at the wall, divided by the radius of the free surface. Linear theory is valid below 0.15.
+/// Above 0.25 a computed height or force is only an indication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Regime {

@@ -12,7 +12,7 @@
 
 use libm::{cbrt, sqrt};
 
-/// A liquid's `density` rho, kg/m3, and surface `tension` sigma, N/m.
+/// A liquid with its `density`, kg/m3, and its surface `tension`, N/m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
     pub density: f64,
@@ -24,8 +24,10 @@ impl Liquid {
         self.density * a * radius * radius / self.tension
     }
 
-    /// Returns the Bond number Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from the axis.
-    /// If `alpha` is the square of an angular rate instead, the result is Bo_c; if `arm` is the radius, it is Bo_r.
+    /// Returns the Bond number of a tank that a rotation accelerates: the ratio of inertia to surface tension. `alpha` is the
+    /// angular acceleration of the spacecraft, rad/s2, `radius` the radius of the tank, m, and `arm` the distance of the tank
+    /// from the axis of rotation, m. If the square of an angular rate is passed as `alpha`, the result is the Bond number of
+    /// the centrifugal acceleration.
     pub fn rotational_bond(&self, alpha: f64, radius: f64, arm: f64) -> f64 {
         self.bond(alpha * arm, radius)
     }
@@ -34,8 +36,8 @@ impl Liquid {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// Returns the time sqrt(rho L^3/sigma) in which surface tension moves liquid over the length L, m (equation 2.29). It
-    /// is not the period of an oscillation.
+    /// Returns the time sqrt(rho L^3/sigma), s, in which surface tension moves liquid over the `length` L, m (equation 2.29).
+    /// It is not the period of an oscillation.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
@@ -57,14 +59,14 @@ pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// Returns the time sqrt(L/a) in which the acceleration a, m/s2, moves liquid over the length L, m (equation 2.28).
+/// Returns the time sqrt(L/a), s, in which an `acceleration` a, m/s2, moves liquid over the `length` L, m (equation 2.28).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }
 
-/// Returns a text with the dominant force among gravity, surface tension and inertia: the one that belongs to the
-/// largest of Bo, 1 and We (Rubaga's thesis, section 2.5). If inertia dominates, the liquid crosses the tank, and
-/// no pendulum represents it.
+/// Returns a sentence that names the dominant force: gravity, surface tension or inertia, whichever belongs to the largest of
+/// Bond number, 1 and Weber number (Rubaga's thesis, section 2.5). If inertia dominates, the liquid crosses the tank, and no
+/// pendulum represents it.
 pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     match (bond > 1.0, weber > 1.0) {
         (_, true) if weber > bond => {
@@ -75,8 +77,8 @@ pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     }
 }
 
-/// Returns a text on the behaviour of a liquid at a Bond number. The limits between the texts are approximate
-/// (Rubaga's thesis, section 2.5).
+/// Returns a short text that describes how liquid behaves at a Bond number, for example "high g: flat surface, …" above 1000.
+/// The Bond numbers at which the text changes are approximate (Rubaga's thesis, section 2.5).
 pub fn regime(bond: f64) -> &'static str {
     match bond {
         b if b > 1000.0 => "high g: flat surface, linear and weakly nonlinear models hold",
@@ -86,8 +88,8 @@ pub fn regime(bond: f64) -> &'static str {
     }
 }
 
-/// Returns a text on the agility of a spacecraft with this angular acceleration, rad/s2, in the words of Table
-/// 2.2 of Rubaga's thesis.
+/// Returns a text on the agility of a spacecraft, for example "low agility", from its angular acceleration, rad/s2 (Rubaga's
+/// thesis, Table 2.2).
 pub fn agility(alpha: f64) -> &'static str {
     match alpha {
         a if a < 5e-5 => "low agility",
@@ -96,9 +98,9 @@ pub fn agility(alpha: f64) -> &'static str {
     }
 }
 
-/// Returns Froude's scale factors from model to full size, each with name and unit of its quantity. `lambda` is the ratio of
-/// lengths, `density` of densities and `gravity` of accelerations, each full size divided by model. In Table 2.3 of Rubaga's
-/// thesis gravity = 1.
+/// Returns the factors that convert quantities of a model to full size by Froude's law, each with the name and the unit of
+/// the quantity. `lambda` is the ratio of lengths, `density` the ratio of densities and `gravity` the ratio of accelerations,
+/// each full size divided by model. Table 2.3 of Rubaga's thesis has the case of equal gravity.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'static str, f64); 10] {
     let volume = lambda * lambda * lambda;
     let force = volume * density * gravity;
@@ -117,8 +119,9 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'stat
     ]
 }
 
-/// Returns the ratio of kinematic viscosities, full size divided by model, for which both have the same Reynolds number.
-/// Froude scaling alone does not preserve the Reynolds number.
+/// Returns the ratio of the kinematic viscosities of two liquids, full size divided by model, for which model and full size
+/// have the same Reynolds number. `lambda` is the ratio of lengths and `gravity` the ratio of accelerations. With equal
+/// viscosities, Froude scaling does not preserve the Reynolds number.
 pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
     lambda * sqrt(lambda * gravity)
 }

@@ -25,16 +25,17 @@
 
 use crate::cylinder::XI;
 
-/// Integral M = int J1(xi_1 r)^4 r dr/int J1(xi_1 r)^2 r dr of the first mode's shape over the cross-section of a
-/// cylinder of radius 1.
+/// Ratio of two integrals over the cross-section of a cylinder of radius 1, int J1(xi_1 r)^4 r dr divided by int J1(xi_1 r)^2
+/// r dr, where J1(xi_1 r) is the shape of the first mode.
 const M: f64 = 0.278_821_981_660_245_8;
 
-/// Squared amplitude of the wave divided by the squared slosh angle, B = (2/((xi_1^2 - 1) J1(xi_1)))^2.
+/// Squared amplitude of the wave divided by the squared slosh angle, (2/((xi_1^2 - 1) J1(xi_1)))^2, in a cylinder of
+/// radius 1.
 const B: f64 = 2.068_401_064_148_324;
 
-/// Modes that the first mode excites, for the azimuthal numbers 0 and 2: the zero xi of each mode and its coupling e =
-/// c^2/(n n_1) with the first mode, where c = int J1^2 J r dr, n = int J^2 r dr and n_1 = int J1^2 r dr. The modes that are
-/// left out would change s and kappa by less than 1e-4 from h/R = 0.2 on.
+/// Slosh modes that the square of the first mode excites, for the azimuthal numbers 0 and 2. Each pair contains the zero xi
+/// of the mode, and its coupling with the first mode, e = c^2/(n n_1) with c = int J1^2 J r dr, n = int J^2 r dr and n_1 =
+/// int J1^2 r dr. The modes that are left out would change s and kappa by less than 1e-4 from h/R = 0.2 on.
 const EXCITED: [[(f64, f64); 8]; 2] = [
     [
         (3.831_705_970_207_513, 4.011_801_530_216_258e-2),
@@ -58,20 +59,21 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
     ],
 ];
 
-/// Relative difference between 2 omega_1 and the frequency of an excited mode, below which the third order is not valid.
+/// Relative difference between twice the frequency of the first mode and the frequency of an excited mode, below which
+/// third-order theory is not valid.
 const DETUNING: f64 = 0.01;
 
-/// Range of fills h/R in which the coefficients are interpolated, because twice the frequency of mode 1 is a frequency of
-/// mode (2,2) at 0.831 and of mode (0,2) at 1.010.
+/// Range of fills h/R in which the coefficients are interpolated, because third-order theory has a pole wherever an excited
+/// mode has twice the frequency of the first mode. Mode (2,2) has it at 0.831 and mode (0,2) at 1.010.
 pub const BRIDGED: [f64; 2] = [0.70, 1.20];
 
-/// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of the first mode of an upright cylinder
+/// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of the first slosh mode of an upright cylinder
 /// filled to h/R = `fill`.
 ///
-/// Within [`BRIDGED`] the third-order theory has poles, and close to a pole it is valid only at very small amplitudes. Both
-/// coefficients are therefore interpolated linearly between the ends of this range. With the interpolated coefficients, the
-/// frequencies at h/R = 0.8 and 1.0 differ from fully nonlinear potential flow by at most 0.3 % up to 16 degrees. In
-/// contrast, the forced response of a pendulum is 26 % too low at h/R = 1.0.
+/// Within the range [`BRIDGED`] third-order theory has two poles, and close to a pole it is valid only for very small waves.
+/// Both coefficients are therefore interpolated linearly between the ends of the range. The interpolated coefficients give
+/// frequencies that differ from fully nonlinear potential flow by at most 0.3 % up to 16 degrees, at h/R = 0.8 and 1.0. A
+/// pendulum would be much worse: its forced response is 26 % too low at h/R = 1.0.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let [low, high] = BRIDGED;
     if fill <= low || fill >= high {
@@ -82,14 +84,14 @@ pub fn coefficients(fill: f64) -> (f64, f64) {
     (s_0 + (s_1 - s_0) * share, kappa_0 + (kappa_1 - kappa_0) * share)
 }
 
-/// Returns the relative change of the squared frequency omega^2 per squared slosh angle: in planar motion 3 kappa/8 -
-/// s/2, and in circular motion kappa/2.
+/// Returns the relative change of the squared natural frequency per squared slosh angle of a mode with the large-wave
+/// coefficients s and kappa: 3 kappa/8 - s/2 in planar motion, and kappa/2 in circular motion.
 pub fn shifts(s: f64, kappa: f64) -> [f64; 2] {
     [0.375 * kappa - 0.5 * s, 0.5 * kappa]
 }
 
-/// Returns the large-wave coefficients s and kappa of third-order theory at h/R = `fill`, without the interpolation of
-/// [`coefficients`]. They grow without bound near 0.831 and 1.010.
+/// Returns the large-wave coefficients s and kappa by third-order theory at h/R = `fill`, without the interpolation of
+/// [`coefficients`]. They grow without bound near the poles at 0.831 and 1.010.
 pub fn unbridged(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     let k2 = XI[0] * XI[0];
@@ -111,8 +113,9 @@ pub fn unbridged(fill: f64) -> (f64, f64) {
     (1.5 * circular - 2.0 * planar, 2.0 * circular)
 }
 
-/// Returns azimuthal number and radial number (which counts from 1) of an excited mode whose frequency is twice the first
-/// mode's frequency within [`DETUNING`] at h/R = `fill`; `None` if there is no such mode.
+/// Returns the slosh mode that resonates with the first mode in an upright cylinder filled to h/R = `fill`, because its
+/// frequency is twice the first mode's frequency within [`DETUNING`]: its azimuthal number, and its radial number, counted
+/// from 1. The result is `None` if there is no such mode.
 pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
@@ -138,9 +141,9 @@ mod tests {
         }
     }
 
-    /// The expected values have twelve digits. They were computed in another way: by Lagrange's averaged function, which is made
-    /// stationary by solving for the excited modes, with integrals by Gauss's rule and Bessel functions by their integral
-    /// representation. They verify sign and magnitude of every term, also close to the resonance at 0.15.
+    /// The expected values, with twelve digits, come from another method: the averaged Lagrangian, made stationary by solving
+    /// for the excited modes, with integrals by Gauss's rule. They verify sign and size of every term, also close to the
+    /// resonance at h/R = 0.15.
     #[test]
     fn third_order_coefficients_equal_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [
@@ -168,7 +171,6 @@ mod tests {
         }
     }
 
-    /// Twice the frequency of mode 1 is the frequency of mode (2,2) at h/R = 0.831, and that of mode (0,2) at 1.01.
     #[test]
     fn a_depth_with_a_secondary_resonance_is_reported_with_the_resonant_mode() {
         assert_eq!(secondary_resonance(0.831), Some((2, 2)));

@@ -29,12 +29,11 @@
 
 use crate::cylinder::XI;
 
-/// Number of modes of each azimuthal number in the sums. With all modes c would change by less than 1e-6 of its value for
-/// mode 1, and by 0.003 for mode 10 (for h/R from 0.2 on).
+/// Number of modes of each azimuthal number in the perturbation sums. With all modes the coefficient c would change by less
+/// than 1e-6 of its value for mode 1, and by 0.003 for mode 10 (h/R of 0.2 and more).
 const ZEROS: usize = 16;
 
-/// Zeros of J0', the derivative of the Bessel function J0, that follow the zero at 0. `XI_2` below contains
-/// the zeros of J2'.
+/// Zeros of J0', the derivative of the Bessel function J0, without the zero at 0. `XI_2` contains the zeros of J2'.
 const XI_0: [f64; ZEROS] = [
     3.831_705_970_207_512_5,
     7.015_586_669_815_619,
@@ -72,15 +71,16 @@ const XI_2: [f64; ZEROS] = [
     51.004_297_672_458_87,
 ];
 
-/// Returns the slope s of the surface up to which the error of [`factors`] for the frequency of the first mode is at most 1
-/// % at h/R = `fill`. At half of this slope the error is 0.15 %. If the slope reaches h/R, a part of the bottom is dry.
+/// Returns the largest slope of the free surface at which [`factors`] gives the frequency of the first mode with an error of
+/// at most 1 %, in a tank filled to h/R = `fill`. At half this slope the error is 0.15 %. At a slope of h/R a part of the
+/// bottom would be dry.
 pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
 
-/// Returns the coefficient c with which the slope of the surface changes the squared frequency of mode `n`
-/// at h/R = `fill`, for motion along the slope and across it (see [`factors`]). Modes count from 0, and `n`
-/// must be below [`crate::cylinder::MODES`].
+/// Returns the coefficients c with which a sloping surface changes the squared frequency of slosh mode `n` by the factor 1 +
+/// c slope^2: the first for motion along the slope, the second for motion across it. `fill` is h/R of the upright tank. The
+/// first mode has the number 0, and `n` must be below [`crate::cylinder::MODES`].
 pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     let a2 = XI[n] * XI[n];
     let lambda = XI[n] * libm::tanh(XI[n] * fill);
@@ -108,11 +108,12 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// Returns the factors by which a sloping surface changes the squared frequency omega^2 of mode `n` at h/R = `fill`, for
-/// motion along the slope and across it. The surface has the slope s, and the gravity g along the axis is unchanged.
+/// Returns the factors by which a sloping surface changes the squared frequency of slosh mode `n`, for motion along the slope
+/// and across it. The surface of a tank filled to h/R = `fill` has the `slope`, while gravity along the tank's axis is
+/// unchanged.
 ///
-/// The factor is 1 + c s^2. If c is negative, it is 1/(1 - c s^2), which is equal to second order, more accurate at larger
-/// slopes, and never negative.
+/// With c from [`coefficients`] the factor is 1 + c slope^2. If c is negative, the factor is 1/(1 - c slope^2), which is
+/// equal to second order, more accurate at larger slopes, and never negative.
 pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
     coefficients(n, fill).map(|c| {
         let x = c * slope * slope;
@@ -124,10 +125,11 @@ pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Each row contains h/R, the slope, and the change of Lambda of the first mode relative to the upright tank, along the
-    /// slope and across it. The values were computed by finite elements in three dimensions, `hubslosh.liquid_modes`
-    /// (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for R = 1 and the fill h cos + sin of the tilt. Results of two
-    /// meshes differ by up to 4e-4; for the upright tank they agree with tanh within 1.4e-4.
+    /// Reference values. Each row contains h/R, the slope, and the relative change of the first mode's squared frequency by
+    /// the tilt, along the slope and across it. They were computed by finite elements in three dimensions with
+    /// `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for a radius of 1 and the fill h cos + sin of
+    /// the tilt. Results of two meshes differ by up to 4e-4; for the upright tank they agree with the exact value within
+    /// 1.4e-4.
     const FINITE_ELEMENTS: [(f64, f64, [f64; 2]); 12] = [
         (0.35, 0.0525, [-0.00382, -0.00129]),
         (0.35, 0.1225, [-0.02139, -0.00764]),
@@ -143,8 +145,8 @@ mod tests {
         (3.0, 0.7, [-0.15777, 0.10438]),
     ];
 
-    /// At small tilts the tolerance is the difference of the results of two meshes. At larger tilts it is the stated error
-    /// of the frequency, which is half the error of Lambda.
+    /// At small tilts the tolerance is the difference between the results of two meshes. At larger tilts it is the error that
+    /// [`largest_slope`] states.
     #[test]
     fn frequencies_equal_those_of_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {
@@ -161,8 +163,8 @@ mod tests {
         }
     }
 
-    /// At the slope 0.2 the factors of the second mode agree with finite elements on two meshes, whose results differ by
-    /// 0.009 of Lambda for the upright and for the tilted cylinder.
+    /// The expected change of the second mode is a result of finite elements for the slope 0.2 minus their result for the
+    /// upright tank, because both have the same error of the mesh, 0.009.
     #[test]
     fn tilt_changes_the_second_mode_as_finite_elements_do() {
         for (fill, change) in [
@@ -175,8 +177,8 @@ mod tests {
         }
     }
 
-    /// The coefficients equal sums that are computed without a closed form, by Simpson's rule from the expansion of the
-    /// matrices K and M. The error is (b/2000)^4/180 for the zero b of J_0' or J_2'.
+    /// The coefficients in closed form equal sums that are computed numerically from the expansion of the matrices K and M,
+    /// with integrals by Simpson's rule. The error of the rule is (b/2000)^4/180 for the zero b of J0' or J2'.
     #[test]
     fn coefficients_of_a_tilted_cylinder_equal_the_perturbation_integrals_by_quadrature() {
         const N: usize = 2000;
@@ -221,17 +223,15 @@ mod tests {
         }
     }
 
-    /// Short waves do not reach the bottom. Along the slope the surface is longer by the root of 1 + s^2, and g is larger by
-    /// the same factor. For waves whose directions are distributed as cos^2 of the angle, the coefficient of the frequency's
-    /// change is 1/8 for modes along the slope and 3/8 across it. Mode 10 differs from this by 0.003.
+    /// Short waves do not reach the bottom. Along the slope the surface is longer by the factor sqrt(1 + s^2), and gravity
+    /// normal to it is larger by the same factor. If the directions of the waves are distributed as cos^2 of the angle, the
+    /// coefficient is 1/8 for motion along the slope and 3/8 across it. Mode 10 differs from this limit by 0.003.
     #[test]
     fn tilt_changes_high_modes_as_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);
         assert!((along - 0.125).abs() < 0.01 && (across - 0.375).abs() < 0.01, "{along} {across}");
     }
 
-    /// In a cylinder whose axis is tilted from gravity no mode has a negative squared frequency, for surface
-    /// slopes up to 14.
     #[test]
     fn zero_tilt_changes_nothing_and_no_frequency_is_negative() {
         assert_eq!(factors(0, 1.0, 0.0), [1.0; 2]);

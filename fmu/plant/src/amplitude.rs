@@ -34,13 +34,14 @@ use taylor::series::{Series, ZERO, mul_ramp, sqrt, square, time_within, values};
 
 const FLOOR: f64 = 1e-4;
 
-/// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
+/// Smallest restoring stiffness W, as a multiple of 1/l times 1 m/s2. Without restoring force there is no drag, but the power
+/// series need a value above 0.
 const WEIGHTLESS: f64 = 1e-6;
 
 const ROUNDED: f64 = 0.02;
 
-/// Damping of one mode by breaking waves, with the symbols of the module's head: `zeta` is zeta_b (0 if waves do not break),
-/// `onset` is the steepness s_b, and `steepness` is sigma, 1/rad.
+/// Damping of one mode by breaking waves: the damping ratio `zeta` per steepness above the onset (0 if waves do not break),
+/// the steepness `onset` at which waves begin to break, and the `steepness` of the wave per slosh angle, 1/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breaking {
     pub zeta: f64,
@@ -52,10 +53,12 @@ impl Breaking {
     const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
 }
 
-/// Part of one mode's drag that grows with the amplitude, with the power series of the quantities in the module's head. `zeta`
-/// is zeta_A, 1/rad; `w_floor` is a constant that is added to W, 1/s2; `w` is W and its rate. Three fields are divided by the
-/// whole drag at the start of the expansion: `share`, which is the drag that does not grow (viscous or of a baffle), and the
-/// gains of both growing parts.
+/// The part of one mode's drag that grows with the amplitude of the wave, as power series in time. The equations are at the
+/// head of the file.
+/// - `zeta`: damping ratio per slosh angle, zeta_A, 1/rad.
+/// - `w`: restoring stiffness W and its rate; `w_floor`, 1/s2, is added to it.
+/// - `share`, `gain`, `gain_breaking`: the drag that does not grow, and the factors of the two parts that grow, each divided
+///   by the whole drag at the start of the series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
     pub acts: bool,
@@ -69,7 +72,7 @@ pub struct Growth {
     omega: Series,
     excess: Series,
     rounded: Series,
-    /// Viscous drag coefficient, divided by its value at the start of the expansion, as a power series in time.
+    /// Viscous drag coefficient divided by its value at the start of the series.
     pub viscous: Series,
     share: f64,
     gain: f64,
@@ -104,9 +107,10 @@ impl Growth {
         Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and rate.
-    /// `m` is the slosh mass, kg. `c` is the drag coefficient that does not depend on the amplitude; its viscous part changes in
-    /// time as the series `viscous`. Returns the whole drag coefficient.
+    /// Starts the power series of the drag, and returns the whole drag coefficient at their start. `w` is the restoring
+    /// stiffness W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is the slosh mass, kg. `c`
+    /// is the drag coefficient that does not depend on the amplitude; its viscous part changes in time as the series
+    /// `viscous`.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -121,9 +125,9 @@ impl Growth {
         both
     }
 
-    /// Returns coefficient n of the drag, relative to its value at the start of the expansion. The arguments are
-    /// coefficient n of the squared slosh angle |q|^2 and of its squared rate |q'|^2, and coefficient n of the drag
-    /// that does not depend on the amplitude (`other`).
+    /// Computes coefficient n of the series of the drag, which is divided by its value at the start, from coefficient n of
+    /// three other series: the squared slosh angle `q2`, its squared rate `v2`, and the drag `other` that does not depend on
+    /// the amplitude.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;
@@ -135,8 +139,8 @@ impl Growth {
         drag
     }
 
-    /// Estimates the time, s, over which the series of the drag converge, from coefficients 0 to 2. Their singularities
-    /// are at u = 0, W = 0 and y = +-i delta W^(1/2), with the quantities of the module's head.
+    /// Estimates the time, s, over which the series of the drag converge, from their first three coefficients. In the symbols
+    /// at the head of the file, the drag is singular at u = 0, W = 0 and y = +-i delta W^(1/2).
     pub fn convergence_radius(&self) -> f64 {
         let time_near = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
         let time = time_near(self.u[0], &self.u);
@@ -148,10 +152,10 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns, at `h`, s, after the start of the expansion, the drag divided by its value at the start, and the
-    /// quantity u of the module's head. u is computed from its series up to order n, and the drag from u and from the
-    /// drag `other` that does not depend on the amplitude. The difference of this drag from its own series is therefore
-    /// the error of the series.
+    /// Returns the drag `h` seconds after the start of the series, divided by its value at the start, and the quantity u of
+    /// the equations at the head of the file. u is computed from its own series up to order n, and the drag from u and from
+    /// the drag `other` that does not depend on the amplitude. The difference between this drag and the series of the drag is
+    /// therefore the error of the series.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);

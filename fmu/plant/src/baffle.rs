@@ -30,21 +30,25 @@ use taylor::series::{Series, ZERO, mul_ramp, time_within, values};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
-/// Range in which the law of Keulegan and Carpenter holds for the ratio of the wave's amplitude,
-/// times exp(-1.84 d/R), to the ring's width.
+/// Range in which the law of Keulegan and Carpenter holds for the stroke of the liquid at the ring, divided by the width of
+/// the ring.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 divided by the smallest wave amplitude for which the baffle's law holds. At this amplitude A_0 increases the damping by
-/// 2e-4 of its value.
+/// Wave amplitude A_0 that is added to the amplitude, divided by the smallest amplitude for which the baffle's law holds. At
+/// this smallest amplitude, A_0 increases the damping by 2e-4 of its value.
 const FLOOR: f64 = 0.03;
 
-/// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
+/// Smallest restoring stiffness W, as a multiple of 1/l times 1 m/s2. Without restoring force there is no drag, but the power
+/// series need a value above 0.
 const WEIGHTLESS: f64 = 1e-6;
 
-/// A ring baffle and its drag on one mode, with the power series of the quantities in the module's head. `zeta` is Z, the
-/// damping ratio at a slosh angle of 1 rad, and 0 without a baffle; `floor2` is A_0^2; `w_floor` is a constant that is added
-/// to W, 1/s2; `w` is W and its rate. `viscous` is divided by its value at the start of the expansion, and `gain` is 2 m Z
-/// divided by the whole drag coefficient there.
+/// A ring baffle and its drag on one mode, as power series in time. The equations are at the head of the file.
+/// - `zeta`: damping ratio Z at a slosh angle of 1 rad; 0 without a baffle.
+/// - `floor2`: square of the angle A_0.
+/// - `w`: restoring stiffness W and its rate; `w_floor`, 1/s2, is added to it.
+/// - `viscous`: viscous drag divided by its value at the start of the series.
+/// - `share`, `gain`: the viscous drag, and the factor of the baffle's drag, each divided by the whole drag at the start of
+///   the series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baffle {
     pub zeta: f64,
@@ -101,8 +105,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Returns warnings if Miles's formula does not hold for the ring baffle, because the ring is wide or the tank is given by
-/// a table of modes.
+/// Returns a warning if Miles's formula does not hold for the ring baffle: because the ring is too wide, or because a table
+/// of modes describes the tank.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     if p.baffle.width <= 0.0 {
@@ -124,8 +128,8 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     warnings
 }
 
-/// Range of validity of the baffle's law. `stroke` is the liquid's stroke at the ring divided by its width,
-/// per wave amplitude, 1/m.
+/// Range of validity of the baffle's law. `stroke` is the stroke of the liquid at the ring per wave amplitude, divided by the
+/// width of the ring, 1/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     stroke: f64,
@@ -154,8 +158,8 @@ impl Range {
 }
 
 impl Baffle {
-    /// Creates the baffle for the first mode. `wave` is the elevation of the wave at the wall per slosh angle, m/rad, and
-    /// `l` the pendulum length, m.
+    /// Creates the baffle with its effect on the first mode. `wave` is the elevation of the wave at the wall per slosh angle,
+    /// m/rad, and `l` the length of the pendulum, m.
     pub fn new(p: &Parameters, wave: f64, l: f64) -> Baffle {
         let (radius, Ring { width, depth }) = (p.tank.d / 2.0, p.baffle);
         let zeta = miles_ring(radius, depth, width, wave);
@@ -163,17 +167,17 @@ impl Baffle {
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 
-    /// Returns the amplitude A of the slosh angle, rad, and the damping ratio that the baffle adds,
-    /// at W = `w` and the squares of slosh angle and rate [|q|^2, |q'|^2].
+    /// Returns the amplitude of the slosh angle, rad, and the damping ratio that the baffle adds at this amplitude. `w` is
+    /// the restoring stiffness W, 1/s2; the array contains the squares of the slosh angle and of its rate.
     pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
         let w = w + T::constant(self.w_floor);
         let amplitude = (q2 + v2 / w).sqrt();
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts an expansion of the drag. `w` is W and its rate, and `at` are the squares [|q|^2, |q'|^2] of slosh angle and rate.
-    /// `m` is the slosh mass, kg. `c` is the viscous drag coefficient, which changes in time as the series `viscous`. Returns the
-    /// drag coefficient of baffle and viscosity together.
+    /// Starts the power series of the drag, and returns the drag coefficient of baffle and viscosity together at their start.
+    /// `w` is the restoring stiffness W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is
+    /// the slosh mass, kg, and `c` the viscous drag coefficient, which changes in time as the series `viscous`.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -184,8 +188,8 @@ impl Baffle {
         both
     }
 
-    /// Returns coefficient n of the baffle's drag, relative to its value at the start of the expansion, from
-    /// coefficient n of the squared slosh angle |q|^2 and of its squared rate |q'|^2.
+    /// Computes coefficient n of the baffle's drag, which is divided by the whole drag at the start of the series, from
+    /// coefficient n of the squared slosh angle `q2` and of its squared rate `v2`.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2]) -> f64 {
         self.q2[n] = q2 + if n == 0 { self.floor2 } else { 0.0 };
         self.v2[n] = v2;
@@ -201,16 +205,17 @@ impl Baffle {
         self.share * self.viscous[n] + self.gain * self.root[n]
     }
 
-    /// Returns the time, s, over which the series of the baffle's drag converge, from coefficients
-    /// 0 to 2. Singularities are at W = 0 and where the bracket W (|q|^2 + A_0^2) + |q'|^2 is 0.
+    /// Returns the time, s, over which the series of the baffle's drag converge, from their first three coefficients. The
+    /// drag is singular at W = 0, and where the bracket W (|q|^2 + A_0^2) + |q'|^2 of the equations at the head of the file
+    /// is 0.
     pub fn convergence_radius(&self) -> f64 {
         let sum = time_within(self.sum[0], self.sum[1].abs(), self.sum[2].abs());
         sum.min(time_within(self.w[0], self.w[1].abs(), 0.0))
     }
 
-    /// Returns, at `h`, s, after the start of the expansion, the drag divided by its value at the start, and the bracket W
+    /// Returns the drag `h` seconds after the start of the series, divided by its value at the start, and the bracket W
     /// (|q|^2 + A_0^2) + |q'|^2. Both are computed from the series of the bracket and of the viscous drag up to order n. The
-    /// difference of this drag from its own series is therefore the error of the series.
+    /// difference between this drag and its own series is therefore the error of the series.
     pub fn drag_at(&self, n: usize, h: f64) -> [f64; 2] {
         let [sum, viscous] = values([&self.sum, &self.viscous], n, h);
         let (sum, w) = (sum.max(0.0), f64::max(self.w[0] + self.w[1] * h, 0.0));

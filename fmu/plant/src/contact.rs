@@ -1,5 +1,5 @@
-/// Contact between hub and bearing under a friction law that switches at rest. The numbers are the values of the output
-/// `friction_mode`.
+/// Contact between hub and bearing: the hub sticks, or it slips in one direction. The output `friction_mode` has these
+/// numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i8)]
 #[allow(missing_docs)]

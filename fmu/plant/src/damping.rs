@@ -17,18 +17,19 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Specific force below which the factor c/c_0 is replaced by its mean, divided by the largest specific force g on a ramp. The
-/// power series of the factor converge only as far as g = 0. Since g is below this value only for a short time, the error, which
-/// is of second order in this time, is below rounding.
+/// Specific force below which the drag factor is replaced by its mean, as a fraction of the largest specific force g on a
+/// ramp. The power series of the factor converge only as far as g = 0. Since g stays below this value only for a short time,
+/// the error, which is of second order in this time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
-/// Largest step as a fraction of the time to g = 0, which is the series' radius of convergence.
+/// Largest step as a fraction of the time until g = 0, which is the radius of convergence of the series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
 pub const RAMP_ORDER: usize = 10;
 
-/// Drag factor c/c_0 of every mode as a function of g, with g_0 (`reference`, m/s2), the exponent p, the
-/// damping ratios `zeta` at g_0 and the restoring specific forces a_n (`centring`, m/s2).
+/// The drag coefficient of every mode as a function of the specific force g, with the equation at the head of the file:
+/// `reference` is g_0, m/s2, `exponent` is p, `zeta` are the damping ratios at g_0, and `centring` are the increases a_n of g
+/// by surface tension, m/s2.
 #[derive(Clone, Debug)]
 pub struct Damping {
     reference: f64,
@@ -38,8 +39,8 @@ pub struct Damping {
 }
 
 impl Damping {
-    /// Creates the damping of all modes. At the specific force `reference`, m/s2, for which the damping ratios in `calculated`
-    /// must be valid, every mode must have a restoring force.
+    /// Creates the damping of all modes. `reference` is the specific force, m/s2, to which the damping ratios in `calculated`
+    /// belong, and at which every mode must have a restoring force.
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
         let by_correlation =
             p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;
@@ -58,8 +59,8 @@ impl Damping {
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. Returns 0 where the ratio has no meaning:
-    /// without restoring force, and so close to this case that the formula overflows.
+    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. The result is 0 without restoring force, where
+    /// the ratio has no meaning, and so close to this case that the formula overflows.
     pub fn ratio(&self, n: usize, g: f64) -> f64 {
         let (zeta, a) = (self.zeta[n], self.centring[n]);
         match self.exponent == 0.25 {
@@ -75,9 +76,9 @@ impl Damping {
         if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
-    /// Sets the restoring specific force of mode `n` and the series of its drag factor c/c_0 in the mode's `pendulum`, from
-    /// the specific force `g` and its slope. If g + a_n is below `floor`, the factor is replaced by its mean, until the ramp
-    /// ends or g + a_n reaches twice `floor`. Returns the time, s, over which the series are valid.
+    /// Sets the restoring force of mode `n`, and the power series of its drag, in its `pendulum`, for the specific force `g`
+    /// with its slope. If the restoring specific force is below `floor`, the drag is replaced by its mean until the ramp ends
+    /// or the restoring specific force has reached twice `floor`. Returns the time, s, over which the series are valid.
     pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
         let a = self.centring[n];
         let x = g.value + a;
@@ -98,14 +99,14 @@ impl Damping {
         reach
     }
 
-    /// Returns the specific force, m/s2, below which the drag factor c/c_0 is replaced by its mean if g follows a
-    /// ramp for `h` seconds.
+    /// Returns the specific force, m/s2, below which the drag is replaced by its mean while `g` follows its ramp for `h`
+    /// seconds.
     pub fn floor(g: Ramp, h: f64) -> f64 {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.value_at(h)) }
     }
 
-    /// Writes the binomial series of the drag factor c/c_0, divided by its value at the start, into `c`. `relative` is the
-    /// slope of g + a_n divided by g + a_n at the start, 1/s.
+    /// Writes the binomial series of the drag, divided by its value at the start, into `c`. `relative` is the slope of the
+    /// restoring specific force divided by its value at the start, 1/s.
     fn series(&self, relative: f64, c: &mut Series) {
         for n in 0..RAMP_ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;

@@ -19,23 +19,24 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples that are taken at one instant. If more are due, the importing tool does not stop at
-/// the FMU's time events.
+/// Largest number of gyro samples that are taken at one instant. More of them are due only if the importing tool does not
+/// stop at the time events of the FMU.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
-    /// Returns the continuous states, in the order of [`x`].
+    /// Returns the continuous states, whose indices are in the module [`x`].
     pub fn continuous_states(&self) -> &[f64; STATES] {
         &self.state.x
     }
 
-    /// Sets the continuous states, in the order of [`x`], as the importing tool has integrated them.
+    /// Sets the continuous states, whose indices are in the module [`x`], to the values that the importing tool has
+    /// integrated.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.state.x = *x;
     }
 
-    /// Sets the simulation time that the importing tool states, s, and in Model Exchange the time since the start, s. Times of
-    /// the importing tool that differ by at most `resolution`, s, count as equal.
+    /// Sets the simulation `time` that the importing tool states, s. In Model Exchange, `since_start` is the time since the
+    /// start, s. Times of the importing tool that differ by at most `resolution`, s, count as equal.
     pub fn set_time(&mut self, time: f64, since_start: Option<f64>, resolution: f64) {
         (self.state.time, self.resolution) = (time, resolution);
         if let Some(elapsed) = since_start {
@@ -43,16 +44,17 @@ impl Plant {
         }
     }
 
-    /// Returns the derivatives x' of the continuous states by time.
+    /// Returns the time derivatives of the continuous states.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
         self.coefficients(0, -torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
-    /// Returns the exact derivative of x' if the states change by dx and the inputs [tau_cmd, tau_ext, g_axial] by du. It is
-    /// coefficient 1 of the power series in s of x' at x + dx s and u + du s. The contact (stick or slip) and the state of
-    /// the wheel (blocked, at its torque limit or free) do not change.
+    /// Returns the exact change of the time derivatives of the states if the states change by `dx` and the inputs tau_cmd,
+    /// tau_ext and g_axial by `du`. While the change is computed, the contact (stick or slip) and the state of the wheel
+    /// (blocked, at its torque limit or free) stay as they are. The result is coefficient 1 of a power series in the size of
+    /// the change.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -102,9 +104,9 @@ impl Plant {
         derivatives
     }
 
-    /// Returns the event indicators, in the order of [`indicator`]. They are positive between events and cross zero at events. An
-    /// indicator of an event that cannot happen is 1. No indicator is ever exactly 0, so that the root finder of the importing
-    /// tool sees no crossing right after an event.
+    /// Returns the event indicators, whose indices are in the module [`indicator`]. They are positive between events and
+    /// cross zero at events; the indicator of an event that cannot happen is 1. No indicator is ever exactly 0, so that the
+    /// root finder of the importing tool sees no crossing right after an event.
     pub fn event_indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let just_positive = |z: f64| if z == 0.0 { f64::MIN_POSITIVE } else { z };
         self.indicators(inputs).map(just_positive)
@@ -135,9 +137,9 @@ impl Plant {
         z
     }
 
-    /// Performs all events that are due at the present time: sets the rate of a hub that has stopped to exactly 0,
-    /// determines its new contact, keeps the rotor's speed within its limits, takes the gyro's samples, and updates the
-    /// slosh regime. Returns true if continuous states have changed.
+    /// Handles all events that are due at the present time: sets the rate of a hub that has stopped to exactly 0, determines
+    /// its new contact, keeps the speed of the rotor within its limits, takes the samples of the gyro, and updates the slosh
+    /// regime. Returns true if continuous states have changed.
     ///
     /// # Errors
     /// [`StepError::Model`] or [`StepError::NotFinite`]; the plant is then unchanged.
@@ -186,8 +188,9 @@ impl Plant {
         self.state.record_contact(contact, time);
     }
 
-    /// Returns true if an event is overdue although no indicator changed its sign in the last step of the importing tool: its
-    /// integrator has passed a change of the contact or a speed limit of the rotor, or the wave has reached another regime.
+    /// Returns true if an event is overdue that the importing tool could not see, because no indicator changed its sign
+    /// within its last step. This happens if its integrator has passed a change of the contact or a speed limit of the rotor,
+    /// or if the wave has reached another regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let z = self.indicators(inputs);
         let lasting = [
@@ -201,16 +204,16 @@ impl Plant {
             || self.present_ranges(inputs) != self.state.ranges
     }
 
-    /// Returns the number of contact changes since the start, the time of the last one, s, and the number
-    /// of the present [`Contact`].
+    /// Returns the number of contact changes since the start, the time of the last one, s, and the number of the present
+    /// [`Contact`].
     pub fn last_contact(&self) -> (i32, f64, i32) {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)
     }
 
-    /// Changes the parameters of the bearing's friction law from now on.
+    /// Changes the friction of the bearing from now on to the parameters `p`.
     ///
     /// # Errors
-    /// Lists all problems of the parameters; the plant is unchanged.
+    /// All problems of the parameters; the plant is then unchanged.
     pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
         let problems = Law::problems(p);
         if !problems.is_empty() {
@@ -222,14 +225,14 @@ impl Plant {
         Ok(())
     }
 
-    /// Adds the work that a changing g_axial has done since the last accepted step. In Model Exchange this function must be
-    /// called when the integrator of the importing tool has accepted a step.
+    /// Adds the work that a changing specific force has done since the last accepted step. In Model Exchange this function
+    /// must be called after the integrator of the importing tool has accepted a step.
     ///
-    /// Since the inputs' derivatives are not known here, the work is exact to fourth order in the step if g_axial is linear
-    /// in time, and otherwise to second order.
+    /// The derivatives of the inputs are not known here. The work is therefore exact to fourth order in the step if g_axial
+    /// is linear in time, and otherwise to second order.
     ///
     /// # Errors
-    /// [`StepError::NotFinite`]; the plant is unchanged.
+    /// [`StepError::NotFinite`]; the plant is then unchanged.
     pub fn accept_step(&mut self, inputs: &Inputs) -> Result<(), StepError> {
         let work = self.work_axial(inputs);
         self.evaluate(inputs);
@@ -243,7 +246,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Returns an error if the states that the importing tool has integrated are outside the range of the models.
+    /// Checks that the states that the importing tool has integrated are within the range of the models.
     ///
     /// # Errors
     /// [`StepError::Model`] with the number of the mode and the reason.
@@ -259,7 +262,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Returns the simulation time at which the gyro's next sample is due, s; `None` without a gyro.
+    /// Returns the simulation time at which the next sample of the gyro is due, s; `None` without a gyro.
     pub fn next_time_event(&self) -> Option<f64> {
         self.next_sample().map(|due| self.state.time + due)
     }
@@ -645,8 +648,8 @@ mod tests {
         }
     }
 
-    /// A damaged saved state may contain any number as the work of g_axial. If the work after a step would be too large to
-    /// be saved, the step is refused.
+    /// A damaged saved state may contain any number as the work of g_axial. If the work after a step is too large for a saved
+    /// state, the step must be refused.
     #[test]
     fn a_step_in_which_the_work_of_g_axial_overflows_is_refused() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);
@@ -657,7 +660,7 @@ mod tests {
         assert_eq!(*plant.state(), before);
     }
 
-    /// A hub that slips under −0.03 N·m sticks after the Coulomb friction is raised to 1 N·m between two steps.
+    /// A torque of −0.03 N·m turns the hub. After the Coulomb friction is raised to 1 N·m between two steps, the hub sticks.
     #[test]
     fn friction_can_be_changed_while_running() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Stribeck);
@@ -679,7 +682,8 @@ mod tests {
         assert!(plant.omega() < 0.0);
     }
 
-    /// Runge-Kutta steps of 0.1 ms with the derivatives of the bench end at the state that a Co-Simulation step reaches.
+    /// The test integrates the derivatives of the bench by Runge–Kutta steps of 0.1 ms, and compares the end with the state
+    /// that one Co-Simulation step reaches.
     #[test]
     fn a_model_exchange_host_reproduces_co_simulation_of_the_plant() {
         // Each Runge-Kutta step of 0.1 ms has the error (omega_2 h)^4 = 4e-11, so that the error after 0.2 s is 1e-9.

@@ -3,9 +3,9 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp, number};
 
-/// Motion of the hub as far as liquid and bearing depend on it: the series of theta, w, w^2 and w' (rad, s), the specific
-/// force `g` along the tank's axis, m/s2, with its rate, and the time `damping_reach`, s, over which the series of the
-/// liquid's damping are valid.
+/// The motion of the hub as power series, as far as liquid and bearing depend on it: its angle theta, its rate w with w^2,
+/// and its acceleration w' (rad, s). `g` is the specific force along the tank's axis, m/s2, with its rate. `damping_reach` is
+/// the time, s, over which the series of the liquid's damping are valid.
 #[derive(Clone, Debug)]
 pub struct HubMotion {
     pub theta: Series,
@@ -17,15 +17,15 @@ pub struct HubMotion {
     pub tilt: Tilt,
 }
 
-/// Gravity across the axis of a tilted bench. In the hub's frame, with the tangent t of the tilt angle and the azimuth phi
-/// of the component across the axis,
+/// The component of gravity across the axis of a tilted bench, as a power series in the frame of the hub. With the specific
+/// force g along the axis, the tangent t of the tilt angle, the azimuth phi of the component, and the angle theta and the
+/// rate w of the hub,
 ///
 /// ```text
-/// e = g d, d = t (cos(phi - theta), sin(phi - theta))
+/// e = g d,   d = t (cos(phi - theta), sin(phi - theta)),   d' = w (d_y, -d_x)
 /// ```
 ///
-/// where g is the specific force along the axis. A mass M at the position X has the potential energy -M e.X, and
-/// d' = w (d_y, -d_x).
+/// `direction` is d and `e` is e, m/s2. A mass M at the position X has the potential energy -M e.X.
 #[derive(Clone, Debug)]
 pub struct Tilt {
     pub tangent: f64,
@@ -37,8 +37,8 @@ pub struct Tilt {
 impl Tilt {
     const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
 
-    /// Sets coefficient n of d and e, which describe gravity in the frame of the hub on a tilted bench, from the
-    /// coefficients of the hub's angle theta up to order n.
+    /// Computes coefficient n of both series from the hub's angle `theta`, which must be known up to order n, and from the
+    /// specific force `g` with its rate.
     pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
         if self.tangent == 0.0 {
             return;
@@ -60,7 +60,8 @@ impl Tilt {
         }
     }
 
-    /// Returns coefficient n of the height (m) of a position X that is given in the hub's frame: -d.X.
+    /// Returns coefficient n of the height, m, of a point of the hub above the plane through the origin. `x` returns
+    /// coefficients of the position of the point in the hub's frame, m.
     pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
         if self.tangent == 0.0 {
             return 0.0;
@@ -77,8 +78,8 @@ impl Tilt {
         [number(&self.e[0]), number(&self.e[1])]
     }
 
-    /// Returns the height -d.X (m) of a position X, and its rate (m/s). X has the rate X' in the frame of a hub that
-    /// turns at the rate `w`.
+    /// Returns the height, m, of a point above the plane through the origin, and the rate of this height, m/s. The point has
+    /// the position (`x`, `y`), m, and the rate (`x_d`, `y_d`), m/s, in the frame of a hub that turns at the rate `w`, rad/s.
     pub fn height_now<T: Number>(&self, [x, y]: [T; 2], [x_d, y_d]: [T; 2], w: T) -> [T; 2] {
         let [d_x, d_y]: [T; 2] = [number(&self.direction[0]), number(&self.direction[1])];
         [-(x * d_x + y * d_y), -(x_d * d_x + y_d * d_y + w * (x * d_y - y * d_x))]

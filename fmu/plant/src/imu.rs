@@ -13,18 +13,19 @@
 
 use crate::parameters::Imu;
 
-/// Fraction of a sampling period by which the gyro may take a sample early, in addition to the resolution of the simulation time.
+/// Fraction of a sampling period by which a sample may be taken early, because communication points match sampling times only
+/// up to rounding.
 const SLACK: f64 = 1e-6;
 
 pub(crate) const FLICKERS: usize = 8;
 const RATIO: f64 = 6.0;
-/// Shortest correlation time of the flicker noise, s. At 0.1 s the white noise of a gyro is far larger
-/// than the flicker noise.
+/// Shortest correlation time of the processes that make up the flicker noise, s. Shorter times are not needed, because at 0.1
+/// s the white noise of a gyro is far larger than its flicker noise.
 const SHORTEST: f64 = 0.1;
 
-/// State of the gyro: the number `next` of its next sample (sample k is taken k/rate seconds after the start), the reading
-/// `held` until then, and for the next sample the bias, the rate random walk and the processes of the flicker noise. All
-/// values are in rad/s.
+/// State of the gyro. `next` is the number of the next sample; sample k is taken k/rate seconds after the start. `held` is
+/// the reading until then. The bias, the rate random walk `walk` and the processes of the `flicker` noise are those of the
+/// next sample. All values are in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
     pub next: u64,
@@ -45,9 +46,9 @@ impl Imu {
         gyro
     }
 
-    /// Takes all gyro samples that fall due within `length`, s. `since_start` is the time at the beginning, s since the
-    /// start of the simulation, and `omega` is the hub's rate as a function of the time since then. Stops after one sample
-    /// more than `allowed`, so that the caller can refuse the step. Returns the number of samples.
+    /// Takes all samples of the gyro that are due within the next `length` seconds, and returns their number. `since_start`
+    /// is the time at the beginning, s since the start of the simulation; `omega` returns the hub's rate at a time after this
+    /// beginning. The function stops after one sample more than `allowed`, so that the caller can refuse the step.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
@@ -66,14 +67,16 @@ impl Imu {
         allowed + 1
     }
 
-    /// Returns the time, s, from `since_start` (s after the start) until sample k; it is negative if the sample is overdue.
+    /// Returns the time, s, that is left until sample `k` is due, at the time `since_start` (s since the start). It is
+    /// negative if the sample is overdue.
     #[inline(always)]
     pub(crate) fn due(&self, k: u64, since_start: f64) -> f64 {
         k as f64 / self.rate - since_start
     }
 
-    /// Returns true if a sample that is due in `due` seconds can be taken now. Communication points and time events match
-    /// sampling times only up to rounding and to the `resolution` of the simulation time.
+    /// Returns true if a sample that is due in `due` seconds can be taken now. A small difference is allowed, because
+    /// communication points and time events match sampling times only up to rounding and up to the `resolution` of the
+    /// simulation time, s.
     #[inline(always)]
     pub(crate) fn is_due(&self, due: f64, resolution: f64) -> bool {
         due <= SLACK / self.rate + resolution
@@ -101,8 +104,8 @@ impl Imu {
         gyro.next += 1;
     }
 
-    /// Advances all processes of the flicker noise by sample number `k`. `keep` returns, for the correlation time of a
-    /// process, s, the fraction of the process that remains after one sample.
+    /// Advances the processes of the flicker noise by one sample, the sample number `k`. For the correlation time of a
+    /// process, s, `keep` returns the fraction of the process that remains after one sample.
     fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;
@@ -117,8 +120,9 @@ impl Imu {
     }
 }
 
-/// Returns two independent standard normal numbers for the seed and the sample number k: the Box-Muller transform of two
-/// uniform numbers from the SplitMix64 mixer.
+/// Returns two independent standard normal random numbers for the sample number `k`. They depend only on the seed and on k,
+/// so that they are the same for every sequence of steps. The method is the Box–Muller transform of two uniform numbers from
+/// the SplitMix64 mixer.
 fn normals(seed: i32, k: u64) -> (f64, f64) {
     normal_pair(seed, 0, k)
 }
@@ -134,7 +138,7 @@ fn normal_pair(seed: i32, stream: u64, k: u64) -> (f64, f64) {
     (radius * cos, radius * sin)
 }
 
-/// Returns the next number of the SplitMix64 generator from its state `x` (Steele, Lea, Flood 2014).
+/// Returns the next number of the generator SplitMix64 after the state `x` (Steele, Lea and Flood 2014).
 fn mix(x: u64) -> u64 {
     let mut z = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -195,7 +199,8 @@ mod tests {
         Imu { rate, arw: 0.0, bias_instability: 0.0, lsb: 0.0, ..Imu::default() }
     }
 
-    /// Returns the Allan variance of readings at rest for averages of m samples, as the mean over `seeds` seeds.
+    /// Returns the Allan variance of the readings of a gyro at rest, for averages of `m` samples, as the mean over `seeds`
+    /// seeds.
     fn allan_variance(imu: Imu, seeds: i32, m: usize) -> f64 {
         let mut sum = 0.0;
         for seed in 0..seeds {
@@ -274,8 +279,8 @@ mod tests {
         }
     }
 
-    /// At rest the reading is the sum of rate, bias and a multiple of the first of the two normal numbers that belong to the
-    /// seed and sample k. The second number drives the bias.
+    /// At rest a reading consists of the rate, the bias and the noise. The noise is a multiple of the first of the two random
+    /// numbers that belong to the seed and the sample; the second number drives the bias.
     #[test]
     fn a_gyro_reading_is_the_sum_of_rate_bias_and_the_noise_of_its_seed() {
         let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };

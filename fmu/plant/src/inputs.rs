@@ -1,8 +1,8 @@
-/// A quantity that is linear in time: `value + slope t`.
+/// A quantity that is linear in time: `value` + `slope` t.
 pub type Ramp = taylor::ramp::Ramp;
 
-/// Inputs of the plant over one step. `tau_cmd` is the torque command to the actuator and `tau_ext` the external torque on
-/// the hub, both N m; `g_axial` is the specific force along the tank's axis, m/s2, and must not be negative.
+/// Inputs of the plant during one step: the torque command `tau_cmd` to the actuator, N m; the external torque `tau_ext` on
+/// the hub, N m; and the specific force `g_axial` along the tank's axis, m/s2, which must not be negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Inputs {

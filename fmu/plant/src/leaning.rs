@@ -47,8 +47,8 @@ pub(crate) struct Leaning {
     tangential: f64,
 }
 
-/// A slosh mode on a tilted bench: mass and length of its pendulum in the plant, and the length l/f of an upright pendulum
-/// with the same frequency.
+/// A slosh mode on a tilted bench: `mass` and `length` of the oblique pendulum that the plant uses, and the length `upright`
+/// of an upright pendulum with the same frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mode {
     pub mass: f64,
@@ -57,7 +57,8 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Returns the tilt of the bench at the start of the motion; `None` for an upright bench and if a table gives the modes.
+    /// Returns the tilt of the bench in the hub's frame at the start of the motion; `None` for an upright bench, or if a
+    /// table gives the modes.
     pub fn from_parameters(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
@@ -66,15 +67,16 @@ impl Leaning {
         })
     }
 
-    /// Returns the factors f by which the tilt changes the squared frequency of mode `n`, which
-    /// counts from 0, along the tangent and across it.
+    /// Returns the factors by which the tilt changes the squared frequency of mode `n` in the tangential and in the radial
+    /// direction. The first mode has the number 0; `fill` is h/R.
     fn factors(self, n: usize, fill: f64) -> [f64; 2] {
         let [along, across] = factors(n, fill, self.slope);
         let mixed = |part: f64| along * part + across * (1.0 - part);
         [mixed(self.tangential), mixed(1.0 - self.tangential)]
     }
 
-    /// Returns mode `n`, which counts from 0, of the tilted tank. `upright` is the pendulum of this mode in an upright tank.
+    /// Returns mode `n` of the tilted tank, where the first mode has the number 0. `upright` is the pendulum of this mode in
+    /// an upright tank.
     pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
         let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
         let oblique = self.oblique(n, p);
@@ -82,8 +84,8 @@ impl Leaning {
         Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
     }
 
-    /// Returns the frequency of mode 1's pendulum in the radial direction divided by the liquid's
-    /// frequency in that direction.
+    /// Returns the ratio of two frequencies of mode 1 in the radial direction: the frequency of its pendulum divided by the
+    /// frequency of the liquid. In the tangential direction both are equal.
     fn radial_frequency(self, p: &Parameters) -> f64 {
         let fill = 2.0 * p.tank.h / p.tank.d;
         let [tangential, radial] = self.factors(0, fill);
@@ -119,8 +121,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Relative error of a mode's frequency in the radial direction above which a warning is issued. The error arises because some
-/// slosh models have one pendulum for both directions.
+/// Relative error of a mode's radial frequency above which a warning is issued. The error arises because some slosh models
+/// have one pendulum for both directions.
 const APART: f64 = 0.01;
 
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {

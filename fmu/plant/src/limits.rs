@@ -20,8 +20,8 @@ use crate::parameters::{MODES, Parameters, SloshSource};
 use crate::slosh::Angles;
 use crate::tank::Calculated;
 
-/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion with a larger swirl
-/// number counts as rotary.
+/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. A motion with a larger swirl number
+/// counts as rotary.
 const ROTARY: f64 = 0.8;
 const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 
@@ -29,11 +29,10 @@ const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 pub(crate) struct Limits {
     mode: [ModeLimits; MODES],
     spin: SpinLimit,
-    /// Bond number of the tank divided by g, s2/m; 0 if surface tension does not limit the range of the modes.
+    /// Bond number of the tank per specific force, s2/m; 0 if surface tension does not limit the range of the modes.
     bond_per_g: f64,
 }
 
-/// Largest slosh angles of a mode within its range, rad; 0 if they are not known.
 #[derive(Clone, Copy, Debug, Default)]
 struct ModeLimits {
     angle: f64,
@@ -81,8 +80,9 @@ impl Limits {
         }
     }
 
-    /// Returns the reason why the modes do not represent the liquid, if any. `omega` is the hub's rate, rad/s. `modes`
-    /// yields the slosh angles, the squared frequency, 1/s2, and the pendulum length, m, of each mode.
+    /// Returns the first reason why the modes do not represent the liquid at present, or [`LimitedBy::None`]. `modes` yields
+    /// the slosh angles, the squared natural frequency, 1/s2, and the pendulum length, m, of each mode; `omega` is the rate
+    /// of the hub, rad/s.
     pub fn reason(&self, modes: impl Iterator<Item = (Angles, f64, f64)>, omega: f64) -> LimitedBy {
         let mut reason = LimitedBy::None;
         for (n, (angles, omega2, l)) in modes.enumerate() {

@@ -30,10 +30,10 @@ pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
-/// Position of the current stretch of motion within its step, which decides whether an event stops the step. A stretch is a part
-/// of a step over which torque and specific force are linear in time. `offset` is the time from the start of the step to the
-/// start of the stretch, s. An event stops the step only if it is later than `passed` seconds after the start of the step;
-/// `passed` is infinite if no event stops the step.
+/// Decides at which event a step stops. A step consists of stretches over which torque and specific force are linear in time;
+/// `offset` is the time from the start of the step to the start of the present stretch, s. The step stops only at events that
+/// are later than `passed` seconds after its start, so that a step can continue after an event. `passed` is infinite if the
+/// step does not stop at events.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
     pub offset: f64,
@@ -46,9 +46,10 @@ impl Stop {
         self.offset + t > self.passed
     }
 
-    /// Returns the time in the stretch of the first gyro sample at which the step stops. Only samples within `h` seconds after
-    /// the time `t` are considered. The stretch begins `since_start` seconds after the gyro's start, and `next` is the number of
-    /// the next sample. Returns `None` if none of the next `allowed` samples stops the step.
+    /// Returns the time of the first gyro sample at which the step stops, s after the start of the stretch; `None` if there
+    /// is no such sample. Only the next `allowed` samples that are due until `h` count. `t` is the time in the stretch at
+    /// which the series begins, and `h` its length, s. The series begins `since_start` seconds after the start of the
+    /// simulation, and `next` is the number of the next sample.
     // Arguments are passed by value, because a reference would force all data of a stretch into memory.
     #[cold]
     fn at_sample(
@@ -63,25 +64,26 @@ impl Stop {
     }
 }
 
-/// The hub's equation J w' = tau + tau_f + T with the power series of its terms, where J = I0 + sum of J_i and T = sum of
-/// T_i over the modes. `i0` is the inertia of hub and rigid liquid, kg m2. `imbalance` contains the static moments of the
-/// dry hub, radial and tangential, and of the rigid liquid, kg m. `tau` is the torque of wheel and environment over the
-/// step, and `net` is tau + T, which the bearing must hold at rest, N m. `power` contains the power of the external torques
-/// and the power dissipated in bearing, suspension line and liquid, W.
+/// The hub's equation J w' = tau + tau_f + T as power series in time, where J is the inertia of hub and liquid, w the rate of
+/// the hub, tau the torque of wheel and environment, tau_f the friction of the bearing, and T the torque of the liquid.
+/// - `i0`: inertia of hub and rigid liquid, kg m2.
+/// - `imbalance`: static moment of the dry hub, radial and tangential, kg m; `rigid_moment` is that of the rigid liquid.
+/// - `tau`: tau and its slope, N m; `net`: tau + T, which the bearing must hold at rest.
+/// - `power`: power of the external torques, W; `dissipation`: power dissipated in bearing, suspension line and liquid, W.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     pub i0: f64,
     pub law: Law,
     pub suspension: Suspension,
     pub damping: Damping,
-    /// True if drag or weight of a slosh mass changes along an expansion although g is constant: if the drag depends on the
-    /// amplitude, the bench is tilted, or a mode has another direction than the tangent.
+    /// True if drag or weight of a slosh mass changes during an internal step although g is constant: if the drag depends on
+    /// the amplitude, the bench is tilted, or a mode moves along another direction than the tangent.
     pub varies: bool,
     with_amplitude: bool,
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// The specific force g, m/s2, and its rate for which the series of the modes' drag and weight were computed last. NaN if
-    /// they were not computed, or if they are valid only for one instant.
+    /// Specific force g, m/s2, and its rate for which the series of drag and weight were last computed. NaN if they were not
+    /// computed, or if they are valid only for one instant.
     g: [f64; 2],
     near_weightless: f64,
     tolerance: f64,
@@ -165,7 +167,7 @@ impl Motion {
         x * e_y[n] - y * e_x[n]
     }
 
-    /// Returns the gravity torques on the dry hub and on the rigid liquid of a tilted bench, N m.
+    /// Returns the torques of gravity on the dry hub and on the rigid liquid of a tilted bench, N m.
     pub fn gravity_torques<T: Number>(&self) -> [T; 2] {
         let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
         [e_y * x - e_x * y, e_y * self.rigid_moment]
@@ -176,8 +178,8 @@ impl Motion {
         -(e_x * (x + self.rigid_moment) + e_y * y)
     }
 
-    /// Returns the sum of mass times height above the rest position of hub and liquid (kg m), and the rate of this sum. The
-    /// sum times g is the potential energy.
+    /// Returns the sum of mass times height over hub and liquid, kg m, and the rate of this sum. Heights are measured from
+    /// the rest position; the potential energy is g times the sum.
     pub fn height<T: Number, M: SloshMode>(&self, modes: &[M]) -> [T; 2] {
         let ([x, y], still) = (self.imbalance, [T::constant(0.0); 2]);
         let moment = [x + self.rigid_moment, y].map(T::constant);
@@ -195,8 +197,9 @@ impl Motion {
             + self.hub.tilt.height(n, moment)
     }
 
-    /// Computes coefficient n of every quantity from the coefficients of the state up to n, and coefficient n + 1 of the state.
-    /// `ramp` is true if specific force, drag or weight changes in time, and `hangs` if the hub hangs from a suspension line.
+    /// Computes coefficient n of every quantity, and coefficient n + 1 of the state, from the coefficients of the state up to
+    /// n. `ramp` is true if specific force, drag or weight changes in time, and `hangs` if the hub hangs from a suspension
+    /// line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,
@@ -258,7 +261,7 @@ impl Motion {
         self.derivatives(0, (true, self.suspension.exists), modes, contact);
     }
 
-    /// Returns the contact of hub and bearing: from the hub's rate if it turns, and at rest from
+    /// Determines the contact between hub and bearing: from the direction of the hub's rate, or, if the hub is at rest, from
     /// the torque that the bearing would have to hold.
     pub fn contact<M: SloshMode>(&mut self, modes: &mut [M], state: &State) -> Contact {
         let omega = state.x[x::OMEGA];
@@ -282,8 +285,8 @@ impl Motion {
         Steps::new(self.max_steps, ADVICE)
     }
 
-    /// Returns the time within `h`, s, at which the hub comes to rest, from the series of its rate up to order n; `None` if
-    /// it does not come to rest.
+    /// Returns the time at which the hub comes to rest, s, from the series of its rate up to order n; `None` if it does not
+    /// come to rest within `h` seconds.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
         let omega = &self.hub.omega;
         let change = omega[1..=n].iter().rev().fold(0.0, |sum, x| (sum + x.abs()) * h);
@@ -299,8 +302,8 @@ impl Motion {
         first_root(&rate[behind..=n], h)
     }
 
-    /// Returns the time within `h`, s, at which the torque on a stuck hub exceeds the static friction of the bearing, and
-    /// the direction of the following motion; `None` if the hub stays stuck.
+    /// Returns the time at which the torque on a stuck hub exceeds the static friction of the bearing, s, and the direction
+    /// of the motion that follows; `None` if the hub stays stuck for `h` seconds.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.law.holding_torques(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
@@ -318,9 +321,9 @@ impl Motion {
         }
     }
 
-    /// Advances the state by `h`, s, during which torque and specific force follow their ramps. The gyro takes the samples
-    /// that fall due; each counts as an internal step. If the step stops at an event, returns the elapsed time. If an error
-    /// is returned, the state is invalid.
+    /// Advances the state by `h` seconds, during which torque and specific force (`acting`) follow their ramps. The gyro
+    /// takes the samples that are due, and each sample counts as one of the internal `steps`. If the step stops at an event
+    /// (`stop`), the elapsed time is returned. If an error is returned, the state is invalid.
     pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
@@ -340,13 +343,13 @@ impl Motion {
         }
     }
 
-    /// Returns true if drag and weight depend on nothing but g, and there is no suspension line.
+    /// Returns true if drag and weight of the liquid depend only on g, and there is no suspension line.
     fn is_plain(&self) -> bool {
         !self.varies && !self.suspension.exists
     }
 
-    /// Advances the motion as [`Motion::advance`] does, for one slosh model. `UNROLLED` is allowed only for a constant
-    /// specific force and plain motion ([`Motion::is_plain`]).
+    /// Advances the motion as [`Motion::advance`] does, for one slosh model. `UNROLLED` selects faster code for one mode,
+    /// which is allowed only if the specific force is constant and [`Motion::is_plain`] is true.
     #[inline(always)]
     fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,
@@ -390,8 +393,8 @@ impl Motion {
         Ok(flow)
     }
 
-    /// Returns the integral of the liquid's mass times height over the time `length` (s), kg m s, from the series up to
-    /// order n. If g is linear in time, the work of its change is the slope of g times this integral.
+    /// Returns the integral of the liquid's mass times height over `length` seconds, kg m s, from the series up to order n.
+    /// If the specific force is linear in time, its change does the work slope times this integral.
     #[cold]
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;
@@ -403,9 +406,9 @@ impl Motion {
     }
 }
 
-/// One stretch of a step, during which torque and specific force (`acting`) are linear in time. The stretch and its first
-/// expansion start at `begin`, s. `event` is the new contact after an event at the end of the expansion. `allowed` are the
-/// allowed errors of the rates of hub and liquid, rad/s, and of the friction law's own state.
+/// A part of a step during which torque and specific force (`acting`) are linear in time. `begin` is the simulation time at
+/// its start, s, and `t` the time since then. `event` is the new contact if the present series ends with an event. `allowed`
+/// are the allowed errors of the rates of hub and liquid, rad/s, and of the state of the friction law.
 struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     motion: &'a mut Motion,
     modes: &'a mut [M],
@@ -587,7 +590,8 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 }
 
-/// Returns the larger of two magnitudes. A NaN may be lost; other checks end a step whose states are NaN.
+/// Returns the larger of two magnitudes. If one of them is NaN, the result may be the other one, because other checks end a
+/// step with NaN.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }

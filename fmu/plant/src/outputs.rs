@@ -11,10 +11,10 @@ use crate::plant::Plant;
 use crate::slosh::{Angles, SloshMode, with_modes};
 use crate::state::{Ranges, STATES, x};
 
-/// The plant's outputs at one instant, or their directional derivatives. The fields have the names, units and signs of the
-/// FMU's outputs, which the FMU's variable table describes. `wave` is the radial and the tangential component of the wave at
-/// the wall, m. `baffle_wave` is the amplitude at the wall of the first mode's oscillation, m, and 0 without a baffle. The
-/// energy balance is energy - energy(0) = work + work_axial - heat.
+/// The outputs of the plant at one instant, or their directional derivatives. They have the names, units and signs of the
+/// outputs of the FMU HubSlosh, which `fmu/hubslosh/src/table.rs` describes. `wave` is the radial and the tangential
+/// component of the wave at the wall, m; `baffle_wave` is the amplitude of the first mode's wave at the wall, m, and 0
+/// without a baffle. The energy balance is energy - (energy at the start) = work + work_axial - heat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Outputs {
@@ -48,9 +48,9 @@ pub struct Outputs {
     pub discrete: Discrete,
 }
 
-/// The outputs that are constant between events: contact, ranges and their reasons. The FMU's variable table describes them.
-/// `friction_mode` is the number of the [`Contact`] under set-valued friction, and 1 under the other friction laws.
-/// `event_time`, s, is 0 in a derivative.
+/// The outputs that are constant between events: contact, ranges of validity and their reasons. `friction_mode` is the number
+/// of the [`Contact`] if the hub can stick, and 1 under all other friction laws. `event_time`, s, is 0 in a directional
+/// derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Discrete {
@@ -63,13 +63,14 @@ pub struct Discrete {
     pub event_time: f64,
 }
 
-/// Returns +0 for +0 and -0, and any other value unchanged, because the outputs of a plant at rest should have no sign.
+/// Returns 0 without a sign for -0, and any other value unchanged, because the outputs of a plant at rest should have no
+/// sign.
 pub(crate) fn unsigned_zero(x: f64) -> f64 {
     x + 0.0
 }
 
 impl Plant {
-    /// Returns the outputs for the present values of the inputs.
+    /// Returns the outputs at the present time, for the present values of the inputs.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.apply_present_contact(inputs);
         let mut outputs = self.outputs_held(inputs);
@@ -78,16 +79,16 @@ impl Plant {
         outputs
     }
 
-    /// Returns the outputs as [`Plant::outputs`] does, but with contact and slosh regime as they were at the last event, for
-    /// importing tools that handle events.
+    /// Returns the outputs as [`Plant::outputs`] does, but with contact and slosh regime as they were at the last event.
+    /// Importing tools that handle events themselves need this.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);
         self.present(&self.state.x, inputs.tau_cmd, work_axial)
     }
 
-    /// Returns the outputs, or their directional derivatives. `x` contains the states or their change. The equations must
-    /// have been evaluated before, for the same `x` and `tau_cmd`.
+    /// Computes the outputs, or their directional derivatives. `x` contains the states, or their change. The equations must
+    /// have been evaluated before, for the same states and the same torque command.
     fn present<T: Number>(&self, x: &[f64; STATES], tau_cmd: Ramp, work_axial: T) -> Outputs {
         let (state, motion) = (&self.state, &self.motion);
         let hub = &motion.hub;
@@ -174,16 +175,16 @@ impl Plant {
         }
     }
 
-    /// Returns the viscous damping ratio of mode `n` at the present g_axial, and the rate (1/s) at which it changes
-    /// with the slope of g_axial. Both are 0 for unused modes and at g_axial = 0.
+    /// Returns the viscous damping ratio of mode `n` at the present specific force, and the rate, 1/s, at which it changes
+    /// with the slope of the specific force. Both are 0 for unused modes and without specific force.
     pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
         let (damping, g) = (&self.motion.damping, inputs.g_axial);
         [damping.ratio(n, g.value), damping.slope_of_ratio(n, g.value) * g.slope]
     }
 
-    /// Returns the exact derivative of the outputs for a change of the states by dx and of the inputs by du.
-    /// Discrete outputs keep their values, and the states of contact and wheel do not change. The amplitude of a
-    /// wave has no derivative at 0.
+    /// Returns the exact change of the outputs for a change of the states by `dx` and of the inputs tau_cmd, tau_ext and
+    /// g_axial by `du`. Discrete outputs keep their values, and the states of contact and wheel do not change. The amplitude
+    /// of a wave has no derivative at 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
@@ -197,8 +198,8 @@ impl Plant {
         self.present::<Dual>(dx, tau_cmd, work_axial)
     }
 
-    /// Updates the outputs that state in which range of validity the plant is (regime, baffle, limiting reason), from the
-    /// other values in `outputs`.
+    /// Sets the outputs that describe the range of validity (regime, baffle, limiting reason), which follow from the other
+    /// values in `outputs`.
     pub fn update_ranges(&self, outputs: &mut Outputs) {
         let Ranges { regime, baffle, limited_by } = self.evaluate_ranges(outputs);
         outputs.discrete.regime = regime;

@@ -5,10 +5,12 @@ use crate::parameters::{Parameters, SloshSource};
 use crate::slosh_model::SloshModel;
 
 impl Parameters {
-    /// Returns the reason why the value of a parameter has no effect although its part of the model is in use. Returns
-    /// `None` if it has an effect, or if its part of the model is switched off. `name` is the parameter's name in the FMU. A
-    /// Boolean has an integer twin, by which a host can set it as well and whose name ends in `_kind`; the values of integer
-    /// twins must have been applied before.
+    /// Returns the reason why the value of a parameter has no effect although its part of the model is in use, for example
+    /// "slosh.zeta_from_correlation = true". `name` is the name of the parameter in the FMU. The result is `None` if the
+    /// parameter has an effect, or if its part of the model is switched off.
+    ///
+    /// A Boolean has an integer twin, whose name ends in `_kind` and by which a host can set the Boolean as well. The values
+    /// of these twins must have been applied before.
     pub fn overridden(&self, name: &str) -> Option<String> {
         let slosh = &self.slosh;
         if slosh.model == SloshModel::Frozen {

@@ -64,12 +64,12 @@ impl SloshSource {
     pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
 }
 
-/// The largest number of slosh modes.
+/// Largest number of slosh modes.
 pub const MODES: usize = 10;
 
-/// Dependence of a mode's drag coefficient c on its natural frequency omega_n. `Laminar`, c ~ omega_n^(1/2), is the damping
-/// of a laminar layer at the wall, for tanks without baffles. `ConstantRatio`, c ~ omega_n, keeps the damping ratio
-/// constant, for a measured or specified ratio. `BySource` is `Laminar` if the damping ratio comes from the correlation, and
+/// How the drag coefficient of a mode changes with its natural frequency. `Laminar`: with the square root of the frequency,
+/// as in the laminar layer at the wall of a tank without baffles. `ConstantRatio`: in proportion to the frequency, so that
+/// the damping ratio stays the same. `BySource`: `Laminar` if the damping ratio comes from the correlation, and
 /// `ConstantRatio` if it is a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -86,7 +86,7 @@ impl DampingLaw {
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::BySource];
 }
 
-/// Choice and parameters of the slosh model; `modes` is 1 to [`MODES`].
+/// The slosh model and its parameters. `modes` is the number of modes, 1 to [`MODES`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Slosh {
@@ -103,11 +103,11 @@ pub struct Slosh {
     pub breaking_steepness: f64,
 }
 
-/// Modes of a tank of any shape; a value of 0 means that it is not given. `nonlinear_inertia` and `nonlinear_stiffness` are
-/// the coefficients s and kappa of the third order in the amplitude, which are 1 and 1 for a pendulum. `angle_limit` and
-/// `swirl_limit` are the slosh angles, rad, above which a mode, or its rotary motion, is out of range. `direction` is the
-/// angle, rad, from the tangent to the direction in which a mode moves its mass, positive outwards. `one_axis` is true if
-/// the tank also has modes along a second axis, which the table does not contain.
+/// Slosh modes of a tank of any shape. A value of 0 means that the value is not given.
+/// - `nonlinear_inertia`, `nonlinear_stiffness`: large-wave coefficients s and kappa, which are 1 for a pendulum.
+/// - `angle_limit`, `swirl_limit`: slosh angles, rad, above which a mode, or its rotary motion, is out of range.
+/// - `direction`: angle, rad, from the tangent to the direction in which a mode moves its mass, positive outwards.
+/// - `one_axis`: true if the tank also has modes along a second axis, which the table does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct ModeTable {
@@ -135,8 +135,8 @@ impl ModeTable {
         [sin, cos]
     }
 
-    /// Returns the pendulum length l of mode `n`, m. It is the given length or, if the frequency f is given, it follows
-    /// from f, the specific force g_ref and the centring stiffness k by (2 pi f)^2 = g_ref/l + k/m.
+    /// Returns the pendulum length l of mode `n`, m. If the frequency f is given instead of the length, l follows from (2 pi
+    /// f)^2 = g_ref/l + k/m with the specific force g_ref, the centring stiffness k and the slosh mass m.
     pub(crate) fn pendulum_length(&self, n: usize) -> f64 {
         if self.length[n] > 0.0 {
             return self.length[n];
@@ -146,7 +146,7 @@ impl ModeTable {
     }
 }
 
-/// A flat ring baffle at the tank's wall, `depth` below the surface. A width of 0 means that there is no baffle.
+/// A flat ring baffle at the wall of the tank, `depth` m below the surface. A `width` of 0 m means that there is no baffle.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Ring {
@@ -154,8 +154,8 @@ pub struct Ring {
     pub depth: f64,
 }
 
-/// Attitude of the bench: its axis is tilted by `tilt`, and the component of gravity across the
-/// axis points to `tilt_azimuth`.
+/// Attitude of the bench: the angle `tilt` between its axis and gravity, rad, and the azimuth `tilt_azimuth` of gravity's
+/// component across the axis, rad.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Bench {
@@ -163,9 +163,9 @@ pub struct Bench {
     pub tilt_azimuth: f64,
 }
 
-/// Friction laws of the bearing: viscous friction b omega; a Stribeck curve, in which sgn(omega) is either smoothed to
-/// tanh(omega/eps) or set-valued so that the hub can stick; and LuGre, with bristles that deflect before they slide. The files of
-/// the laws describe when to choose which law.
+/// Friction laws of the bearing: none; viscous friction; Stribeck's curve, in which the sign of the rate is either smoothed
+/// or set-valued so that the hub can stick; and LuGre, with bristles that deflect before they slide. The file of each law
+/// describes when to choose it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -188,8 +188,8 @@ impl FrictionModel {
     ];
 }
 
-/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of cos theta, sin theta, cos 2
-/// theta and sin 2 theta for each direction of rotation.
+/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are, for each direction of rotation, the
+/// coefficients of cos theta, sin theta, cos 2 theta and sin 2 theta in the directional factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Friction {
@@ -206,7 +206,7 @@ pub struct Friction {
     pub harmonics_backward: [f64; 4],
 }
 
-/// Initial conditions. The slosh angles and rates belong to mode 1; all further modes start at rest.
+/// Initial conditions. The slosh angles and rates belong to mode 1; all other modes start at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Init {
@@ -243,7 +243,7 @@ pub struct Imu {
     pub seed: i32,
 }
 
-/// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one call may take.
+/// Limits of the integrator. `max_steps` is the largest number of internal steps and gyro samples in one call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Solver {
@@ -365,8 +365,8 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// With this limit the computation of a communication step with one mode takes less than a second, and with ten spherical
-    /// modes about six seconds.
+    /// Returns a limit with which the computation of a communication step takes less than a second with one mode, and about
+    /// six seconds with ten spherical modes.
     fn default() -> Self {
         Solver { max_steps: 200_000 }
     }

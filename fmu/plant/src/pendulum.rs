@@ -8,25 +8,24 @@ use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 use crate::parameters::Init;
 
-/// Largest angle, rad, between the initial displacement of mode 1 and the mode's direction of motion that counts as a rounding
-/// error of decimal parameters.
+/// Largest angle, rad, between the initial displacement of mode 1 and its direction of motion that counts as a rounding error
+/// of decimal parameters.
 const ALONG: f64 = 1e-6;
 
 /// Largest step as a fraction of the time to the nearest singularity of the drag's power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// One slosh mode as a pendulum with its hinge on the tank's axis.
-///
-/// - `m`, `l`: slosh mass, kg, and length of the pendulum, m, with `inv_l` = 1/l.
-/// - `c`: viscous coefficient of the slosh mass relative to the tank, N s/m, with `c_m` = c/m; `c_0` is its value at
-///   the reference g, and `course` is c divided by its value at the start of the expansion.
+/// One slosh mode as a pendulum whose hinge is on the tank's axis.
+/// - `m`, `l`: slosh mass, kg, and length of the pendulum, m; `inv_l` is 1/l.
+/// - `c`: drag coefficient of the slosh mass relative to the tank, N s/m; `c_m` is c/m; `c_0` is the viscous coefficient at
+///   the reference specific force; `course` is the drag divided by its value at the start of a power series.
 /// - `r`: distance of the hinge from the bearing axis, m.
-/// - `along`: unit vector (n_x, n_t), radial and tangential, of the motion in models that move along one
-///   direction, with `r_x` = r n_x, `r_t` = r n_t and `r_l` = r_t/l; (0, 1) is the tangent.
-/// - `wave`: elevation of the wave at the wall per slosh angle, m/rad, 2 R/(xi_n^2 - 1) in a cylinder.
-/// - `spring`, `s`, `l_s`, `l2_s`: coefficient h of the quartic spring, 1/m2, and coefficient s of the inertia
-///   that grows with the amplitude, with l/s and l^2/s; only `third_order.rs` uses them.
-/// - `g`, `omega_n`: restoring specific force g + a_n, m/s2, with its rate, and sqrt((g + a_n)/l), rad/s.
+/// - `along`: radial and tangential component of the unit vector along which a mode moves in models with one direction;
+///   `r_x`, `r_t` are r times these components, and `r_l` is r_t/l.
+/// - `wave`: elevation of the wave at the wall per slosh angle, m/rad.
+/// - `spring`, `s`, `l_s`, `l2_s`: coefficient of the quartic spring, 1/m2, coefficient s of the inertia that grows with the
+///   amplitude, l/s and l^2/s; only `third_order.rs` uses them.
+/// - `g`: specific force plus the equivalent of surface tension, m/s2, with its rate; `omega_n`: natural frequency, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
     pub m: f64,
@@ -86,8 +85,8 @@ impl Pendulum {
         self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
     }
 
-    /// Sets the viscous drag coefficient of the slosh mass to `factor` times its value at the reference g. `course` is the
-    /// series of the coefficient, divided by its value at the start of the expansion.
+    /// Sets the viscous drag coefficient of the slosh mass to `factor` times its value at the reference specific force.
+    /// `course` is the series of the coefficient, divided by its value at the start.
     pub fn set_damping(&mut self, factor: f64, course: Series) {
         self.c = factor * self.c_0;
         self.c_m = self.c / self.m;
@@ -99,8 +98,8 @@ impl Pendulum {
         self.baffle.zeta > 0.0 || self.growth.acts
     }
 
-    /// Adds the drag of the baffle and the drag that grows with the amplitude to the viscous drag. `at` are |q|^2 and
-    /// |q'|^2, the squares of slosh angle and rate.
+    /// Adds the drag of the baffle, and the drag that grows with the amplitude, to the viscous drag. `at` contains the
+    /// squares of the slosh angle and of its rate.
     pub fn add_amplitude_drag(&mut self, at: [f64; 2]) {
         let w = self.g.map(|g| g * self.inv_l);
         if self.baffle.zeta > 0.0 {
@@ -113,16 +112,16 @@ impl Pendulum {
         self.course[0] = 1.0;
     }
 
-    /// Sets coefficient n of the drag, which changes in time, from coefficient n of the squared slosh angle |q|^2 and
-    /// of its squared rate |q'|^2.
+    /// Computes coefficient n of the drag, which depends on the amplitude. `at` contains coefficient n of the squared slosh
+    /// angle and of its squared rate.
     pub fn expand_drag(&mut self, n: usize, at: [f64; 2]) {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
         self.course[n] = if growth.acts { growth.expand(n, at, other) } else { other };
     }
 
-    /// Returns the time, s, over which the series of the amplitude-dependent drag converge reliably, from
-    /// coefficients 0 to 2.
+    /// Returns the time, s, over which the series of the amplitude-dependent drag converge reliably, from their first three
+    /// coefficients.
     pub fn convergence_radius(&self) -> f64 {
         let baffle =
             if self.baffle.zeta > 0.0 { self.baffle.convergence_radius() } else { f64::INFINITY };
@@ -131,8 +130,8 @@ impl Pendulum {
         SHARE_OF_RADIUS * baffle.min(growth)
     }
 
-    /// Returns the error, rad/s, of the slosh mass's rate at the time `h`, s, after the start of the expansion that arises
-    /// because the series of its amplitude-dependent drag end at order n.
+    /// Returns the error of the slosh mass's rate, rad/s, `h` seconds after the start of the series, that arises because the
+    /// series of the amplitude-dependent drag end at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let Pendulum { baffle, growth, course, .. } = self;
         let [mut drag, mut rate2] = [0.0; 2];
@@ -152,8 +151,8 @@ impl Pendulum {
         self.along[0] != 0.0
     }
 
-    /// Returns the reason why mode 1 cannot start as `init` states, if any: the mode moves along one direction, but the
-    /// initial displacement or rate has another direction.
+    /// Returns the reason why mode 1 cannot start with the displacement and rate in `init`, if any: the mode moves along one
+    /// direction only, and they have another direction.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;
         let starts = [
@@ -184,23 +183,23 @@ impl Pendulum {
         if self.is_askew() { [a * x, a * t] } else { [T::constant(0.0), a] }
     }
 
-    /// Returns the coordinates q_x and q_y of the slosh mass and their rates q_x' and q_y', from its angle along its
-    /// direction of motion and the rate of this angle.
+    /// Converts the angle of the slosh mass along its direction of motion, and the rate of this angle, to coordinates: the
+    /// radial and the tangential angle, and their rates.
     #[inline(always)]
     pub fn coordinates(&self, [al, al_d]: [f64; 2]) -> [f64; 4] {
         let [x, t] = self.along;
         if self.is_askew() { [al * x, al * t, al_d * x, al_d * t] } else { [0.0, al, 0.0, al_d] }
     }
 
-    /// Returns the angle of the slosh mass along its direction of motion, and the rate of this angle, from the
-    /// coordinates q_x and q_y and their rates q_x' and q_y'.
+    /// Converts coordinates, which are the radial and the tangential angle and their rates, to the angle along the slosh
+    /// mass's direction of motion and the rate of this angle.
     #[inline(always)]
     pub fn angle_and_rate(&self, [q_x, q_y, x_d, y_d]: [f64; 4]) -> [f64; 2] {
         let [x, t] = self.along;
         if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
-    /// Returns coefficient n of the component of a vector a along the direction n of the slosh mass: a_x n_x + a_t n_t.
+    /// Returns coefficient n of the component of the vector (`a_x`, `a_t`) along the slosh mass's direction of motion.
     #[inline(always)]
     pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
         self.along[0] * a_x[n] + self.along[1] * a_t[n]
@@ -212,8 +211,8 @@ impl Pendulum {
         radial + self.along[1] * mul(n, a_t, b)
     }
 
-    /// Returns coefficient n of the component of a vector a across the direction n of the slosh mass, times a number b:
-    /// (a_x n_t - a_t n_x) b.
+    /// Returns coefficient n of a product: the component of the vector (`a_x`, `a_t`) across the slosh mass's direction of
+    /// motion, times the series `b`.
     #[inline(always)]
     pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };
@@ -229,7 +228,8 @@ impl Pendulum {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
     }
 
-    /// Returns coefficient n of the product of a rate v of the liquid and the drag coefficient, which may change in time.
+    /// Returns coefficient n of drag coefficient times the rate `v`. The drag coefficient is divided by its value at the
+    /// start of the series; if `varies` is false, it is constant.
     #[inline(always)]
     pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
         if varies { mul(n, &self.course, v) } else { v[n] }

@@ -28,13 +28,12 @@ use crate::state::{Axial, Ranges, STATES, State, x};
 use crate::tank::{self, Calculated};
 use crate::wheel::{self, Piece};
 
-/// Hub, bearing, tank, wheel and gyro: their state, and the power series of the equations of motion.
+/// Hub, bearing, tank, wheel and gyro: their state, and the power series of their equations of motion.
 #[derive(Clone, Debug)]
 pub struct Plant {
     calculated: Calculated,
     pub(crate) hub_inertia: f64,
-    /// Mass of the rigid liquid, kg, followed by the inertia of the rigid liquid, kg m2, and the
-    /// distance of the tank from the bearing axis, m.
+    /// Mass of the rigid liquid, kg. `i_0` is its inertia, kg m2, and `r` the distance of the tank from the bearing axis, m.
     pub(crate) m_0: f64,
     pub(crate) i_0: f64,
     pub(crate) r: f64,
@@ -52,7 +51,7 @@ pub struct Plant {
     pub(crate) stopped: Option<StoppedStep>,
 }
 
-/// Way in which a step that may stop at events has ended: at its end (`End`), at its end together with an event, or earlier at an
+/// How a step that may stop at events has ended: without an event (`End`), with an event exactly at its end, or earlier at an
 /// event, with the elapsed time, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -62,9 +61,10 @@ pub enum StepEnd {
     Event(f64),
 }
 
-/// A step that has stopped at an event. The plant continues it by repeating it from its `start` and passing this event, so that
-/// the motion is bit-identical whether steps stop at events or not. `h` is the length of the whole step and `passed` the elapsed
-/// time, s; `inputs` are tau_cmd, tau_ext and g_axial during the step; `time` and `x` are time and states at the event.
+/// A step that has stopped at an event. The plant continues it by repeating it from its `start` and passing this event, so
+/// that the motion is bit-identical whether steps stop at events or not. `h` is the length of the whole step, s, and `passed`
+/// the time from its start to the event. `inputs` are tau_cmd, tau_ext and g_axial during the step. `time` and `x` are time
+/// and states at the event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoppedStep {
     start: State,
@@ -76,7 +76,7 @@ pub struct StoppedStep {
 }
 
 impl StoppedStep {
-    /// Number of 64-bit words of a saved step.
+    /// Number of 64-bit words in which a stopped step is saved.
     pub const WORDS: usize = State::WORDS + 6 + STATES;
 
     /// Returns the stopped step as 64-bit words, from which [`StoppedStep::from_words`] restores it.
@@ -92,7 +92,7 @@ impl StoppedStep {
         words
     }
 
-    /// Restores a stopped step from the words of [`StoppedStep::to_words`]; `None` if they are not valid.
+    /// Restores a stopped step from the words that [`StoppedStep::to_words`] has returned; `None` if they are not valid.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<StoppedStep> {
         let (start, rest) = words.split_first_chunk()?;
         let mut numbers = [0.0; 6 + STATES];
@@ -111,8 +111,8 @@ impl StoppedStep {
         })
     }
 
-    /// Returns true if a step of length `h` from the present state continues the stopped step, because it has the same end
-    /// and the same inputs.
+    /// Returns true if a step of `h` seconds from the state `state` continues the stopped step, because it has the same end
+    /// and the same inputs. Times that differ by at most `resolution`, s, count as equal.
     fn is_continued_by(&self, state: &State, inputs: &Inputs, h: f64, resolution: f64) -> bool {
         let left = self.h - self.passed;
         let is_same = |a: f64, b: f64| (a - b).abs() <= resolution.max(rounding(self.h));
@@ -130,7 +130,8 @@ fn rounding(h: f64) -> f64 {
 }
 
 impl Plant {
-    /// Returns a message for each invalid combination of parameters, apart from those that depend on the initial motion.
+    /// Returns a message for each combination of parameters that is not allowed. Problems that depend on the initial motion
+    /// are not among them.
     pub fn problems(p: &Parameters) -> Vec<String> {
         let mut problems = Law::problems(&p.friction);
         problems.extend(p.wheel.problems());
@@ -138,12 +139,12 @@ impl Plant {
         problems
     }
 
-    /// Creates a plant at the start of its motion, at `start_time` (s), with the values that the inputs have then.
-    /// `tolerance` is the allowed relative error of rates and angles.
+    /// Creates a plant at the start of its motion, at `start_time`, s. `inputs` are the values that the inputs have then, and
+    /// `tolerance` is the allowed relative error of rates and angles. The caller must have checked the range of each
+    /// parameter.
     ///
     /// # Errors
-    /// If combinations of parameters are invalid, returns the messages of all problems. The caller must have checked the
-    /// ranges of single parameters.
+    /// Messages of all problems with combinations of parameters.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,
@@ -194,14 +195,14 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Returns a warning, one sentence each, for every parameter and for the specific force if it is outside the known
-    /// range of the models.
+    /// Returns a warning, one sentence each, for every parameter that is outside the known range of the models, and for the
+    /// specific force in `inputs` if it is.
     pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
         tank::warnings(p, inputs.g_axial.value)
     }
 
-    /// Creates a plant that continues from the saved state `state`. [`Plant::problems`] must find no problem with the
-    /// parameters, and the state must belong to a plant with the same parameters.
+    /// Creates a plant that continues from the saved state `state`, which must belong to a plant with the same parameters.
+    /// [`Plant::problems`] must have found no problem with them.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
         Plant::with_state(p, *state, tolerance)
     }
@@ -251,12 +252,12 @@ impl Plant {
         self.state.x[x::OMEGA]
     }
 
-    /// Returns the values calculated from the parameters.
+    /// Returns the values that were calculated from the parameters.
     pub fn calculated(&self) -> &Calculated {
         &self.calculated
     }
 
-    /// Returns the complete state, for saving.
+    /// Returns the state, which determines all further motion together with parameters and inputs.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -276,7 +277,7 @@ impl Plant {
         self.stopped = stopped;
     }
 
-    /// Advances by exactly `h` > 0 seconds, during which the inputs follow their ramps.
+    /// Advances the motion by exactly `h` > 0 seconds, during which the inputs follow their ramps.
     ///
     /// # Errors
     /// See [`StepError`]; the plant is then unchanged.
@@ -289,8 +290,8 @@ impl Plant {
         done.map(|_| ())
     }
 
-    /// Advances as [`Plant::step`] does, but stops at the first event: the hub sticks or slips, the wheel reaches a
-    /// limit, or the gyro takes a sample. If the next step has the same end and the same inputs, it continues as if the
+    /// Advances the motion as [`Plant::step`] does, but stops at the first event: the hub sticks or slips, the wheel reaches
+    /// a limit, or the gyro takes a sample. If the next step has the same end and the same inputs, it continues as if the
     /// step had not stopped.
     ///
     /// # Errors
@@ -330,8 +331,9 @@ impl Plant {
         Ok(StepEnd::Event(passed - begun))
     }
 
-    /// Advances as [`Plant::step`] does, but if an error is returned the state is invalid. The step stops at the first event
-    /// later than `passed` seconds after its start. Returns the time of this event, s after the start of the step.
+    /// Advances the motion as [`Plant::step`] does, but leaves an invalid state if it returns an error. The step stops at the
+    /// first event that is later than `passed` seconds after its start; then the time of this event is returned, in seconds
+    /// after the start of the step.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -395,9 +397,9 @@ impl Plant {
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
-    /// Returns the work of all changes of g_axial since the start, J, including the present change. A jump of g_axial does the
-    /// work jump times mass times height of the liquid. In Model Exchange the work since the last accepted step is computed by
-    /// Hermite's rule, for a g_axial that is linear in time.
+    /// Returns the work, J, that all changes of the specific force g_axial have done since the start, including its present
+    /// change. A jump of g_axial does the work jump times mass times height of the liquid. In Model Exchange the work since
+    /// the last accepted step is computed by Hermite's rule, for a g_axial that is linear in time.
     pub(crate) fn work_axial(&mut self, inputs: &Inputs) -> f64 {
         let last = self.state.axial;
         let change = inputs.g_axial.value - last.g;
@@ -408,8 +410,8 @@ impl Plant {
         self.work_axial_at(change, self.height())
     }
 
-    /// Returns the work of all changes of g_axial, J, as [`Plant::work_axial`] does. `change` is the change of g_axial since
-    /// the last accepted step; the array contains the liquid's mass times height and the rate of this product.
+    /// Returns the work of all changes of the specific force, J, as [`Plant::work_axial`] does. `change` is the change since
+    /// the last accepted step. The array contains the liquid's mass times height, kg m, and the rate of this product.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
         let c = T::constant;
@@ -453,8 +455,8 @@ impl Plant {
         self.evaluate_ranges(&outputs)
     }
 
-    /// Sets the contact that belongs to the present inputs, and returns the previous contact for
-    /// [`Plant::revert_contact`]. A torque that has changed since the last step may have broken the hub away, or may
+    /// Sets the contact that belongs to the present inputs, and returns the previous contact, which [`Plant::revert_contact`]
+    /// restores. The contact can differ because a torque that has changed since the last step may break the hub away, or may
     /// cancel a break-away at this instant.
     pub fn apply_present_contact(&mut self, inputs: &Inputs) -> Contact {
         let before = self.state.contact;
@@ -464,7 +466,8 @@ impl Plant {
         before
     }
 
-    /// Sets the contact as [`Plant::apply_present_contact`] does, but permanently: the next step begins with this contact.
+    /// Sets the contact that belongs to the present inputs, as [`Plant::apply_present_contact`] does, and keeps it: the next
+    /// step begins with this contact.
     pub fn take_present_contact(&mut self, inputs: &Inputs) {
         if self.omega() == 0.0 {
             let (contact, time) = (self.present_contact(inputs), self.state.time);
@@ -472,7 +475,7 @@ impl Plant {
         }
     }
 
-    /// Undoes [`Plant::apply_present_contact`], whose result is `before`.
+    /// Restores the contact `before` that [`Plant::apply_present_contact`] has returned.
     pub fn revert_contact(&mut self, before: Contact) {
         self.state.contact = before;
     }

@@ -7,7 +7,7 @@ use formulas::third_order;
 
 macro_rules! models {
     ($($name:ident = $number:literal, $item:literal, $description:literal;)+) => {
-        /// The mechanical models of the liquid.
+        /// Mechanical models of the liquid.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum SloshModel {
@@ -18,10 +18,10 @@ macro_rules! models {
             /// All models in the order of their numbers.
             pub const ALL: [SloshModel; [$($number),+].len()] = [$(SloshModel::$name),+];
 
-            /// Values of `slosh.model` with their descriptions, in the order of the models' numbers.
+            /// Items of the FMU's parameter `slosh.model` with their descriptions, in the order of the models' numbers.
             pub const ITEMS: [(&str, &str); SloshModel::ALL.len()] = [$(($item, $description)),+];
 
-            /// Returns the value of `slosh.model` for this model.
+            /// Returns the item of the FMU's parameter `slosh.model` that stands for this model.
             pub const fn name(self) -> &'static str {
                 SloshModel::ITEMS[self as usize - 1].0
             }
@@ -51,8 +51,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns the largest amplitude for which the slosh model is defined: an angle, rad, or for `liquid` a displacement
-    /// divided by the pendulum length.
+    /// Returns the largest amplitude for which the slosh model is defined: an angle, rad, or in the model `liquid` a
+    /// displacement divided by the pendulum length.
     pub(crate) fn largest_amplitude(self) -> f64 {
         match self {
             SloshModel::Frozen
@@ -63,8 +63,9 @@ impl SloshModel {
         }
     }
 
-    /// Returns the relative change of omega^2 per squared angle, in planar and in circular motion, of a mode with the
-    /// coefficients s and kappa; `None` for a motion that the model does not have.
+    /// Returns the relative change of the squared natural frequency per squared slosh angle, in planar and in circular
+    /// motion, of a mode with the large-wave coefficients `s` (inertia) and `kappa` (stiffness). `None` stands for a motion
+    /// that the model cannot make.
     pub(crate) fn shifts(self, s: f64, kappa: f64) -> [Option<f64>; 2] {
         match self {
             SloshModel::Frozen | SloshModel::Linear => [Some(0.0), None],
@@ -74,9 +75,9 @@ impl SloshModel {
         }
     }
 
-    /// Returns the factors F of the squared frequency and M of the slosh mass (`leaning.rs`) for a pendulum that hangs
-    /// obliquely on a tilted bench. s and kappa are the pendulum's large-wave coefficients, `slope` is the tangent of the
-    /// tilt angle, and `n2` the squared tangential component of the tilt direction.
+    /// Returns how the obliqueness of a pendulum on a tilted bench changes its squared frequency and its slosh mass: the
+    /// factors F and M of `leaning.rs`. `slope` is the tangent of the tilt angle, and `n2` the squared tangential component
+    /// of the tilt direction. `s` and `kappa` are the large-wave coefficients of the pendulum.
     pub(crate) fn oblique(self, slope: f64, n2: f64, (s, kappa): (f64, f64)) -> Oblique {
         let s2 = slope * slope;
         match self {
@@ -100,8 +101,9 @@ impl SloshModel {
     }
 }
 
-/// Returns the displacement u at which a nonlinear spring is in equilibrium on the slope s: the solution of u (1 + H u^2) =
-/// s, by Newton's method. For a softening spring it is the solution nearest to 0, if one exists.
+/// Returns the displacement u, divided by the pendulum length, at which a nonlinear spring holds a mass on a slope: the
+/// solution of u (1 + `spring` u^2) = `slope` by Newton's method. A softening spring has several solutions; the one nearest
+/// to 0 is returned if it exists.
 fn rest(spring: f64, slope: f64) -> f64 {
     let mut u = if spring > 0.0 { slope } else { 0.0 };
     for _ in 0..60 {

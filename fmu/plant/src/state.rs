@@ -7,9 +7,14 @@ use taylor::integrator::{MAX_MAGNITUDE, add_time};
 use crate::contact::Contact;
 use crate::imu::{FLICKERS, Gyro};
 
-/// Indices of the continuous states in x: hub angle `THETA`, rad, and rate `OMEGA`, rad/s; `WORK` of tau_actuator and
-/// tau_ext, and dissipated `HEAT`, both since the start, J; `STUCK_TIME`, s; rate `WHEEL_SPEED` of the rotor relative to
-/// inertial axes, rad/s; deflection `BRISTLE` of LuGre friction, rad. The index of a new state must be below [`x::SLOSH`].
+/// Indices of the continuous states.
+/// - `THETA`, `OMEGA`: angle of the hub, rad, and its rate, rad/s.
+/// - `WORK`, `HEAT`: work of actuator and external torque, and dissipated energy, since the start, J.
+/// - `STUCK_TIME`: time in stiction since the start, s.
+/// - `WHEEL_SPEED`: rate of the rotor relative to inertial axes, rad/s.
+/// - `BRISTLE`: deflection of the bristles of LuGre friction, rad.
+///
+/// The index of a new state must be below [`x::SLOSH`].
 #[allow(missing_docs)]
 pub mod x {
     use crate::parameters::MODES;
@@ -21,8 +26,8 @@ pub mod x {
     pub const STUCK_TIME: usize = 4;
     pub const WHEEL_SPEED: usize = 5;
     pub const BRISTLE: usize = 6;
-    /// Index of the first slosh coordinate: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, and so on. The unit depends on
-    /// the slosh model. Coordinates of unused modes are 0.
+    /// Index of the first slosh coordinate. Each mode has four coordinates: radial, tangential, and the rates of both. Their
+    /// unit depends on the slosh model; coordinates of unused modes are 0.
     pub const SLOSH: usize = 7;
     pub const COUNT: usize = SLOSH + 4 * MODES;
 }
@@ -30,9 +35,9 @@ pub mod x {
 /// Number of continuous states.
 pub const STATES: usize = x::COUNT;
 
-/// Indices of the event indicators, which are positive between events and cross zero at events: the hub comes to rest or, if
-/// it is stuck, breaks away; the torque command passes a torque limit of the wheel or changes its sign; the rotor reaches
-/// its highest or lowest speed.
+/// Indices of the event indicators, which are positive between events and cross zero at events: the hub comes to rest; a
+/// stuck hub breaks away; the torque command passes a torque limit of the wheel or changes its sign; the rotor reaches its
+/// highest or lowest speed.
 #[allow(missing_docs)]
 pub mod indicator {
     pub const REST: usize = 0;
@@ -56,7 +61,7 @@ pub(crate) struct Ranges {
     pub limited_by: LimitedBy,
 }
 
-/// Complete state of the plant. Together with parameters and inputs it determines all further motion.
+/// State of the plant. Together with parameters and inputs it determines all further motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
@@ -65,18 +70,18 @@ pub struct State {
     pub(crate) ranges: Ranges,
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
-    /// Time since the start, s, and its rounding error. It is the sum of the lengths of all steps, because the simulation times
-    /// of an importing tool may have rounding errors, may drift, or may start at 1e9 s.
+    /// Time since the start, s, and its rounding error. The plant adds up the lengths of all steps, because the simulation
+    /// times of an importing tool may have rounding errors, may drift, or may start at 1e9 s.
     pub(crate) elapsed: [f64; 2],
-    /// Specific force g_axial at the start, m/s2, to which the slosh damping ratio refers.
+    /// Specific force at the start, m/s2, to which the damping ratio of the liquid refers.
     pub(crate) start_g: f64,
     pub(crate) axial: Axial,
     pub(crate) gyro: Gyro,
 }
 
-/// Work done by a changing g_axial since the start, J, and the value of g_axial, m/s2, up to which this work is known. `accepted`
-/// contains the last accepted step in Model Exchange. It is empty after a step of Co-Simulation, because g_axial then changes
-/// only at an instant.
+/// The `work`, J, that a changing specific force has done since the start, and the specific force `g`, m/s2, up to which this
+/// work is known. `accepted` is the last accepted step in Model Exchange. It is `None` after a step of Co-Simulation, because
+/// g then changes only at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
     pub work: f64,
@@ -84,7 +89,7 @@ pub(crate) struct Axial {
     pub accepted: Option<Accepted>,
 }
 
-/// The liquid at the end of an accepted step in Model Exchange: its mass times height, kg m, and the rate of this product.
+/// The liquid at the end of an accepted step in Model Exchange: mass times height, kg m, and the rate of this product.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Accepted {
     pub time: f64,
@@ -100,7 +105,7 @@ impl Axial {
 }
 
 impl State {
-    /// Number of 64-bit words of a saved state.
+    /// Number of 64-bit words in which a state is saved.
     pub const WORDS: usize = 2 + Self::REALS;
 
     const REALS: usize = 13 + FLICKERS + STATES;
@@ -142,7 +147,7 @@ impl State {
         words
     }
 
-    /// Restores a state from the words of [`State::to_words`]; `None` if they are not a valid state.
+    /// Restores a state from the words that [`State::to_words`] has returned; `None` if they are not a valid state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let contact = match (words[0] >> 32) as u8 as i8 {
             -1 => Contact::Backward,
@@ -201,7 +206,7 @@ impl State {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Sets the clock to `t`, s, after `begin`, which contains the simulation time, s, and the time since the start with
+    /// Sets the clock to `t` seconds after `begin`, which contains the simulation time, s, and the time since the start with
     /// its rounding error, s.
     pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
         let (time, elapsed) = begin;

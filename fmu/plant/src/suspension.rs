@@ -38,8 +38,8 @@ impl Suspension {
         self.c * hub.omega2[n]
     }
 
-    /// Returns the torque tau_s of the suspension line (N m) and the energy of its spring (J) at the start of an expansion,
-    /// or their directional derivatives.
+    /// Returns the torque of the suspension line on the hub, N m, and the energy of its spring, J, at the start of a power
+    /// series, or the directional derivatives of both.
     pub fn present<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let [turned, w]: [T; 2] = [number(&hub.theta), number(&hub.omega)];
         let turned = turned - T::constant(self.theta_0);

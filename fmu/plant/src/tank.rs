@@ -26,11 +26,14 @@ use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::slosh_model::SloshModel;
 
-/// Values calculated from the parameters; 0 for unused modes. `m_liq` and `m_0` are the masses of the whole liquid and
-/// of the rigid liquid, kg, and `bond` is the Bond number rho g R^2/sigma. For each mode there are the pendulum's mass,
-/// kg, and length, m (on a tilted bench, those of an oblique pendulum with the same frequency), the natural frequency,
-/// Hz (on an upright bench sqrt((g + a)/l)/(2 pi)), the damping ratio, and the increase a_n of g that is equivalent to
-/// the centring stiffness, m/s2.
+/// Values that were calculated from the parameters; 0 for unused modes.
+/// - `m_liq`, `m_0`: masses of the whole liquid and of the rigid liquid, kg.
+/// - `bond`: Bond number rho g R^2/sigma.
+/// - `mass`, `length`: slosh mass, kg, and pendulum length, m, of each mode; on a tilted bench those of an oblique pendulum
+///   with the same frequency.
+/// - `frequency`: natural frequency of each mode, Hz.
+/// - `damping`: damping ratio of each mode.
+/// - `centring`: increase of g that is equivalent to the stiffness by surface tension, m/s2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Calculated {
@@ -136,8 +139,9 @@ impl ModeTable {
         self.direction[..modes].iter().any(|direction| *direction != 0.0)
     }
 
-    /// Returns the largest sum of modal masses along one direction, kg. It is the larger eigenvalue of the sum of m n n^T
-    /// over the modes, where m is the mass of a mode and n its direction.
+    /// Returns the largest sum of slosh masses that move along one direction, kg, which must not exceed the mass of the
+    /// liquid. It is the larger eigenvalue of the sum of m n n^T over the first `modes` modes, with the slosh mass m and the
+    /// direction n of each mode.
     fn most_along_one(&self, modes: usize) -> f64 {
         if self.direction[..modes].iter().all(|direction| *direction == self.direction[0]) {
             return self.mass[..modes].iter().sum();
@@ -150,8 +154,10 @@ impl ModeTable {
         sum / 2.0 + libm::hypot(half, cross)
     }
 
-    /// Returns the smallest inertia of the liquid in the model `planar`, kg m2, for a tank at the distance r from the axis:
-    /// m_0 r^2 plus, for each mode, the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
+    /// Returns the smallest inertia, kg m2, that the liquid of the slosh model `planar` can have about the bearing axis while
+    /// its modes move. `r` is the distance of the tank from the axis, m. The inertia is m_0 r^2 plus, for each mode, the
+    /// smallest value of m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2], where s is the sine of the slosh angle and r_x, r_t are r
+    /// along the mode's direction and across it.
     fn least_inertia(&self, modes: usize, r: f64) -> f64 {
         let of_mode = |n: usize| {
             let ([n_x, n_t], l) = (self.direction_components(n), self.pendulum_length(n));
@@ -221,9 +227,9 @@ impl Slosh {
         self.zeta_amplitude > 0.0 || self.zeta_breaking > 0.0
     }
 
-    /// Returns the parameters of breaking waves for mode `n`, which counts from 0. `wave` is the
-    /// elevation at the wall per slosh angle, m/rad. If the table of modes gives no wave number,
-    /// the wave number of an upright cylinder of this `radius`, m, is used.
+    /// Returns the parameters of breaking waves for mode `n`, where the first mode has the number 0. `wave` is the elevation
+    /// at the wall per slosh angle, m/rad. If the table of modes gives no wave number, the wave number of an upright cylinder
+    /// with this `radius`, m, is used.
     pub(crate) fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
         let k = match self.source {
             SloshSource::Table if self.table.wave_number[n] > 0.0 => self.table.wave_number[n],
@@ -232,9 +238,9 @@ impl Slosh {
         Breaking { zeta: self.zeta_breaking, onset: self.breaking_steepness, steepness: k * wave }
     }
 
-    /// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of mode `n` in a tank filled to h/R =
-    /// `fill`; modes count from 0. Both are 1, as for a pendulum, for the second and further modes of an upright
-    /// cylinder and for all slosh models except `liquid`.
+    /// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of mode `n` in a tank filled to h/R = `fill`;
+    /// the first mode has the number 0. Both are 1, as for a pendulum, in all slosh models except `liquid`, and for all modes
+    /// of a cylinder except the first.
     pub(crate) fn third_order(&self, n: usize, fill: f64) -> (f64, f64) {
         match self.source {
             _ if self.model != SloshModel::Liquid => (1.0, 1.0),
@@ -247,8 +253,8 @@ impl Slosh {
     }
 }
 
-/// Returns messages if the slosh model is `liquid` and the inertia of a mode falls with the amplitude (s <= 0), because the
-/// kinetic energy of hub and liquid would then be indefinite at amplitudes that depend on the hub.
+/// Returns a message for each mode of the slosh model `liquid` whose inertia falls with the amplitude (s <= 0). These modes
+/// are refused, because the kinetic energy of hub and liquid would not be positive at amplitudes that depend on the hub.
 fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     let (fill, slosh) = (2.0 * p.tank.h / p.tank.d, p.slosh);
     let falling =
@@ -267,8 +273,7 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     })
 }
 
-/// Fill h/R below which waves are shallow: s (the large-wave coefficient of inertia) becomes negative, and s and
-/// kappa grow without bound.
+/// Fill h/R below which waves are shallow, so that the large-wave coefficients grow without bound and s becomes negative.
 const SHALLOW: f64 = 0.4;
 
 fn third_order_warning(fill: f64) -> Option<String> {
@@ -312,15 +317,15 @@ fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
     })
 }
 
-/// Bond number of the tank below which capillarity adds more than 3 % to the squared frequency of mode 1.
+/// Bond number of the tank below which surface tension adds more than 3 % to the squared frequency of mode 1.
 const LOW_BOND: f64 = 100.0;
 
 impl Calculated {
     /// Calculates the modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation gives the damping ratio of the first mode. The damping ratio of each higher mode has the same ratio
-    /// to its own laminar layer (`formulas::damping`). Without restoring force (g = 0 and no centring stiffness) there is no
-    /// frequency; the damping ratio then has no meaning and is returned as 0.
+    /// The correlation gives the damping ratio of the first mode. Each higher mode has the same ratio of its damping to that
+    /// of its own laminar layer (`formulas::damping`). Without restoring force, that is, without g and surface tension, there
+    /// is no frequency, and the damping ratio, which then has no meaning, is 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;
@@ -382,8 +387,8 @@ impl Calculated {
         all
     }
 
-    /// Returns the pendulums in use. Their viscous drag coefficients c = 2 zeta omega_n m belong to the `g` of
-    /// [`Calculated::new`]; `damping.rs` computes them at other values of g.
+    /// Returns the pendulums of all modes in use. Their viscous drag coefficients belong to the specific force with which
+    /// [`Calculated::new`] was called; `damping.rs` computes them at other values.
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
         let (r, slosh, p) = (p.tank.r, p.slosh, *p);

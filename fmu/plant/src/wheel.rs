@@ -12,8 +12,8 @@ use alloc::vec::Vec;
 use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
-/// A part of a step during which the wheel's torque is linear in time: its length, s, the rotor's speed at its end, rad/s,
-/// and the level (a torque limit or zero) that the torque command passes at its end.
+/// A part of a step during which the torque of the wheel is linear in time: its `length`, s; the `speed` of the rotor at its
+/// end, rad/s; and the level (a torque limit or zero) that the torque command has `passed` at its end.
 pub(crate) struct Piece {
     pub length: f64,
     pub torque: Ramp,
@@ -21,9 +21,9 @@ pub(crate) struct Piece {
     pub passed: Option<f64>,
 }
 
-/// Returns the torque command after `t`, s. If it has just reached the level `passed` (a torque limit or zero), it is set to
-/// exactly this level. Otherwise rounding might leave it one unit in the last place before the level, so that it would pass
-/// the level again and again without advancing in time.
+/// Returns the torque command after `t` seconds. `passed` is the level (a torque limit or zero) that the command has just
+/// reached, if any; the result is then exactly this level. Rounding might otherwise leave the command one unit in the last
+/// place before the level, so that it would pass the level again and again without advancing in time.
 pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp {
     let now = command.shifted(t);
     match passed {
@@ -44,8 +44,8 @@ impl Wheel {
         )]
     }
 
-    /// Returns the torque on the hub, N m, and its slope, for a rotor speed and a torque command. If the command equals a
-    /// limit, its slope decides whether it is within or beyond the limit.
+    /// Returns the torque of the wheel on the hub, N m, and its slope, for a rotor `speed`, rad/s, and a torque `command`. If
+    /// the command equals a torque limit, its slope decides if it is within or beyond the limit.
     pub(crate) fn torque(&self, speed: f64, command: Ramp) -> Ramp {
         let Ramp { value, slope } = command;
         if !self.enabled {
@@ -117,8 +117,8 @@ mod tests {
         (impulse, speed, pieces)
     }
 
-    /// A torque command passes each limit of the wheel only once although times are rounded. Otherwise the step would be divided
-    /// at the same limit again and again, into parts of zero length, until it is refused.
+    /// If rounding of times made the command pass a limit twice, the step would be divided at the same limit again and again,
+    /// into parts of zero length, until it is refused.
     #[test]
     fn a_torque_command_passes_each_limit_once_despite_rounding() {
         let mut rng = fastrand::Rng::with_seed(1);
@@ -134,7 +134,6 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
-    /// The rotor has reached its lowest or highest speed, and the torque command is constant or rises from 0.
     #[test]
     fn a_wheel_at_a_speed_limit_gives_only_torque_that_leads_away_from_the_limit() {
         let w = wheel();
@@ -164,7 +163,6 @@ mod tests {
         assert!((impulse - 0.0026).abs() < 1e-15);
     }
 
-    /// A torque of 0.1 N·m brakes the rotor of the reaction wheel to its lowest speed in 3.3 s of 10 s.
     #[test]
     fn the_hub_gains_the_momentum_that_the_rotor_loses_until_saturation() {
         let w = wheel();
@@ -231,8 +229,8 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// The rotor reaches its speed limit at the time t at which the impulse of the torque is a t + b t^2/2 = I_w (W_0 - W),
-    /// for a constant torque a and for a ramp a + b t.
+    /// The expected time t is the solution of a t + b t^2/2 = I_w (W_0 - W), where the left side is the impulse of the torque
+    /// a + b t, and the right side the change of the rotor's angular momentum.
     #[test]
     fn the_rotor_reaches_its_speed_limit_at_the_time_that_the_impulse_of_the_torque_gives() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };
@@ -256,7 +254,7 @@ mod tests {
         }
     }
 
-    /// With `wheel.enabled` = false the torque has no limits; its integral is still added up as a speed.
+    /// Without a wheel (`wheel.enabled` = false) the torque has no limits. Its integral is still added up as a speed.
     #[test]
     fn an_actuator_without_a_wheel_gives_the_commanded_torque_and_integrates_it() {
         let w = Wheel { enabled: false, ..wheel() };

@@ -22,18 +22,15 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of an FMI function, by which the importer learns if the call has succeeded: [`OK`], [`DISCARD`], [`ERROR`] or
-/// [`FATAL`].
+/// Return value of an FMI function.
 pub type Status = c_int;
-/// The call succeeded.
 pub const OK: Status = 0;
-/// Status with which warnings are sent to the host's log; no function returns it.
+/// Status with which warnings are sent to the host's log. No function returns it.
 pub const WARNING: Status = 1;
-/// The FMU cannot compute the result of the call, and the instance is unchanged.
+/// The FMU could not compute the result of the call, and the instance is unchanged.
 pub const DISCARD: Status = 2;
 /// The call was not allowed in the present state, had invalid arguments, or its execution has failed.
 pub const ERROR: Status = 3;
-/// The instance is unusable.
 pub const FATAL: Status = 4;
 
 fn status(severity: Severity) -> Status {
@@ -44,8 +41,8 @@ fn status(severity: Severity) -> Status {
     }
 }
 
-/// The logging callback that the host has passed, in a form that does not depend on the FMI version. Its arguments are
-/// status, category and message.
+/// The logging callback of the host, in a form that does not depend on the FMI version. The arguments are status, category
+/// and message.
 pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 
 /// Sends the messages of one instance to the host's logger.
@@ -53,23 +50,22 @@ pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 pub struct Log {
     logger: Option<Logger>,
     pub filter: Filter,
-    /// True after the warning about the host's communication steps has been logged, so that it is logged only once.
+    /// True after the warning about the host's communication steps was logged, so that it is logged only once.
     step_warned: bool,
 }
 
 impl Log {
-    /// Creates the log of a new instance.
     pub fn new(logger: Option<Logger>) -> Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
 
-    /// Writes the reason why a call has failed to the host's log. The log category follows from the severity of the failure.
+    /// Writes the reason of a failed call to the host's log. The status and the log category follow from the severity of the
+    /// fault.
     pub fn report(&self, fault: &Fault) {
         self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
     }
 
     #[cold]
-    /// Logs the model's warnings at the start of the simulation.
     pub fn report_warnings<M: Model, V: Version>(&self, instance: &Instance<M, V>) {
         if self.filter.wants(Topic::Warning) {
             for warning in instance.warnings() {
@@ -78,14 +74,14 @@ impl Log {
         }
     }
 
-    /// Warns in the host's log of a side effect of `call`, which `effect` describes.
+    /// Warns in the host's log that `call` had a side effect, which `effect` describes.
     #[cold]
     pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
         self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));
     }
 
-    /// Writes the model's warning about the host's communication steps to the host's log, if there
-    /// is one, at most once per instance.
+    /// Writes the model's warning about the host's communication steps to the host's log, at most once per instance. Nothing
+    /// is written if the model has no warning.
     pub fn report_step_warning<M: Model, V: Version>(&mut self, instance: &Instance<M, V>) {
         if !self.step_warned
             && self.filter.wants(Topic::Warning)
@@ -96,8 +92,8 @@ impl Log {
         }
     }
 
-    /// Writes the model's last event to the host's log if events have occurred during the call; `before` is the number of
-    /// events before the call.
+    /// Writes the model's last event to the host's log if events have occurred during the call. `before` is the number of
+    /// events before the call, and `now` the instance after it.
     #[inline(always)]
     pub fn report_event<M: Model, V: Version>(
         &self,
@@ -133,12 +129,12 @@ impl Log {
 
 // ---- Texts and arrays ----
 
-/// Converts a text to a C string for the host; NUL characters become spaces.
+/// Converts a text to a C string for the host. NUL characters become spaces, because they would end a C string.
 pub fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// Copies a C string that the host passes; `None` for NULL.
+/// Copies a C string that the host passes; `None` if the pointer is NULL.
 pub unsafe fn text(string: *const c_char) -> Option<String> {
     if string.is_null() {
         return None;
@@ -146,8 +142,7 @@ pub unsafe fn text(string: *const c_char) -> Option<String> {
     Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
 }
 
-/// Borrows an array that the host passes as the argument `name`, for reading. The pointer may be
-/// NULL if the array is empty.
+/// Borrows an array that the host passes as the argument `name`, for reading. The pointer may be NULL if the array is empty.
 ///
 /// # Errors
 /// If the pointer is NULL and the array is not empty; the message contains `name`.
@@ -166,7 +161,7 @@ pub unsafe fn array<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// Borrows an array that the host passes as the argument `name`, for writing results.
+/// Borrows an array that the host passes as the argument `name` and into which the function writes results.
 ///
 /// # Errors
 /// If the pointer is NULL and the array is not empty; the message contains `name`.
@@ -185,7 +180,7 @@ pub unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// Borrows the host's variable into which a function writes one result. The host passes `pointer` to the variable as the argument
+/// Borrows a variable of the host into which the function writes a result. The host passes `pointer` to it as the argument
 /// `name`.
 ///
 /// # Errors
@@ -194,22 +189,22 @@ pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&
     unsafe { pointer.as_mut() }.ok_or_else(|| null_argument(call, name))
 }
 
-/// Returns the fault for an argument that must not be NULL.
 pub fn null_argument(call: &Call, name: &str) -> Fault {
     call.error(format_args!("argument {name} is NULL"))
 }
 
 // ---- Instances ----
 
-/// Constant from which the [`mark`] of a live component is computed. Calls check the mark, so that a wrong handle gives an error
-/// instead of a crash.
+/// Number from which [`mark`] computes the mark of a live component. Calls check the mark, so that a wrong handle gives an
+/// error instead of a crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
-/// Returns the mark of an object of this kind at this address: the number that is the first word of a live component
-/// or saved state. The mark depends on the model, the FMI version and the loaded copy of the library, so that handles
-/// of other FMUs, of the other FMI version or of a second copy of the library are recognised as wrong. It is computed
-/// from the address of the variable table and a digit for the version. The upper 16 bits of a mark differ from those
-/// of every valid address.
+/// Returns the mark of a live object: the number in its first word, by which a call recognises that `handle` is valid. `kind`
+/// distinguishes components from saved states.
+///
+/// The mark depends on the model, the FMI version and the loaded copy of the library, because it is computed from the address
+/// of the variable table and a digit for the version. Handles of other FMUs, of the other FMI version or of a second copy of
+/// the library are therefore recognised as wrong. The upper 16 bits of a mark differ from those of every valid address.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
     // The digit is smaller than the alignment of the table, so that it does not overlap with the table's address.
@@ -217,23 +212,22 @@ fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     kind ^ table ^ u64::from(version) ^ handle.addr() as u64
 }
 
-/// Lowest address that a component can have on the platforms for which FMUs are built. Smaller
-/// handles are refused without being read.
+/// Lowest address that an object can have on the platforms for which FMUs are built. Smaller handles are refused without
+/// being read.
 const LOWEST_ADDRESS: usize = 1024;
 
-/// A live instance with its log; the handle that the host has points to it.
+/// A live instance with its log. The handle that the host has points to it.
 #[repr(C)]
 #[allow(missing_docs)]
 pub struct Component<M: Model, V: Version> {
     mark: u64,
     pub instance: Instance<M, V>,
     pub log: Log,
-    /// Data about the host that only this version of FMI needs, for example the host's callbacks.
+    /// Data about the host that only this version of FMI needs, for example callbacks.
     pub host: V::Host<M>,
 }
 
-/// Creates the component of an instance, to which the handle points that the host gets from
-/// fmi2Instantiate or fmi3Instantiate…, and returns this handle.
+/// Creates the component of an instance on the heap and returns the handle for the host, which points to it.
 pub fn new_component<M: Model, V: Version>(
     instance: Instance<M, V>,
     log: Log,
@@ -244,8 +238,8 @@ pub fn new_component<M: Model, V: Version>(
     Box::into_raw(component).cast()
 }
 
-/// Returns true if `handle` points to a live `T` (a component or a saved state), whose first field is its [`mark`]. `kind` is the
-/// constant from which marks of this type are computed.
+/// Returns true if `handle` points to a live `T`, a component or a saved state, whose first field is its [`mark`]. `kind` is
+/// the number from which marks of this type are computed.
 unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bool {
     handle.addr() >= LOWEST_ADDRESS
         && handle.cast::<T>().is_aligned()
@@ -260,8 +254,8 @@ unsafe fn free<T>(handle: *mut c_void) {
     }
 }
 
-/// Frees the component behind a handle that the host passes to fmi2FreeInstance or
-/// fmi3FreeInstance. A handle that is not the handle of a live component is ignored.
+/// Frees the component behind the handle that the host passes to fmi2FreeInstance or fmi3FreeInstance. Any other handle is
+/// ignored.
 pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     unsafe {
         if is_live::<Component<M, V>, M, V>(handle, COMPONENT) {
@@ -270,8 +264,8 @@ pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
     }
 }
 
-/// Runs `body` on the component behind a handle. If `body` fails, the fault is logged and determines the returned status. If
-/// `body` panics, the instance becomes unusable.
+/// Runs `body` on the component behind a handle, and returns the status for the host. If `body` fails, the fault is logged
+/// and determines the status. If `body` panics, the instance becomes unusable.
 #[inline]
 pub unsafe fn perform<M: Model, V: Version>(
     handle: *mut c_void,
@@ -299,8 +293,8 @@ pub unsafe fn perform<M: Model, V: Version>(
     status(fault.severity)
 }
 
-/// Runs `body` as [`perform`] does, but only if the instance state allows the call. Functions use it that must not read their
-/// arguments if the call is not allowed.
+/// Runs `body` as [`perform`] does, but only if the state of the instance allows the call. Functions need this if they must
+/// not read their arguments when the call is not allowed.
 #[inline]
 pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     handle: *mut c_void,
@@ -314,8 +308,8 @@ pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     unsafe { perform(handle, call, if_allowed) }
 }
 
-/// Runs `body` as [`perform`] does. If the simulation starts with this call, logs warnings about
-/// initial parameters and inputs.
+/// Runs `body` as [`perform`] does. If the simulation starts with this call, the warnings about initial parameters and inputs
+/// are logged afterwards.
 pub unsafe fn perform_start<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -337,8 +331,8 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
 }
 
-/// Stops the standard library from printing panics, because the host's logger reports them. The panic hook belongs to this
-/// library's own copy of the standard library, not to the host's.
+/// Stops the standard library from printing panics to stderr, because the host's logger reports them. The panic hook belongs
+/// to the copy of the standard library in this FMU, and not to the host.
 pub fn silence_panics() {
     // The tests of this crate share the standard library of the test runner, whose panic messages are needed.
     #[cfg(not(test))]
@@ -350,10 +344,11 @@ pub fn silence_panics() {
 
 // ---- Functions that both versions have ----
 
-/// Returns the filter that lets only messages of the log categories `names` pass to the host's log.
+/// Returns the filter that passes only messages of the log categories `categories`, an array of `count` C strings, to the
+/// host's log.
 ///
 /// # Errors
-/// If a name is unknown or NULL.
+/// If a category is unknown or NULL.
 pub unsafe fn filter<M: Model>(
     call: &Call,
     categories: *const *const c_char,
@@ -366,7 +361,8 @@ pub unsafe fn filter<M: Model>(
     Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))
 }
 
-/// Fills an array that the host passes to a getter with the values that `body` writes.
+/// Fills the array `pointer` of `length` numbers, which the host passes as the argument `name`, with the values that `body`
+/// writes.
 pub unsafe fn fill<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -380,8 +376,8 @@ pub unsafe fn fill<M: Model, V: Version>(
     }
 }
 
-/// Handles the host's message that it has completed a step of its integrator, and sets the host's variable that states if an
-/// event must be handled now. `B` is the Boolean type of the FMI version.
+/// Handles the host's message that its integrator has completed a step, and writes whether an event must be handled now to
+/// the host's variable `enter_event_mode`. `B` is the Boolean type of the FMI version.
 pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     handle: *mut c_void,
     enter_event_mode: *mut B,
@@ -400,9 +396,9 @@ pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     }
 }
 
-/// Defines the C functions of one version of FMI: each as a function that is generic in the model, and a macro that exports
-/// all of them for one model under their C names. The exported macro is necessary because each FMU must define these symbols
-/// itself. The first token of the input is `$`.
+/// Defines the C functions of one version of FMI. Each becomes a function that is generic in the model, and a macro `$export`
+/// exports all of them for one model under their C names. This macro is necessary because each FMU must define these symbols
+/// itself. The first token of the input must be `$`.
 macro_rules! c_functions {
     ($d:tt $export:ident, $version:ident; $(
         $(#[$doc:meta])*
@@ -445,18 +441,16 @@ struct SavedState<M: Model, V: Version> {
     instance: Instance<M, V>,
 }
 
-/// Creates a saved state, which is a copy of an instance, and returns the handle with which the
-/// host refers to it.
+/// Creates a saved state, which is a copy of an instance, and returns the handle for the host.
 pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void {
     let mut state = Box::new(SavedState { mark: 0, instance });
     state.mark = mark::<M, V>(STATE, ptr::from_ref(&*state).cast());
     Box::into_raw(state).cast()
 }
 
-/// Returns the instance in the saved state behind a handle. `name` is the name of the argument for messages.
+/// Returns the instance in the saved state behind a handle that the host passes as the argument `name`.
 ///
 /// # Errors
-///
 /// If the handle is NULL or does not belong to a saved state of this FMU.
 pub unsafe fn saved_state<'a, M: Model, V: Version>(
     call: &Call,
@@ -472,7 +466,8 @@ pub unsafe fn saved_state<'a, M: Model, V: Version>(
     Ok(unsafe { &mut (*handle.cast::<SavedState<M, V>>()).instance })
 }
 
-/// Saves an instance into the saved state behind `handle`, or into a new one if it is NULL.
+/// Saves an instance into the saved state to which `handle` points, or into a new saved state if the handle is NULL. `name`
+/// is the argument's name for messages.
 pub unsafe fn save_state<M: Model, V: Version>(
     call: &Call,
     name: &str,
@@ -490,7 +485,8 @@ pub unsafe fn save_state<M: Model, V: Version>(
     Ok(())
 }
 
-/// Writes the number of bytes of a serialised state to the host's variable `size`.
+/// Writes the number of bytes of a serialised state to the host's variable `size`. `name` and `saved` are name and handle of
+/// the saved state.
 pub unsafe fn serialized_size<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -506,7 +502,11 @@ pub unsafe fn serialized_size<M: Model, V: Version>(
     }
 }
 
-/// Writes a saved state as bytes into an array of the host. Returns an error if the array is too short.
+/// Writes a saved state as bytes into an array of the host, which has `size` bytes. `name` and `saved` are name and handle of
+/// the saved state.
+///
+/// # Errors
+/// If the array is too short.
 pub unsafe fn serialize<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -527,8 +527,8 @@ pub unsafe fn serialize<M: Model, V: Version>(
     }
 }
 
-/// Restores a saved state from bytes, which must come from an instance with the same variables. The host's variable for the
-/// handle is only written and never read, because the host need not have initialised it.
+/// Restores a saved state from `size` bytes, which must come from an instance with the same variables, and writes its handle
+/// to the host's variable `to`. This variable is only written and never read, because the host need not have initialised it.
 pub unsafe fn deserialize<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -550,9 +550,10 @@ pub unsafe fn deserialize<M: Model, V: Version>(
     }
 }
 
-/// Frees a saved state and sets the host's handle to NULL; the handle may be NULL. fmusim (0.0.39) passes the state
-/// itself instead of the address of the handle. The state is then recognised by its mark, which cannot be an address, and
-/// is freed as well.
+/// Frees a saved state and sets the host's handle to NULL. The handle may already be NULL.
+///
+/// fmusim (0.0.39) passes the saved state itself instead of the address of the handle. It is then recognised by its mark,
+/// which cannot be an address, and is freed as well.
 pub unsafe fn free_state<M: Model, V: Version>(
     call: &Call,
     name: &str,

@@ -5,13 +5,13 @@
 
 use std::fmt;
 
-/// Interface type of an instance.
+/// Type of the interface for which a host creates an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Interface {
-    /// Model Exchange: the host integrates.
+    /// Model Exchange, in which the host integrates the equations of the FMU.
     ModelExchange = 0,
-    /// Co-Simulation: the FMU integrates.
+    /// Co-Simulation, in which the FMU integrates its equations itself.
     CoSimulation = 1,
 }
 
@@ -25,15 +25,15 @@ impl Interface {
     }
 }
 
-/// Handling of events, such as the start of sticking: by the FMU within its steps, or by the host in event mode.
+/// Who handles events, such as the start of sticking: the FMU within its steps, or the host in event mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Events {
     /// The FMU handles events within its steps.
     InStep = 0,
-    /// The host handles events in event mode, and discrete values change only there.
+    /// The host handles events in event mode. Discrete values change only there.
     ByHost = 1,
-    /// The FMU handles events within its steps, but discrete values change for the host only in event mode.
+    /// The FMU handles events within its steps, but the host sees changes of discrete values only in event mode.
     Reported = 2,
 }
 
@@ -42,7 +42,7 @@ impl Events {
     pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
-/// The state of an instance in the state machine of the standard.
+/// The state of an instance in the state machine of the FMI standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -53,12 +53,12 @@ pub enum InstanceState {
     Event = 3,
     Continuous = 4,
     Terminated = 5,
-    /// A step has failed. The last values can be read, and a saved state can be restored.
+    /// A step has failed. The host can read the last values and restore a saved state.
     Failed = 6,
-    /// A call has panicked. The instance can only be freed.
+    /// A call has panicked. The host can only free the instance.
     Fatal = 7,
-    /// Event mode directly after initialization mode. Parameters can still be set, because OpenModelica does so. The next
-    /// call that continues the simulation changes the state to the ordinary event mode.
+    /// Event mode directly after initialization mode. Parameters can still be set here, because OpenModelica sets them here.
+    /// The next call that continues the simulation changes the state to `Event`.
     Initialized = 8,
     Configuration = 9,
     Intermediate = 10,
@@ -96,7 +96,7 @@ impl InstanceState {
         }
     }
 
-    /// Returns true if an instance with this interface and this handling of events can enter this state and remain in it.
+    /// Returns true if an instance with this interface and this handling of events can enter this state and stay in it.
     pub fn is_reachable(self, interface: Interface, events: Events) -> bool {
         match self {
             InstanceState::Stepping => interface == Interface::CoSimulation,
@@ -113,15 +113,15 @@ impl InstanceState {
     }
 }
 
-/// C types of the values that a function reads or sets.
+/// C type of the values that an FMI function gets or sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum CType {
     Real,
     Integer,
-    /// Enumeration. FMI 2.0 reads it as an Integer, FMI 3.0 by the functions of Int64.
+    /// Enumeration, which FMI 2.0 reads as an Integer and FMI 3.0 by the functions of Int64.
     Enumeration,
-    /// Structural parameter of FMI 3.0, which is read by the functions of UInt64.
+    /// Structural parameter of FMI 3.0, which the functions of UInt64 get and set.
     Size,
     Boolean,
     String,
@@ -139,22 +139,21 @@ pub(crate) mod states {
     pub const C: u16 = InstanceState::Continuous.bit();
     pub const T: u16 = InstanceState::Terminated.bit();
     pub const F: u16 = InstanceState::Failed.bit();
-    /// All states except `Fatal`.
     pub const ANY: u16 = I | M | S | E | C | T | F;
-    /// All states from the start of the simulation on, except `Fatal`.
+    /// All states after initialization mode, except `Fatal`.
     pub const RUN: u16 = S | E | C | T | F;
     pub const FATAL: u16 = InstanceState::Fatal.bit();
     pub const CONFIGURATION: u16 = InstanceState::Configuration.bit();
     pub const INTERMEDIATE: u16 = InstanceState::Intermediate.bit();
 }
 
-/// A function of one version of FMI and the conditions under which it may be called.
+/// A function of one version of FMI, with the conditions under which a host may call it.
 #[derive(Debug)]
 pub struct Call {
     /// Name of the function, with which error messages begin.
     pub name: &'static str,
     allowed: u16,
-    /// The C type of the values if the function reads or sets values of variables; `None` for all other functions.
+    /// The C type of the values if the function gets or sets variables; `None` for all other functions.
     pub c_type: Option<CType>,
     only_in: Option<Interface>,
 }
@@ -164,11 +163,11 @@ impl Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// Checks that the host may make this call, for the interface, the handling of events and the present
-    /// state of the instance.
+    /// Checks that the host may make this call on an instance with this `interface`, this handling of `events` and this
+    /// present `state`.
     ///
     /// # Errors
-    /// If the call is not allowed; the message contains the instance states in which it is allowed.
+    /// If the call is not allowed; the message lists the states in which it is allowed.
     #[inline]
     pub fn check(
         &self,
@@ -247,7 +246,7 @@ pub(crate) const fn me(call: Call) -> Call {
     Call { only_in: Some(Interface::ModelExchange), ..call }
 }
 
-/// Severity of a fault.
+/// Severity of a fault, from which the status follows that the FMI function returns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Severity {
@@ -259,9 +258,9 @@ pub enum Severity {
 /// The reason why a call has failed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// Severity, from which the returned status of the function follows.
+    /// Severity of the fault.
     pub severity: Severity,
-    /// Message for the log, with the function, the variable, and the allowed values.
+    /// Message for the log, which names the function and the variable and states the allowed values.
     pub text: String,
 }
 

@@ -8,23 +8,23 @@
 use crate::call::Interface;
 use crate::number::{is_finite, text};
 
-/// Allowed drift of the clock of a host that accumulates step sizes, as a fraction of the time since the start. After 1e7
-/// steps of 0.1 s the drift of such a clock is 2e-10.
+/// Allowed drift of the clock of a host that adds up its step sizes, as a fraction of the time since the start. After 1e7
+/// steps of 0.1 s the sum has drifted by 2e-10 of its value.
 const DRIFT: f64 = 1e-9;
 
-/// Allowed rounding error of a host's time, relative to the largest number from which the time is computed: 8 to 16 units
-/// in the last place.
+/// Allowed rounding error of a time that the host passes, relative to the largest number from which this time is computed: 8
+/// to 16 units in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// An instant of the simulation, as a model receives it.
+/// An instant of the simulation, as the runtime passes it to a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// Simulation time as the host states it, s, which messages and outputs contain.
+    /// Simulation time that the host has passed, s. Messages and outputs contain this time.
     pub time: f64,
     /// Time since the start of the simulation, s, in Model Exchange. `None` in Co-Simulation, where
     /// the model adds up the step sizes instead.
     pub since_start: Option<f64>,
-    /// Times of the host that differ by less than this, s, count as equal.
+    /// Two times of the host that differ by less than this, s, count as equal, because they may differ by rounding.
     pub resolution: f64,
 }
 
@@ -32,57 +32,51 @@ pub struct Instant {
 pub(crate) struct Clock {
     pub start: f64,
     pub stop: Option<f64>,
-    /// Present simulation time as the host states it, s.
     pub time: f64,
-    /// True in Model Exchange, where the host sets `time`. False in Co-Simulation, where steps advance it.
+    /// True in Model Exchange, where the host sets `time`; false in Co-Simulation, where steps advance it.
     pub is_hosts: bool,
-    /// Time of the last event, s, before which a Model Exchange host may not go back.
+    /// Time of the last event, s. A host of Model Exchange may not go back before it.
     pub last_event: f64,
 }
 
 impl Clock {
-    /// Returns a clock at the time `start`, s. `stop` is the end of the experiment, s, if the host has set one.
     pub fn new(interface: Interface, start: f64, stop: Option<f64>) -> Clock {
         let is_hosts = interface == Interface::ModelExchange;
         Clock { start, stop, time: start, is_hosts, last_event: f64::NEG_INFINITY }
     }
 
-    /// Returns the present instant: the present time and its resolution.
     pub fn now(&self) -> Instant {
         self.at(self.time, 0.0)
     }
 
-    /// Returns the instant at the start of a step of size `h` (s), at the host's time `time` (s).
+    /// Returns the instant at which a step of `h` seconds starts. `time` is the host's time of the start, s.
     pub fn at(&self, time: f64, h: f64) -> Instant {
         let resolution = self.resolution(time).max(self.resolution(time + h));
         let since_start = self.is_hosts.then_some(time - self.start);
         Instant { time, since_start, resolution }
     }
 
-    /// Returns the difference, s, below which two times of the host near `time` count as equal.
     fn resolution(&self, time: f64) -> f64 {
         ROUNDING * self.start.abs().max(time.abs())
     }
 
-    /// Returns the tolerance, s, within which a time near `time` counts as the end of a step of size `h`.
+    /// Returns the tolerance, s, within which a time near `time` counts as the end of a step of `h` seconds.
     fn tolerance(&self, time: f64, h: f64) -> f64 {
         DRIFT * (time - self.start).abs().max(h) + self.resolution(time)
     }
 
-    /// Returns true if two times of the host, s, are equal except for rounding.
     pub fn is_same(&self, a: f64, b: f64) -> bool {
         (a - b).abs() <= self.resolution(a)
     }
 
-    /// Returns true if `time` is finite and before `end` by more than the rounding error.
     pub fn is_before(&self, time: f64, end: f64) -> bool {
         is_finite(time) && time < end - self.resolution(end)
     }
 
-    /// Checks that the host may make a step of size `h`, s, from the time `at`, s.
+    /// Checks that the host may make a step of `h` seconds from its time `at`, s.
     ///
     /// # Errors
-    /// If the step is not allowed; the text is the reason.
+    /// The reason if the step is not allowed, for example because it does not start at the present time.
     #[inline(always)]
     pub fn check_step(&self, at: f64, h: f64) -> Result<(), String> {
         if !(is_finite(h) && h > 0.0) {
@@ -105,11 +99,11 @@ impl Clock {
         }
     }
 
-    /// Checks a time that the host sets. If `goes_back` is true, a time before the last event is allowed, as in FMI 2.0 but
-    /// not in FMI 3.0.
+    /// Checks a time, s, that the host wants to set in Model Exchange. `goes_back` is true if the host may also set times
+    /// before the last event, as in FMI 2.0 but not in FMI 3.0.
     ///
     /// # Errors
-    /// If this time is not allowed; the text is the reason.
+    /// The reason if the time is not allowed.
     pub fn check_time(&self, time: f64, goes_back: bool) -> Result<(), String> {
         if !is_finite(time) {
             return Err(format!("time = {} s (allowed: any finite number)", text(time)));
@@ -124,7 +118,7 @@ impl Clock {
         Ok(())
     }
 
-    /// Returns the stop time, s, if the present time exceeds it by more than the rounding error; otherwise `None`.
+    /// Returns the stop time, s, if the present time is later by more than a rounding error; otherwise `None`.
     pub fn passed_stop(&self) -> Option<f64> {
         self.stop.filter(|stop| self.time > stop + self.tolerance(*stop, 1.0))
     }

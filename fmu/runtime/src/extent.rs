@@ -20,7 +20,7 @@ use crate::model::Model;
 use crate::table::{GUID_LENGTH, Scalar, Table};
 use crate::variable::{Access, Causality, Dimension, Value};
 
-/// Name of the file in the FMU's folder `resources` that contains the start values of a reduced model description.
+/// Name of the file with the start values of a reduced model description, in the folder `resources` of the FMU.
 pub const START_VALUES: &str = "start_values.txt";
 
 const DIGITS: usize = SIZES + 6;
@@ -32,19 +32,19 @@ const SIZES: usize = 3;
 pub struct Extent {
     token: String,
     sizes: Vec<(&'static str, usize)>,
-    /// Indices of the continuous states that the reduced description contains, in the order in which the host reads them. They
-    /// are indices into the model's own state vector, which also has the states of all other tanks and modes.
+    /// Indices of the continuous states that the reduced description contains, in the order in which the host reads them.
+    /// They are indices in the model's state vector, which also has the states of all other tanks and modes.
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
-    /// Start values of inputs that differ from the start values in the table, each with the input's position in the table.
+    /// Start values of inputs that differ from those in the table, each with the position of the input in the table.
     inputs: Vec<(usize, f64)>,
 }
 
 impl Extent {
-    /// Returns the extent for `token`, the GUID or instantiationToken that the host passes, with the start values of the
-    /// table. `whole` is the token of the full description. Returns `None` if `token` does not belong to a reduced
-    /// description of this table.
+    /// Returns the extent of a reduced model description, with the start values of the table. `token` is the GUID or
+    /// instantiationToken that the host passes, and `whole` is that of the full description. Returns `None` if `token` does
+    /// not belong to a reduced description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -85,8 +85,8 @@ impl Extent {
         Some(Extent { token: token.into(), sizes, places, indicators, starts, inputs: Vec::new() })
     }
 
-    /// Reads the start values of the reduced description from the file in the FMU's folder `resources`, if the description
-    /// has such a file.
+    /// Reads the start values of the reduced description from the file [`START_VALUES`] in the folder `resources`. A
+    /// description whose token has no checksum of such a file has the start values of the table.
     ///
     /// # Errors
     /// If the file is missing, belongs to another description, or does not match the table.
@@ -142,34 +142,28 @@ impl Extent {
         Ok(())
     }
 
-    /// Returns the GUID (FMI 2.0) or instantiationToken (FMI 3.0) of the reduced description.
     pub fn token(&self) -> &str {
         &self.token
     }
 
-    /// Returns the indices, in the model's state vector, of the continuous states, in the order in which the host reads them.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
 
-    /// Returns the number of event indicators that the reduced description has.
     pub fn indicators(&self) -> usize {
         self.indicators
     }
 
-    /// Returns the start values of the parameters, in the order of the table.
     pub fn starts(&self) -> &[Value] {
         &self.starts
     }
 
-    /// Returns the start values of inputs that differ from the start values in the table, each with the input's
-    /// position in the table.
     pub fn inputs(&self) -> &[(usize, f64)] {
         &self.inputs
     }
 
-    /// Returns an error if `value`, a number of elements such as tanks or modes, is so large that the reduced description lacks
-    /// the variables of some elements.
+    /// Returns an error message if `value` is a number of tanks or modes for which the reduced description lacks the
+    /// variables of some of them; otherwise `None`.
     pub fn problem<M: Model>(&self, scalar: &Scalar<M>, value: Value) -> Option<String> {
         let (_, most) = self.sizes.iter().find(|(name, _)| *name == scalar.variable.name)?;
         match value {
@@ -183,7 +177,7 @@ impl Extent {
 }
 
 /// Returns how many event indicators of the table belong to elements within `sizes`. `of` is the name of the parameter that
-/// counts the elements with indicators.
+/// counts the elements with indicators ([`Dynamics::INDICATORS_OF`](crate::model::Dynamics::INDICATORS_OF)).
 fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
     let all = table.about.event_indicators;
     let size = sizes.iter().find(|(name, _)| Some(*name) == of);
@@ -194,8 +188,8 @@ fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) 
     }
 }
 
-/// Returns the checksum of a file of start values, which is part of the GUID or token of a reduced
-/// description: four hexadecimal digits.
+/// Returns the checksum of a file of start values, four hexadecimal digits that are part of the token of a reduced
+/// description.
 pub fn checksum(text: &str) -> String {
     // 0 means that there is no file.
     let sum = (Hash::new().bytes(text.as_bytes()).value() & 0xffff).max(1);
@@ -203,8 +197,8 @@ pub fn checksum(text: &str) -> String {
 }
 
 impl<M: Model> Table<M> {
-    /// Returns the name and the largest value of each parameter that determines how many elements arrays have. The order is that
-    /// in which the arrays first use the parameters.
+    /// Returns name and largest value of each parameter that determines how many elements an array has, in the order in which
+    /// the arrays of the table first use these parameters.
     pub fn sizes(&self) -> Vec<(&'static str, usize)> {
         let mut sizes: Vec<(&'static str, usize)> = Vec::new();
         for dimension in self.variables.iter().flat_map(|variable| variable.shape) {
@@ -219,8 +213,8 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if a reduced description with these `sizes` contains this scalar, that is, if no index of the
-    /// scalar exceeds its size.
+    /// Returns true if a reduced description with these `sizes` contains this scalar. `sizes` are the largest values of the
+    /// parameters that count elements, with their names.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {
@@ -232,8 +226,8 @@ impl<M: Model> Scalar<M> {
     }
 }
 
-/// Returns the folder to which a URI points; FMI 2.0 passes the folder of resources in this form: `file:///a%20b`, on
-/// Windows `file:///C:/a`. A path that is not a URI is returned unchanged.
+/// Converts a URI to the path of a folder; for example, FMI 2.0 passes the folder of resources as `file:///a%20b`, and on
+/// Windows as `file:///C:/a`. A path that is not a URI is returned unchanged.
 pub fn folder_of_uri(uri: &str) -> Option<std::path::PathBuf> {
     let Some(rest) = uri.strip_prefix("file:") else {
         return (!uri.is_empty() && !uri.contains("://")).then(|| uri.into());
@@ -270,8 +264,7 @@ mod tests {
         Extent::from_token::<Trays>(&token, whole)
     }
 
-    /// A reduced description's token contains the number of states. The test model has at most
-    /// three trays, each with its level as a state; by default it has two.
+    /// The test model has up to three trays, by default two, and the level of each is a continuous state.
     #[test]
     fn a_token_contains_the_number_of_states() {
         assert_eq!(extent_with("000000000").unwrap().places(), [0_usize; 0]);

@@ -11,7 +11,7 @@ impl Hash {
         Hash(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
 
-    /// Returns the hash of everything that was added so far, followed by `bytes`.
+    /// Returns the hash after the bytes were added.
     pub fn bytes(mut self, bytes: &[u8]) -> Hash {
         for byte in bytes {
             self.0 ^= u128::from(*byte);
@@ -20,7 +20,8 @@ impl Hash {
         self
     }
 
-    /// Returns the hash after appending a text and its end, so that "ab", "c" differs from "a", "bc".
+    /// Returns the hash after the text and a mark of its end were added. Because of the mark, the texts "ab", "c" have
+    /// another hash than "a", "bc".
     pub fn text(self, text: &str) -> Hash {
         self.bytes(text.as_bytes()).bytes(&[0xff])
     }

@@ -22,51 +22,48 @@ use crate::version::Version;
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 /// Range of the relative tolerances of the integration that a host can set.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
-/// Largest allowed magnitude of a continuous state. No realistic motion reaches it; powers and products of larger states could
-/// overflow.
+/// Largest allowed magnitude of a continuous state. No realistic motion reaches it, and powers and products of larger states
+/// could overflow.
 pub const MAX_STATE: f64 = 1e30;
 
-/// An instance of an FMU, for one version of FMI. A clone is a complete saved state, because an instance has no other data.
+/// An instance of an FMU for one version of FMI. A clone of it is a complete saved state, because an instance has no other
+/// data.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Instance<M: Model, V: Version> {
     version: PhantomData<V>,
     pub(crate) interface: Interface,
     pub(crate) events: Events,
-    /// Form of arrays in the model description that the host has read: one variable for each array, or one
-    /// variable for each element.
     pub(crate) layout: Layout,
-    /// Part of the variables that is in the model description that the host has read; `None` if it contains all.
     pub(crate) extent: Option<Arc<Extent>>,
     pub(crate) state: InstanceState,
     pub(crate) clock: Clock,
     pub(crate) tolerance: f64,
-    /// Values of the parameters in the order of the table. They may be outside their ranges, because they are checked at the
-    /// end of initialization mode.
+    /// Values of the parameters in the order of the table. They may be outside their ranges until the end of initialization
+    /// mode, where they are checked.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
     pub(crate) sloped: bool,
-    /// True from the end of a step with linearly changing inputs until an input is set. While it is true, the inputs keep the
-    /// slopes of this step, so that outputs are limits from the left.
+    /// True from the end of a step in which inputs changed linearly until an input is set. During this time the inputs keep
+    /// the slopes of the step, so that outputs are limits from the left.
     pub(crate) past_slopes: bool,
-    /// The model. It is created when it is first needed in initialization mode, and dropped if a parameter or input is set
-    /// before the simulation starts.
+    /// The model, which is created when a call first needs it in initialization mode. It is dropped if a parameter or input
+    /// is set before the simulation starts.
     pub(crate) model: Option<M>,
-    /// The last computed outputs; `known` says which of them are valid at the present instant.
+    /// The outputs that were computed last. `known` says which of them are valid at the present instant.
     pub(crate) outputs: Option<M::Outputs>,
     pub(crate) known: Known,
-    /// Values of the discrete outputs, by slot, as the host saw them when it was last in event mode. They are needed if
-    /// events are handled as [`Events::Reported`]. Empty until initialization has ended; before that, discrete outputs are
-    /// computed like all other outputs.
+    /// Values of the discrete outputs that the host saw when it was last in event mode, by slot. They are needed if events
+    /// are handled as [`Events::Reported`]. The list is empty until initialization has ended; until then, discrete outputs
+    /// are computed like all other outputs.
     pub(crate) shown: Vec<i32>,
     scratch: [Vec<f64>; 2],
 }
 
-/// Part of the stored outputs that is valid at the present instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     Nothing,
-    /// Only integers, enumerations and Booleans are valid.
+    /// Integers, enumerations and Booleans are valid, but real outputs are not.
     Discrete,
     All,
 }
@@ -110,7 +107,7 @@ impl<M: Model> ExactSizeIterator for Places<M> {}
 /// Result of a step that may stop at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepInfo {
-    /// True if there is an event that must be handled.
+    /// True if the host must handle an event now.
     pub event: bool,
     /// True if the step has stopped at an event before its end.
     pub early: bool,
@@ -152,8 +149,8 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
 }
 
 impl<M: Model, V: Version> Instance<M, V> {
-    /// Creates an instance for a host that does not choose who handles events. In Model Exchange the host handles them, in
-    /// Co-Simulation the FMU does so within its steps.
+    /// Creates an instance for a host that does not choose who handles events: in Model Exchange the host handles them, in
+    /// Co-Simulation the FMU within its steps.
     pub fn new(interface: Interface) -> Self {
         Instance::with_events(interface, V::events(interface))
     }
@@ -182,7 +179,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Restricts a new instance to the variables of a reduced model description.
+    /// Restricts a new instance to the variables of a reduced model description; `None` keeps all variables.
     pub fn with_extent(mut self, extent: Option<Arc<Extent>>) -> Self {
         if let Some(extent) = &extent {
             self.parameters = extent.starts().to_vec();
@@ -210,7 +207,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.interface
     }
 
-    /// Checks that a call is allowed in the present state.
+    /// Checks that the present state of the instance allows a call, and returns the call.
     ///
     /// # Errors
     /// If the call is not allowed.
@@ -225,26 +222,28 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state
     }
 
-    /// Returns the present simulation time, s: the end of the last step, or in Model Exchange the time that
-    /// the host has set.
+    /// Returns the simulation time, s: the end of the last step, or in Model Exchange the time that the host has set.
     pub fn time(&self) -> f64 {
         self.clock.time
     }
 
-    /// Makes the instance unusable after a panic, because its values may be wrong: every further call
-    /// except freeing is refused.
+    /// Makes the instance unusable after a panic, because its values may be wrong. Every further call is refused, except the
+    /// call that frees the instance.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
     }
 
-    /// Changes the instance state after a failed call in versions of FMI that require this.
     pub(crate) fn after_error(&mut self) {
         if let Some(state) = V::AFTER_ERROR.filter(|_| self.state != InstanceState::Fatal) {
             self.state = state;
         }
     }
 
-    /// Sets tolerance, start time and stop time (s), each `None` if the host has not set it.
+    /// Sets the tolerance of the integration and the start and stop time of the experiment, s. `None` stands for a value that
+    /// the host has not set.
+    ///
+    /// # Errors
+    /// If a value is not allowed; the message names all wrong values.
     pub fn setup_experiment(
         &mut self,
         tolerance: Option<f64>,
@@ -277,7 +276,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Enters initialization mode, from which on all variables can be read.
+    /// Enters initialization mode. From then on the host can read all variables.
     pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
         self.check(V::ENTER_INITIALIZATION)?;
         self.state = InstanceState::Initialization;
@@ -287,7 +286,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Leaves initialization mode, so that the simulation can start.
     ///
     /// # Errors
-    /// If parameters are not allowed. This is the last call that checks all parameters.
+    /// If parameters are not allowed; the message names all problems.
     pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::EXIT_INITIALIZATION)?;
         self.outputs(call)?;
@@ -305,8 +304,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
     }
 
-    /// Returns the warnings at the start of the simulation. In addition to those of [`Model::warnings`] there is one warning
-    /// for each reason ([`Model::overridden`]) why parameters that differ from their start values have no effect.
+    /// Returns the warnings at the start of the simulation: those of the model
+    /// ([`Dynamics::warnings`](crate::model::Dynamics::warnings)), and one for each reason why parameters that differ from
+    /// their start values have no effect ([`Dynamics::overridden`](crate::model::Dynamics::overridden)).
     pub fn warnings(&self) -> Vec<String> {
         let Some(model) = &self.model else { return Vec::new() };
         let parameters = self.given_parameters();
@@ -326,7 +326,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 None => reasons.push((why, vec![scalar.name()])),
             }
         }
-        /// Largest number of parameter names in one message, so that the reason remains visible.
+        // A message with more names would hide its reason.
         const NAMED: usize = 6;
         warnings.extend(reasons.into_iter().map(|(why, names)| {
             let verb = if names.len() == 1 { "has" } else { "have" };
@@ -356,8 +356,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Resets the instance to its state after instantiation: all parameters and inputs have their start values again. The
-    /// layout of arrays and the reduced model description do not change.
+    /// Resets the instance to its state after instantiation, in which all parameters and inputs have their start values. The
+    /// layout of arrays and the reduced model description stay the same.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
         let (layout, extent) = (self.layout, self.extent.take());
@@ -366,13 +366,17 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns the value of a variable, for the function `call` of the FMI version.
+    /// Returns the value of the variable with the value reference `reference`. `call` is the function with which the host
+    /// reads it.
+    ///
+    /// # Errors
+    /// If the call is not allowed now, or if the variable does not exist, has another type or has no value.
     pub fn get(&mut self, call: &'static Call, reference: u32) -> Result<Value, Fault> {
         let call = self.check(call)?;
         self.value(call, reference)
     }
 
-    /// Returns the value of a variable, for a call that was already checked.
+    /// Returns the value of a variable as [`Instance::get`] does, for a call that was already checked.
     #[inline(always)]
     pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
         let scalar = scalar::<M, V>(call, reference)?;
@@ -442,7 +446,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// Sets several values, for the function `call` of the FMI version. If one value is refused, no value is set.
+    /// Sets several variables: element n of `references` gets `value(n)`. `call` is the function with which the host sets
+    /// them.
+    ///
+    /// # Errors
+    /// If one of the values is refused; then no variable is set.
     #[inline]
     pub fn set(
         &mut self,
@@ -473,8 +481,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets all elements of the variables for which `meant` returns true to their start values. Returns those variables of which
-    /// at least one element had another value, in the order of the table.
+    /// Sets the variables for which `meant` returns true to their start values. Returns those of them that had another value,
+    /// in the order of the table.
     pub(crate) fn restart(
         &mut self,
         meant: impl Fn(&Variable<M>) -> bool,
@@ -504,15 +512,15 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns true if a discrete value in the model differs from the value that the host reads, because the host's value changes
-    /// only in event mode.
+    /// Returns true if a discrete output of the model differs from the value that the host reads, because the host's value
+    /// changes only in event mode.
     fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
         let outputs = *self.discrete_outputs(call)?;
         let mut all = M::table().discrete().zip(&self.shown);
         Ok(all.any(|(scalar, shown)| discrete(scalar, &outputs) != *shown))
     }
 
-    /// Sets an input or a parameter, and drops all results that depend on it.
+    /// Stores the value of an input or a parameter, and drops all results that depend on it.
     #[inline(always)]
     fn store(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
@@ -586,8 +594,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Returns true if the host may set single continuous states now. This is allowed in Model Exchange, in event
-    /// mode and continuous-time mode.
+    /// Returns true if the host may set single continuous states now, that is, in event mode and continuous-time mode of
+    /// Model Exchange.
     fn takes_states(&self) -> bool {
         self.interface == Interface::ModelExchange
             && matches!(self.state, InstanceState::Event | InstanceState::Continuous)
@@ -638,8 +646,11 @@ impl<M: Model, V: Version> Instance<M, V> {
             .map_err(|problems| call.error(problems.join("; ")))
     }
 
-    /// Sets slopes of inputs (unit of the input per s) for the next step, in which the inputs change linearly; after this
-    /// step they are constant again. `orders` must be 1, because higher derivatives are not supported.
+    /// Sets the slopes with which inputs change during the next step, in the unit of the input per second. After this step
+    /// the inputs are constant again. `orders` must all be 1, because higher derivatives are not supported.
+    ///
+    /// # Errors
+    /// If an order or a slope is not allowed; then no slope is set.
     pub fn set_input_derivatives(
         &mut self,
         references: &[u32],
@@ -664,7 +675,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes time derivatives of variables, with the slopes of inputs that are set for the next step.
+    /// Computes the time derivatives of the variables `references` and writes them to `answers`. The inputs have the slopes
+    /// that are set for the next step. `orders` must all be 1.
     pub fn output_derivatives(
         &mut self,
         references: &[u32],
@@ -697,8 +709,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, references, &along, answers)
     }
 
-    /// Computes the derivative of `unknowns` for a change of `knowns` by `direction`. Knowns are inputs and continuous
-    /// states; in initialization mode, before the initial state is computed, they are inputs and real parameters.
+    /// Computes the directional derivative of the variables `unknowns` for a change of the variables `knowns` by `direction`,
+    /// and writes it to `answers`. Knowns are inputs and continuous states. In initialization mode, before the initial state
+    /// is computed, they are inputs and real parameters.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -730,8 +743,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, unknowns, &along, answers)
     }
 
-    /// Computes the derivatives of the unknowns for a change of the states by the first scratch vector and of the inputs by
-    /// the slopes in `along`.
+    /// Computes the directional derivatives of the unknowns and writes them to `answers`. The states change by the first
+    /// scratch vector, and the inputs by the slopes in `along`.
     fn derivatives_along(
         &mut self,
         call: &Call,
@@ -771,10 +784,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         done
     }
 
-    /// Returns the value references of the variables on which a variable depends. Before the simulation starts, these are
-    /// the dependencies of its initial value. Afterwards they are those declared inputs and states that have an effect at
-    /// present, which depends for example on stick or slip and on the selected models. If a derivative is zero at the
-    /// present point but not nearby, the dependency counts as well.
+    /// Returns the value references of the variables on which a variable depends. Before the simulation starts, these are the
+    /// dependencies of its initial value. Afterwards they are those of the declared inputs and states that have an effect at
+    /// present, which can depend for example on the selected models, or on whether the hub sticks. A dependency whose
+    /// derivative vanishes only at the present point counts as well.
     pub(crate) fn dependencies(
         &mut self,
         call: &Call,
@@ -818,8 +831,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(found.map(|(known, _)| V::reference(known)).collect())
     }
 
-    /// Changes states and inputs by up to `share` of their nominal values; each `point` gives other changes. Derivatives at such
-    /// nearby points show which dependencies vanish only at the present point.
+    /// Changes all states and inputs by up to `share` of their nominal values; each number `point` gives another change. The
+    /// derivatives at such nearby points show which dependencies vanish only at the present point.
     fn move_aside(&mut self, share: f64, point: u64) {
         // Multiples of the golden ratio fill the interval uniformly.
         let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;
@@ -847,9 +860,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.known = Known::Nothing;
     }
 
-    /// Computes derivatives in initialization mode by central differences with Richardson extrapolation, between
-    /// instances with different start values. Each known is changed by a thousandth of its value, or of its nominal value
-    /// if this is larger.
+    /// Computes the directional derivative of the `unknowns` in initialization mode and writes it to `answers`. It uses
+    /// central differences with Richardson extrapolation between instances with different start values, because there are no
+    /// equations for derivatives with respect to parameters. Each known is changed by about a thousandth of its value, or of
+    /// its nominal value if that is larger.
     fn initial_derivative(
         &self,
         call: &Call,
@@ -898,15 +912,20 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Makes a step of size `h` from the time `at`, both in s. It allocates no memory unless it fails.
+    /// Makes a step of `h` seconds from the host's time `at`, s. The step allocates no memory unless it fails.
+    ///
+    /// # Errors
+    /// If the step is not allowed or the model cannot compute it.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
         let call = self.check(V::DO_STEP)?;
         self.step_by(call, at, h, |model, inputs| model.step(inputs, h).map(|()| StepEnd::End))?;
         Ok(())
     }
 
-    /// Makes a step as [`Instance::do_step`] does, for a host that handles events between steps. If `stops` is true, the
-    /// step stops at the first event.
+    /// Computes the directional derivatives of the unknowns in initialization mode and writes them to `answers`. It uses
+    /// central differences with Richardson extrapolation between instances with different start values, because there are no
+    /// equations for derivatives with respect to parameters. The step is so short that each known changes by at most some
+    /// thousandths of its value, or of its nominal value if its value is 0.
     #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
@@ -938,8 +957,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
 
-    /// Returns an error if a step of size `h` from the time `at`, both in s, is never valid, for example because its size is
-    /// negative or because it does not begin at the present time.
     #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         self.clock.check_step(at, h).map_err(|why| call.error(why))
@@ -1015,7 +1032,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state = InstanceState::Intermediate;
     }
 
-    /// Leaves the state of an intermediate update.
+    /// Ends an intermediate update, in which the host could call functions of the FMU.
     ///
     /// # Errors
     /// If a call that the host made during the intermediate update has failed.
@@ -1054,8 +1071,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets the inputs at the end of a step to exactly the values that the host gave for this instant, because values that are
-    /// computed from the slopes differ by rounding.
+    /// Sets the inputs `references` to exactly the values `ends` that the host gave for the end of the step. The values that
+    /// follow from the slopes differ from them by rounding.
     pub(crate) fn end_ramps(&mut self, references: &[u32], ends: &M::Inputs) {
         let mut ends = *ends;
         for reference in references {
@@ -1078,7 +1095,6 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Enters event mode, in which the host may change discrete inputs and handle events.
     ///
     /// # Errors
-    ///
     /// If the present state does not allow it.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_EVENT)?;
@@ -1090,8 +1106,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Handles all events that are due. One call is enough; repeated calls, for example after other inputs,
-    /// have no further effect.
+    /// Handles all events that are due. A second call at the same instant has no effect unless the inputs have changed.
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
         let call = self.check(V::NEW_DISCRETE_STATES)?;
         if self.events == Events::Reported {
@@ -1105,8 +1120,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
-    /// Handles events whose effects were already computed within the step: applies the changes that the present inputs cause, and
-    /// lets the host read the new values of all discrete outputs.
+    /// Handles events that steps have already handled within the model. Applies the discrete changes that the present inputs
+    /// cause, and lets the host see the new values of all discrete outputs.
     fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
         let inputs = self.inputs;
         let now = self.clock.now();
@@ -1120,19 +1135,20 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed: false, next_time })
     }
 
-    /// Enters or leaves configuration mode, in which structural parameters can be set.
+    /// Enters or leaves configuration mode, in which structural parameters can be set: `to` is the new state.
     ///
     /// # Errors
-    ///
-    /// If the present state does not allow it.
+    /// If the present state does not allow `call`.
     pub fn configure(&mut self, call: &'static Call, to: InstanceState) -> Result<(), Fault> {
         self.check(call)?;
         self.state = to;
         Ok(())
     }
 
-    /// Leaves event mode, so that steps can follow. `call` is the function of the FMI version, which determines the states
-    /// in which this is allowed.
+    /// Leaves event mode, so that steps can follow.
+    ///
+    /// # Errors
+    /// If the present state does not allow `call`.
     pub fn enter_step_mode(&mut self, call: &'static Call) -> Result<(), Fault> {
         self.check(call)?;
         self.state = InstanceState::Stepping;
@@ -1142,7 +1158,6 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// Enters continuous-time mode, in which the host integrates.
     ///
     /// # Errors
-    ///
     /// If the present state does not allow it.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_CONTINUOUS_TIME)?;
@@ -1151,7 +1166,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Checks the states after a step of the host's integrator. Returns true if an event must be handled now.
+    /// Checks the states after the integrator of the host has completed a step. Returns true if an event must be handled now.
+    ///
+    /// # Errors
+    /// If the states are not valid, or the step has passed the stop time.
     pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
         let call = self.check(V::COMPLETED_STEP)?;
         let time = self.clock.time;
@@ -1168,8 +1186,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// Sets the simulation time, s, in Model Exchange. In FMI 2.0 a host may go back to any time, in FMI 3.0 only to the
-    /// last event. A time that is NaN or infinite is refused.
+    /// Sets the simulation time, s, in Model Exchange. In FMI 2.0 a host may go back to any time, in FMI 3.0 only to the last
+    /// event.
+    ///
+    /// # Errors
+    /// If the time is not finite or not allowed.
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
         let call = self.check(V::SET_TIME)?;
         self.clock.check_time(time, !V::SETS_STATES).map_err(|why| call.error(why))?;
@@ -1182,8 +1203,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets the continuous states. If a state is NaN, infinite or larger than [`MAX_STATE`], the call is discarded, because
-    /// the integrator should then try a smaller step.
+    /// Sets the continuous states (Model Exchange).
+    ///
+    /// # Errors
+    /// If a state is NaN, infinite or larger than [`MAX_STATE`]. The call is then discarded, because the integrator of the
+    /// host should try a smaller step.
     pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
         let call = self.check(V::SET_CONTINUOUS_STATES)?;
         if let (Some(_), Some(model)) = (&self.extent, &self.model) {
@@ -1211,8 +1235,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Reads the continuous states in the order of the derivatives in the model description. The array must have as many
-    /// elements as there are states.
+    /// Writes the continuous states to `states`, in the order of the derivatives in the model description.
+    ///
+    /// # Errors
+    /// If `states` does not have one element for each state.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_CONTINUOUS_STATES)?;
         let places = self.places();
@@ -1224,8 +1250,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes the derivatives of the states. If a derivative is NaN or infinite, the call is discarded, because the
-    /// integrator should then try a smaller step.
+    /// Writes the derivatives of the continuous states to `derivatives`.
+    ///
+    /// # Errors
+    /// If a derivative is NaN or infinite. The call is then discarded, because the integrator of the host should try a
+    /// smaller step.
     pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_DERIVATIVES)?;
         let places = self.places();
@@ -1249,8 +1278,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes the event indicators, each of which changes its sign at an event. If an indicator is NaN or infinite, the
-    /// call is discarded, because the host should then try a smaller step.
+    /// Writes the event indicators, each of which changes its sign at an event, to `indicators`.
+    ///
+    /// # Errors
+    /// If an indicator is NaN or infinite. The call is then discarded, because the host should try a smaller step.
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_EVENT_INDICATORS)?;
         let count = match &self.extent {
@@ -1284,7 +1315,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
-    /// Reads the nominal values of the states.
+    /// Writes the nominal values of the continuous states to `nominals`. Hosts scale their tolerances by them.
     pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_NOMINALS)?;
         let places = self.places();
@@ -1297,10 +1328,10 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     // ---- Saved states, and the model ----
 
-    /// Restores a saved state.
+    /// Restores the saved state `saved`.
     ///
     /// # Errors
-    /// If the saved state belongs to an instance with another interface, handling of events, or set of variables.
+    /// If it belongs to an instance with another interface, another handling of events, or another set of variables.
     pub fn restore(&mut self, saved: &Self) -> Result<(), Fault> {
         let call = self.check(V::SET_STATE)?;
         if saved.interface != self.interface {
@@ -1320,7 +1351,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns an error if the model description of the saved instance has other variables.
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout != self.layout {
             return Err(call.error(
@@ -1375,7 +1405,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 
-    /// Returns the parameters that the host has set, in the model's type. Their values are not checked.
+    /// Returns the parameters in the model's own type, without a check of their values.
     fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
@@ -1401,7 +1431,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns outputs of which at least the integers, enumerations and Booleans are valid.
+    /// Returns the outputs, of which at least integers, enumerations and Booleans are valid at the present instant.
     fn discrete_outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
         let Instance { events, model, inputs, outputs, known, .. } = self;
         if *known == Known::Nothing
@@ -1449,8 +1479,8 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 }
 
-/// Evaluates the function `question` of the model. If the FMU handles events within its steps, the changes that the present
-/// inputs cause are applied before and reverted afterwards. If the host handles events, they are not applied.
+/// Evaluates the function `question` of the model. If the FMU handles events within its steps, the discrete changes that the
+/// present inputs cause are applied before and undone afterwards. If the host handles events, they are not applied.
 #[inline(always)]
 fn query_model<M: Model, T>(
     events: Events,
@@ -1517,8 +1547,8 @@ fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
     ))
 }
 
-/// Advances the inputs along their slopes by `h` seconds, within their ranges. The value of `h` has the error `resolution`,
-/// s, because it comes from the host.
+/// Moves the inputs along their slopes by `h` seconds, and checks that they stay within their ranges. The host's times, from
+/// which `h` is computed, have the error `resolution`, s.
 #[inline(always)]
 fn follow_slopes<M: Model>(
     call: &Call,
@@ -1551,8 +1581,9 @@ fn hold_inputs<M: Model>(inputs: &mut M::Inputs) {
     }
 }
 
-/// Returns the value of an input after `h` seconds. If it is below its smallest allowed value only by rounding of slope,
-/// value and time, it is set to this value.
+/// Returns the value of an input after `h` seconds on its slope. A value that is below the smallest allowed value only by
+/// rounding is set to the smallest allowed value. `resolution`, s, is the rounding error of the host's times, from which `h`
+/// is computed.
 #[inline]
 fn end_of_ramp<M: Model>(
     scalar: &Scalar<M>,
@@ -1635,7 +1666,6 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
     Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
 }
 
-/// Finds the scalar of a value reference. Its type must be that of the call.
 #[inline]
 fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
     V::scalar(reference, call.c_type).map_err(|why| call.error(why))
@@ -1648,8 +1678,9 @@ mod tests {
     use crate::tests::trays::Trays;
     use crate::v3::Fmi3;
 
-    /// Dependencies are tested at nearby points: states with the nominal value 5 m and inputs with the nominal value 4 m/s
-    /// are changed by up to a hundredth of these values. Inputs are only increased, and stay within their ranges.
+    /// The function moves states with the nominal value 5 m and inputs with the nominal value 4 m/s by up to a hundredth of
+    /// these values, so that dependencies can be tested at nearby points. Inputs are only increased, and stay within their
+    /// ranges.
     #[test]
     fn nearby_points_for_differences_move_every_state_and_input_by_a_share_of_its_size() {
         let moved = |share: f64, point: u64, q: f64| {

@@ -4,18 +4,18 @@
 //! [`variable`] and [`table`] define the variables of a model, [`call`] the instance states in which functions are allowed,
 //! and [`instance`] the effects of calls. [`snapshot`] serialises saved states, and [`log`] selects messages for the host's
 //! log. The trait [`version::Version`] contains the differences between versions of FMI. Each version is one module ([`v2`],
-//! [`v3`]) with its C interface, on top of the common [`c_abi`]. Only these modules contain unsafe code.
+//! [`v3`]) with its C interface, on top of the common `c_abi`. Only these modules contain unsafe code.
 //!
 //! An FMU is a crate with a table, an implementation of [`Model`] and two lines:
 //! `runtime::export_fmi2!(TheModel);` and `runtime::export_fmi3!(TheModel);`.
 
 #![warn(missing_docs)]
 
-pub mod c_abi;
+mod c_abi;
 pub mod call;
 pub mod clock;
 pub mod dynamics;
-pub mod extent;
+mod extent;
 pub mod hash;
 pub mod instance;
 pub mod log;

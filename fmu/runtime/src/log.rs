@@ -15,7 +15,7 @@ use crate::version::Version;
 #[allow(missing_docs)]
 pub enum Topic {
     Event,
-    /// A parameter or state is outside the range in which the model was verified.
+    /// A parameter, input or state is outside the range in which the model was verified.
     Warning,
     Failure(Severity),
 }
@@ -26,7 +26,7 @@ pub enum Topic {
 pub struct Category {
     pub name: &'static str,
     pub description: String,
-    /// Topic of the messages; `None` for all topics.
+    /// Topic of the messages in this category; `None` for a category that contains all topics.
     pub topic: Option<Topic>,
 }
 
@@ -43,7 +43,7 @@ fn category_names<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option
     if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
 }
 
-/// Returns the log categories of a model, with the descriptions that a version of FMI needs.
+/// Returns the log categories of the model to which `table` belongs, with descriptions for the FMI version `V`.
 pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     let description = |topic| match topic {
         Some(Topic::Event) => table.about.events.into(),
@@ -65,7 +65,7 @@ pub fn category(topic: Topic) -> &'static str {
     NAMES.iter().find(|(_, of)| *of == Some(topic)).map_or("logAll", |(name, _)| name)
 }
 
-/// Selection of the messages of one instance.
+/// The messages of one instance that are passed to the host's log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
     events: bool,
@@ -76,7 +76,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Failures and warnings, which is the selection of a new instance.
+    /// Failures and warnings but no events. A new instance starts with this selection.
     pub const FAILURES: Filter =
         Filter { events: false, warning: true, discard: true, error: true, fatal: true };
     /// All messages.
@@ -85,18 +85,18 @@ impl Filter {
     pub const NONE: Filter =
         Filter { events: false, warning: false, discard: false, error: false, fatal: false };
 
-    /// Only the reasons of failed calls.
+    /// The reasons of failed calls, without warnings and events.
     pub const ERRORS: Filter = Filter { warning: false, ..Filter::FAILURES };
 
-    /// Returns the selection with failures added.
+    /// Returns this selection with the reasons of failed calls added.
     pub fn with_errors(self) -> Filter {
         Filter { discard: true, error: true, fatal: true, ..self }
     }
 
-    /// Returns the selection of messages in the log categories `names`; an empty list selects all messages.
+    /// Returns the selection of messages in the log categories `names`. An empty list selects all messages.
     ///
     /// # Errors
-    /// If names are unknown; the text contains them and the known names.
+    /// If a category is unknown; the text lists the unknown and the known categories.
     pub fn from_categories<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
         let known = category_names(table);
         if names.is_empty() {
@@ -118,7 +118,7 @@ impl Filter {
         Err(format!("unknown log category {}; known: {}", unknown.join(", "), known.join(", ")))
     }
 
-    /// Returns true if messages on this topic are logged.
+    /// Returns true if messages on `topic` are passed to the host's log.
     pub fn wants(mut self, topic: Topic) -> bool {
         *self.switch(topic)
     }

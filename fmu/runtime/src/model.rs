@@ -4,15 +4,15 @@ pub use crate::dynamics::{Dynamics, Instant, StepEnd, StepFailure};
 use crate::table::{Scalar, Table};
 use crate::variable::Causality;
 
-/// [`Dynamics`] with the table of their variables.
+/// [`Dynamics`] with the table of its variables.
 pub trait Model: Dynamics {
     /// Returns the table of variables and further contents of the model description.
     fn table() -> &'static Table<Self>;
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns the inputs and continuous states on which the variable depends without delay, for the element ModelStructure
-    /// of the model description.
+    /// Returns the inputs and continuous states on which the value of this variable depends without delay. The element
+    /// ModelStructure of the model description lists them.
     pub fn depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
         let known = M::table()
             .scalars
@@ -21,8 +21,8 @@ impl<M: Model> Scalar<M> {
         known.filter(|s| self.names(self.variable.depends_on, s))
     }
 
-    /// Returns the inputs and parameters on which the initial value of the variable depends, for the element ModelStructure
-    /// of the model description.
+    /// Returns the inputs and parameters on which the initial value of this variable depends. The element ModelStructure of
+    /// the model description lists them.
     pub fn initial_depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
         let known = M::table()
             .scalars

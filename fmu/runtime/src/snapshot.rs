@@ -41,7 +41,7 @@ const HAS_SLOPES: u8 = 4;
 const HAS_PAST_SLOPES: u8 = 8;
 const HAS_SHOWN: u8 = 16;
 
-/// Returns the number of bytes of a serialised state, which is the same for all states of a model.
+/// Returns the number of bytes of a saved state, which is the same for all states of a model.
 pub fn size<M: Model>() -> usize {
     let table = M::table();
     let head = 8 + 4 + 4 + 38 + 4 + 5 * 8;
@@ -50,7 +50,7 @@ pub fn size<M: Model>() -> usize {
     head + set + table.about.saved_words * 8 + 16
 }
 
-/// Returns a saved state as bytes, which another process can read.
+/// Converts a saved state to bytes. [`from_bytes`] restores it from them, also in another process.
 pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     let (table, size) = (M::table(), size::<M>());
     let mut bytes = Vec::with_capacity(size);
@@ -103,10 +103,10 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     bytes
 }
 
-/// Restores a saved state from bytes.
+/// Restores a saved state from the bytes that [`to_bytes`] has written.
 ///
 /// # Errors
-/// If the bytes are not a saved state of this model; the text is the reason.
+/// The reason if the bytes are not a saved state of this model, or are damaged.
 pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, String> {
     let (table, size) = (M::table(), size::<M>());
     let model = table.about.model;
@@ -235,8 +235,8 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(format!("the saved state is damaged: {what}")) }
     }
 
-    /// Reads the value of a parameter from a saved state. Its type must be the type of `like`. It may be outside the parameter's
-    /// range, because a state can be saved before the end of initialization mode.
+    /// Reads the value of a parameter, whose type is the type of `like`. A value outside the parameter's range is accepted,
+    /// because a state can be saved before the parameters are checked at the end of initialization mode.
     fn value<M: Model>(&mut self, scalar: &Scalar<M>, like: Value) -> Result<Value, String> {
         let bytes = self.take()?;
         let number = i32::try_from(i64::from_le_bytes(bytes));

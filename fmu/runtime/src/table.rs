@@ -15,20 +15,20 @@ use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Va
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub struct About {
-    /// Name of the FMU: modelName, modelIdentifier and file name.
+    /// Name of the FMU, from which modelName, modelIdentifier and the name of the file are made.
     pub model: &'static str,
     /// Version of the model and its table.
     pub version: &'static str,
     pub description: &'static str,
-    /// Description of events for the log; "" without events.
+    /// Description of the log category for events; "" if the model has no events.
     pub events: &'static str,
     pub event_indicators: usize,
     /// Number of 64-bit words that [`Dynamics::save`] writes for a saved state.
     pub saved_words: usize,
 }
 
-/// All data about the variables of a model. The table uses no heap memory, so that a host may load and unload the FMU
-/// any number of times.
+/// The variables of a model. The table uses no memory on the heap, so that a host may load and unload the FMU any number of
+/// times.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Table<M: Dynamics> {
@@ -43,14 +43,14 @@ pub struct Table<M: Dynamics> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// Layout of the variables in the model description: one variable for each element of an array, or one for each array.
+/// Form of arrays in the model description that the host has read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Layout {
-    /// Each element of an array is a variable.
+    /// Each element of an array is a variable of its own.
     Scalars = 0,
-    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that determine
-    /// array sizes are structural.
+    /// Each entry of the table is one variable, with dimensions if it is an array. Then the integer parameters that determine
+    /// the lengths of arrays are structural.
     Arrays = 1,
 }
 
@@ -59,10 +59,10 @@ impl Layout {
     pub const ALL: [Layout; 2] = [Layout::Scalars, Layout::Arrays];
 }
 
-/// Length of a GUID with braces.
+/// Number of characters of a GUID with its braces.
 pub const GUID_LENGTH: usize = 38;
 
-/// Joins parts of a table. `N` is the number of all variables.
+/// Joins parts of a table to one array, at compile time. `N` is the total number of variables.
 ///
 /// # Panics
 /// If the parts together do not have `N` variables.
@@ -81,11 +81,11 @@ pub const fn join<M: Dynamics, const N: usize>(parts: &[&[Variable<M>]]) -> [Var
     all
 }
 
-/// Range of consecutive scalars in the table: the index of the first scalar, and the index after that of the last scalar.
+/// Range of consecutive scalars in the table: the index of the first scalar, and the index after the last one.
 type Span = (usize, usize);
 
-/// Returns the range of indices of one kind of scalars: 'i' for inputs, 'p' for parameters, any
-/// other character for derivatives.
+/// Returns the range of all scalars of one `kind`: 'i' stands for inputs, 'p' for parameters, and any other character for
+/// derivatives of states. Scalars of one kind must be adjacent in the table.
 const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
     let (mut begin, mut end, mut n) = (0, 0, 0);
     while n < scalars.len() {
@@ -114,19 +114,20 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
     pub variable: &'static Variable<M>,
-    /// Access of the entry in the table, copied to each of its scalars because every call needs it.
+    /// Access functions of the table's entry, copied to each of its scalars because every call needs them.
     pub access: Access<M>,
-    /// C type in which the scalar is read and set, copied from the entry in the table because every call needs it.
+    /// C type in which the host gets and sets the scalar, copied because every call needs it.
     pub c_type: CType,
-    /// For a continuous state, the function that returns its number in the model. It is copied from the entry in the table,
-    /// because every call needs it.
+    /// For a continuous state, the function that returns its index in the model's state vector, copied because every call
+    /// needs it.
     pub state: Option<Place>,
-    /// Index among all scalars, from which the value reference follows (see [`Version`](crate::version::Version)).
+    /// Position among all scalars of the table. The value reference follows from it (see
+    /// [`Version`](crate::version::Version)).
     pub index: u32,
-    /// Number of the element in its array, 0 for the first.
+    /// Number of the element in its array; 0 for the first element and for a scalar.
     pub element: usize,
-    /// Index of the scalar's value in the instance. For a parameter it is the number of scalar parameters before it in the
-    /// table, and for a discrete output the number of discrete outputs before it.
+    /// Index under which the instance stores the value. For a parameter it is the number of scalar parameters before it in
+    /// the table, and for a discrete output the number of discrete outputs before it.
     pub slot: usize,
 }
 
@@ -138,7 +139,7 @@ impl<M: Dynamics> Clone for Scalar<M> {
 }
 impl<M: Dynamics> Copy for Scalar<M> {}
 
-/// Returns the number of scalars of a table.
+/// Returns the number of scalars that the entries of a table have together.
 pub const fn scalar_count<M: Dynamics>(variables: &[Variable<M>]) -> usize {
     let (mut count, mut entry) = (0, 0);
     while entry < variables.len() {
@@ -148,7 +149,7 @@ pub const fn scalar_count<M: Dynamics>(variables: &[Variable<M>]) -> usize {
     count
 }
 
-/// Returns all scalars of a table; N is [`scalar_count`].
+/// Lists the scalars of a table, at compile time. `N` must be the number that [`scalar_count`] returns.
 pub const fn scalars<M: Dynamics, const N: usize>(
     variables: &'static [Variable<M>],
 ) -> [Scalar<M>; N] {
@@ -200,7 +201,7 @@ impl<M: Dynamics> Scalar<M> {
         self.variable.element_name(self.element)
     }
 
-    /// Returns the number of the continuous state in the model, if this scalar is a continuous state.
+    /// Returns the index of the scalar in the model's state vector; `None` if the scalar is not a continuous state.
     #[inline]
     pub fn state(&self) -> Option<usize> {
         self.state.map(|place| place(self.element))
@@ -218,8 +219,8 @@ impl<M: Dynamics> Scalar<M> {
         self.variable.start(&mut parameters, &mut inputs, self.element)
     }
 
-    /// Returns true if the list of dependencies `names` contains the scalar `other`. The list may contain
-    /// names of whole arrays.
+    /// Returns true if `names`, a list of dependencies of this scalar, contains the scalar `other`. A list may contain names
+    /// of whole arrays.
     pub(crate) fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {
@@ -234,7 +235,7 @@ impl<M: Dynamics> Scalar<M> {
 }
 
 impl<M: Dynamics> Table<M> {
-    /// Creates a model's table from the declared variables and their scalars.
+    /// Creates the table of a model from its entries `variables` and their `scalars` (see [`scalars`]).
     pub const fn new(
         about: About,
         variables: &'static [Variable<M>],
@@ -252,13 +253,13 @@ impl<M: Dynamics> Table<M> {
         }
     }
 
-    /// Finds a scalar by its name and returns its index, which is its value reference in FMI 2.0.
+    /// Returns the index of the scalar with this name, which is also its value reference in FMI 2.0.
     pub fn find(&self, name: &str) -> Option<u32> {
         self.scalars.iter().position(|s| s.name() == name).map(|n| n as u32)
     }
 
-    /// Returns the GUID: a hash of the version and of all properties on which a host depends, but not of the descriptions of
-    /// variables. If a host passes another GUID, it has read another model description.
+    /// Returns the GUID: a hash of the version and of all properties of variables on which a host depends, but not of their
+    /// descriptions. A host that passes another GUID has read another model description.
     pub fn guid(&self) -> &str {
         let bytes = self.guid.get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
@@ -268,8 +269,8 @@ impl<M: Dynamics> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. Each layout has its own
-    /// token, from which the binary recognises the description that a host has read.
+    /// Returns the instantiationToken of the model description of FMI 3.0, which is a hash like the GUID. Each layout has its
+    /// own token, so that the binary recognises which description the host has read.
     pub fn token(&self, layout: Layout) -> &str {
         let bytes = self.tokens[layout as usize].get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
@@ -290,7 +291,8 @@ impl<M: Dynamics> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// Returns true if a parameter determines array sizes. It is then structural if arrays are variables.
+    /// Returns true if this parameter determines the length of an array. In a description with array variables it is then
+    /// structural.
     pub fn is_structural(&self, variable: &Variable<M>) -> bool {
         let sizes =
             |d: &Dimension| matches!(d, Dimension::Sized(name, _) if *name == variable.name);
@@ -323,14 +325,15 @@ impl<M: Dynamics> Table<M> {
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the derivatives of the continuous states. Model Exchange uses their order also for states and nominal values.
+    /// Returns the derivatives of the continuous states. In Model Exchange, states and nominal values have the same order.
     #[inline]
     pub const fn derivatives(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.derivatives;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the indices, in the model's state vector, of the continuous states, in the order in which the host reads them.
+    /// Returns the indices of the continuous states in the model's state vector, in the order in which the host reads the
+    /// states.
     pub fn places(&self) -> impl ExactSizeIterator<Item = usize> + use<M> {
         self.derivatives().iter().map(|s| match s.access {
             Access::Derivative(place) => place(s.element),
@@ -338,7 +341,7 @@ impl<M: Dynamics> Table<M> {
         })
     }
 
-    /// Returns the scalar that is continuous state `place` of the model's state vector.
+    /// Returns the scalar whose value is element `place` of the model's state vector; `None` if there is none.
     pub fn state_at(&self, place: usize) -> Option<&'static Scalar<M>> {
         self.scalars.iter().find(|s| s.state() == Some(place))
     }
@@ -414,7 +417,7 @@ impl<M: Dynamics> Table<M> {
     }
 }
 
-/// Formats a hash in the form of a GUID, as FMI 2.0 requires it.
+/// Formats a hash as a GUID with braces, the form that FMI 2.0 requires.
 fn braced(hash: Hash) -> String {
     let hex = format!("{:032x}", hash.value());
     format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])

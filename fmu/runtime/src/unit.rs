@@ -1,13 +1,14 @@
 //! Units of variables, which the model description defines.
 
-/// A unit as a product of powers of SI base units, with its display units.
+/// A unit of the model description: a product of powers of SI base units, with the units in which a host may display values.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Unit {
     pub name: &'static str,
-    /// Exponents of kg, m, s, rad; `None` if they are not integers.
+    /// Exponents of kg, m, s and rad, for example [1, 1, -2, 0] for N; `None` if the exponents are not integers.
     pub base: Option<[i32; 4]>,
-    /// Units in which hosts may show a value, each with its factor: value in this unit = factor times value in the SI unit.
+    /// Units in which a host may display values, each with its factor: value in this unit = factor times value in the SI
+    /// unit.
     pub display_units: &'static [(&'static str, f64)],
 }
 
@@ -22,7 +23,7 @@ const fn unit(
     Unit { name, base: Some([kg, m, s, rad]), display_units }
 }
 
-/// All units; a model description contains those that its variables use.
+/// All units that the FMUs of this project use. The model description of an FMU contains those of its own variables.
 #[rustfmt::skip]
 pub static UNITS: &[Unit] = &[
     //                kg  m   s  rad
@@ -68,7 +69,7 @@ pub static UNITS: &[Unit] = &[
     Unit { name: "rad/s/sqrt(s)", base: None, display_units: &[] },
 ];
 
-/// Finds a unit by its name; `None` for a name that is not in [`UNITS`].
+/// Returns the unit with this name; `None` if it is not in [`UNITS`].
 pub fn find(name: &str) -> Option<&'static Unit> {
     UNITS.iter().find(|unit| unit.name == name)
 }

@@ -2,7 +2,7 @@
 //! The FMI standard documents them; the comments here describe only properties of this implementation.
 //!
 //! Every function is generic in the model; `export_fmi2!` exports them for one model under their names. Their effects are
-//! implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface in [`crate::c_abi`].
+//! implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface in `crate::c_abi`.
 
 // The standard documents these names.
 #![allow(missing_docs)]
@@ -63,7 +63,7 @@ pub const fmi2PendingStatus: fmi2StatusKind = 1;
 pub const fmi2LastSuccessfulTime: fmi2StatusKind = 2;
 pub const fmi2Terminated: fmi2StatusKind = 3;
 
-/// The host's logger, which formats the message as printf does.
+/// The host's logger, which formats its message as printf does.
 pub type fmi2CallbackLogger = Option<
     unsafe extern "C" fn(
         environment: fmi2ComponentEnvironment,
@@ -75,7 +75,7 @@ pub type fmi2CallbackLogger = Option<
     ),
 >;
 
-/// Callbacks of the host. Each may be NULL, and only the logger is used.
+/// Callbacks of the host. Each of them may be NULL, and the FMU uses only the logger.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
@@ -89,7 +89,6 @@ pub struct fmi2CallbackFunctions {
 
 // ---- Functions, and the states in which each may be called ----
 
-/// Functions of FMI 2.0 that are not in [`Version`], with the instance states in which they are allowed.
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
@@ -199,8 +198,7 @@ fn wrong_reference<M: Model>(reference: u32, found: Option<&Scalar<M>>) -> Strin
     }
 }
 
-/// Result of fmi2NewDiscreteStates, by which the host learns what the handled events have changed, and when the next time event
-/// is.
+/// Result of fmi2NewDiscreteStates: what the handled events have changed, and when the next time event is.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
@@ -242,7 +240,8 @@ unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Returns a logger that calls the host's logger. The struct of callbacks need not exist after fmi2Instantiate has returned.
+/// Returns a logger that calls the host's logger. The struct `functions` need not exist after fmi2Instantiate has returned,
+/// because its contents are copied.
 fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Option<Logger> {
     let logger = functions.logger?;
     let environment = functions.componentEnvironment;
@@ -254,11 +253,11 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
     }))
 }
 
-/// Returns the interface of the requested instance, and the part of the variables that the model description with this GUID
-/// contains.
+/// Checks the arguments of fmi2Instantiate. Returns the interface of the requested instance, and the part of the variables
+/// that the model description with this GUID contains (`None` for all).
 ///
 /// # Errors
-/// If the instance cannot be created; the text is the reason.
+/// The reason why the instance cannot be created.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,
@@ -326,8 +325,8 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Writes a property of the last step, such as the time of its end, to the host's variable. `known` returns the value for a kind
-/// of status; if it returns `None`, the call is discarded.
+/// Writes a property of the last step, such as the time of its end, to the host's variable `value`. `known` returns the
+/// property of the requested `kind`; if it returns `None`, the call is discarded.
 unsafe fn write_step_status<M: Model, T>(
     c: fmi2Component,
     call: &'static Call,
@@ -353,7 +352,7 @@ c_functions! { $ export_fmi2, v2;
 fn fmi2GetTypesPlatform() -> fmi2String = c"default".as_ptr();
 fn fmi2GetVersion() -> fmi2String = c"2.0".as_ptr();
 
-/// Selects the logged categories: if `loggingOn` is false, nothing is logged; if it is true and no categories are
+/// Selects the messages that are logged. If `loggingOn` is false, nothing is logged; if it is true and no categories are
 /// given, everything is logged.
 fn fmi2SetDebugLogging(c: fmi2Component, loggingOn: fmi2Boolean, nCategories: usize, categories: *const fmi2String) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, &SET_DEBUG_LOGGING, |component| {
@@ -381,7 +380,7 @@ fn fmi2SetupExperiment(c: fmi2Component, toleranceDefined: fmi2Boolean, toleranc
 fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2Status =
     perform::<M, Fmi2>(c, Fmi2::ENTER_INITIALIZATION, |component| component.instance.enter_initialization_mode());
 
-/// Leaves initialization mode. Parameters are fixed from here on; in Model Exchange only from the next call
+/// Leaves initialization mode. In Co-Simulation, parameters are fixed from here on; in Model Exchange, from the next call
 /// that continues the simulation.
 fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::EXIT_INITIALIZATION, |component| component.instance.exit_initialization_mode());
@@ -408,7 +407,7 @@ fn fmi2SetInteger(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, v
     set::<M, _>(c, &SET_INTEGER, (vr, nvr, value), Value::Integer);
 fn fmi2SetBoolean(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Boolean) -> fmi2Status =
     set::<M, _>(c, &SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0));
-/// Refuses every reference, because no variable is a string; the values are never read.
+/// Refuses every value reference, because no variable is a string. The values are never read.
 fn fmi2SetString(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2String) -> fmi2Status =
     set::<M, _>(c, &SET_STRING, (vr, nvr, value), |_| Value::Boolean(false));
 
@@ -445,8 +444,7 @@ fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedState: *const fmi2Byte, s
 fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode());
 
-/// Handles the events that are due. The struct `eventInfo` then states if states have changed, and the time of
-/// the next time event.
+/// Handles the events that are due, and writes to `eventInfo` if states have changed and when the next time event is.
 fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi2Status = {
     let call = Fmi2::NEW_DISCRETE_STATES;
     perform_start::<M, Fmi2>(c, call, |component| {
@@ -468,7 +466,7 @@ fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi
 fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
 
-/// Handles the host's message that it has completed a step of its integrator. `noSetFMUStatePriorToCurrentPoint` has no effect,
+/// Handles the host's message that its integrator has completed a step. `noSetFMUStatePriorToCurrentPoint` has no effect,
 /// because the FMU stores no past states.
 fn fmi2CompletedIntegratorStep(c: fmi2Component, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean, enterEventMode: *mut fmi2Boolean, terminateSimulation: *mut fmi2Boolean) -> fmi2Status =
     completed_step::<M, Fmi2, _>(c, enterEventMode, terminateSimulation);
@@ -504,7 +502,7 @@ fn fmi2SetRealInputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, 
     })
 };
 
-/// Computes the time derivatives of outputs at the end of the last step; only order 1 is supported.
+/// Computes the time derivatives of outputs at the end of the last step. All orders must be 1.
 fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *mut fmi2Real) -> fmi2Status = {
     let call = Fmi2::GET_OUTPUT_DERIVATIVES;
     perform_if_allowed::<M, Fmi2>(c, call, |component| {
@@ -514,7 +512,7 @@ fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference,
     })
 };
 
-/// Makes one step. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU stores no past states.
+/// Makes one communication step. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU stores no past states.
 fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean) -> fmi2Status = {
     let call = Fmi2::DO_STEP;
     perform::<M, Fmi2>(c, call, |component| {
@@ -526,7 +524,7 @@ fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicati
     })
 };
 
-/// Refuses the call, because steps are never asynchronous.
+/// Refuses the call, because fmi2DoStep returns only when the step is complete, so that no step can be cancelled.
 fn fmi2CancelStep(c: fmi2Component) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, &CANCEL_STEP, |_| {
         Err(CANCEL_STEP.error("no step is running: fmi2DoStep returns when the step is done"))

@@ -2,7 +2,7 @@
 //! The FMI standard documents them; the comments here describe only properties of this implementation.
 //!
 //! Every function is generic in the model; `export_fmi3!` exports them for one model under their names. Their effects are
-//! implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface in [`crate::c_abi`].
+//! implemented in [`crate::instance`] and [`crate::snapshot`], the common part of the C interface in `crate::c_abi`.
 //!
 //! The value reference of a scalar is its position among the variables, counted from 1. After the variables of the table
 //! follow the independent variable and the event indicators, which are not variables in FMI 2.0. There are no clocks and no
@@ -63,7 +63,7 @@ fn fmi3GetVersion() -> fmi3String = c"3.0".as_ptr();
 
 // ---- Version, logging, creation and destruction of instances ----
 
-/// Selects the messages that are logged. Failures are always logged.
+/// Selects the messages that are logged. The reasons of failed calls are always logged.
 fn fmi3SetDebugLogging(instance: fmi3Instance, loggingOn: fmi3Boolean, nCategories: usize, categories: *const fmi3String) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &SET_DEBUG_LOGGING, |component| {
         let filter = filter::<M>(&SET_DEBUG_LOGGING, categories, nCategories)?;
@@ -164,7 +164,8 @@ fn fmi3SetInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReferen
     set::<M, _>(instance, &SET_INT32, (valueReferences, nValueReferences), (values, nValues), Value::Integer);
 fn fmi3SetUInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, _values: *const u32, nValues: usize) -> fmi3Status =
     access_no_variable::<M>(instance, const { &Call::new("fmi3SetUInt32", SET) }, (valueReferences, nValueReferences), nValues);
-/// Sets enumerations. A value that exceeds an i32 is replaced by 0, which is not an item of any enumeration.
+/// Sets enumerations. A value that does not fit into 32 bits is replaced by 0, which is not an item of any enumeration and
+/// therefore refused.
 fn fmi3SetInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Int64, nValues: usize) -> fmi3Status =
     set::<M, _>(instance, &SET_INT64, (valueReferences, nValueReferences), (values, nValues), |n| Value::Integer(i32::try_from(n).unwrap_or(0)));
 fn fmi3SetUInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3UInt64, nValues: usize) -> fmi3Status =
@@ -238,10 +239,10 @@ fn fmi3SetShiftFraction(instance: fmi3Instance, valueReferences: *const fmi3Valu
 
 // ---- Events and Model Exchange ----
 
-/// Does nothing, because fmi3UpdateDiscreteStates evaluates everything.
+/// Does nothing, because fmi3UpdateDiscreteStates evaluates the discrete states.
 fn fmi3EvaluateDiscreteStates(instance: fmi3Instance) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &EVALUATE_DISCRETE_STATES, |_| Ok(()));
-/// Handles the events that are due. The arguments then state if states have changed, and the time of the next time event.
+/// Handles the events that are due, and writes to the arguments if states have changed and when the next time event is.
 fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, nominalsOfContinuousStatesChanged: *mut fmi3Boolean, valuesOfContinuousStatesChanged: *mut fmi3Boolean, nextEventTimeDefined: *mut fmi3Boolean, nextEventTime: *mut fmi3Float64) -> fmi3Status = {
     let call = Fmi3::NEW_DISCRETE_STATES;
     perform_if_allowed::<M, Fmi3>(instance, call, |component| {
@@ -263,7 +264,7 @@ fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *m
 };
 fn fmi3EnterContinuousTimeMode(instance: fmi3Instance) -> fmi3Status =
     perform::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
-/// Handles the host's message that it has completed a step of its integrator. `noSetFMUStatePriorToCurrentPoint` has no effect,
+/// Handles the host's message that its integrator has completed a step. `noSetFMUStatePriorToCurrentPoint` has no effect,
 /// because the FMU stores no past states.
 fn fmi3CompletedIntegratorStep(instance: fmi3Instance, _noSetFMUStatePriorToCurrentPoint: fmi3Boolean, enterEventMode: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean) -> fmi3Status =
     completed_step::<M, Fmi3, _>(instance, enterEventMode, terminateSimulation);
@@ -303,7 +304,7 @@ fn fmi3DoStep(instance: fmi3Instance, currentCommunicationPoint: fmi3Float64, co
     };
     do_step::<M>(instance, step, answers)
 };
-/// Fails, because the FMU has no model partitions (Scheduled Execution).
+/// Refuses the call, because only Scheduled Execution has model partitions, and the FMU does not support it.
 fn fmi3ActivateModelPartition(instance: fmi3Instance, _clockReference: fmi3ValueReference, _activationTime: fmi3Float64) -> fmi3Status = {
     const CALL: &Call = &Call::new("fmi3ActivateModelPartition", ANY);
     perform_if_allowed::<M, Fmi3>(instance, CALL, |_| Err(CALL.error("this FMU has no Scheduled Execution")))

@@ -9,13 +9,13 @@ use crate::number::{is_finite, text};
 #[allow(missing_docs)]
 pub enum Value {
     Real(f64),
-    /// An integer, or the number of an enumeration's item.
+    /// An integer, or the number of the item of an enumeration.
     Integer(i32),
     Boolean(bool),
 }
 
 impl Value {
-    /// Returns the value of a real number, otherwise `None`.
+    /// Returns the number if the value is a real number; otherwise `None`.
     #[inline]
     pub fn real(self) -> Option<f64> {
         match self {
@@ -24,7 +24,7 @@ impl Value {
         }
     }
 
-    /// Returns the value of an integer or the number of an enumeration's item, otherwise `None`.
+    /// Returns the number if the value is an integer or the item of an enumeration; otherwise `None`.
     #[inline]
     pub fn integer(self) -> Option<i32> {
         match self {
@@ -33,7 +33,7 @@ impl Value {
         }
     }
 
-    /// Returns the value of a Boolean, otherwise `None`.
+    /// Returns true or false if the value is a Boolean; otherwise `None`.
     #[inline]
     pub fn boolean(self) -> Option<bool> {
         match self {
@@ -43,24 +43,23 @@ impl Value {
     }
 }
 
-/// The role of a variable, as in FMI.
+/// The role of a variable, as FMI defines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Causality {
-    /// An input, which the host may set at any time.
     Input,
     Output,
     Local,
-    /// A parameter, which the host sets before the end of initialization mode.
     Parameter,
     CalculatedParameter,
 }
 
-/// A real quantity with its unit, one of [`crate::unit::UNITS`].
+/// Type of a real variable: its unit, and optionally display unit, range and nominal value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Quantity {
-    /// Unit of the value, an SI unit, for example "N.m"; "" if the unit depends on parameters.
+    /// SI unit of the value, for example "N.m", which must be in [`crate::unit::UNITS`]; "" if the unit depends on
+    /// parameters.
     pub unit: &'static str,
     pub display_unit: Option<&'static str>,
     pub min: Option<f64>,
@@ -68,7 +67,7 @@ pub struct Quantity {
     pub nominal: Option<f64>,
 }
 
-/// An item of an enumeration; the first item has the number 1.
+/// An item of an enumeration. The first item has the number 1.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub struct Item {
@@ -82,7 +81,7 @@ impl Item {
         Item { name, description }
     }
 
-    /// Creates items from pairs of name and description.
+    /// Creates the items of an enumeration from pairs of name and description.
     pub const fn list<const N: usize>(rows: [(&'static str, &'static str); N]) -> [Item; N] {
         let mut items = [Item { name: "", description: "" }; N];
         let mut i = 0;
@@ -94,7 +93,7 @@ impl Item {
     }
 }
 
-/// An enumeration type.
+/// Type of a variable whose values are named items, for example the slosh models.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Enumeration {
@@ -103,7 +102,7 @@ pub struct Enumeration {
     pub items: &'static [Item],
 }
 
-/// A variable's type.
+/// Type of a variable with its properties.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub enum Kind {
@@ -113,8 +112,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
-/// Function that returns the index in the model's state vector of a continuous state, from the number of the element in its array
-/// (0 for the first element and for a scalar).
+/// Function that returns the index of a continuous state in the model's state vector. The argument is the number of the
+/// element if the state is an array; it is 0 for the first element and for a scalar.
 pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
@@ -122,13 +121,12 @@ pub type Place = fn(usize) -> usize;
 #[allow(missing_docs)]
 pub enum Dimension {
     Fixed(usize),
-    /// The length is the value of the integer parameter with this name; the number is the largest length. If every
-    /// element is a variable of its own, the array always has the largest length. If the array is one variable, the
-    /// parameter is structural (see [`Layout`](crate::table::Layout)).
+    /// The length is the value of the integer parameter with this name, and the number is the largest length. In a
+    /// description with array variables the parameter is structural (see [`Layout`](crate::table::Layout)). In a description
+    /// with scalars the array always has the largest length.
     Sized(&'static str, usize),
-    /// The array always has the largest length, which is the number; the value of the integer parameter with
-    /// this name is the number of elements that are used. A reduced model description does not contain the
-    /// other elements (see [`extent`](crate::extent)).
+    /// The array always has the largest length, which is the number; only as many elements are used as the integer parameter
+    /// with this name says. A reduced model description does not contain the unused elements.
     Used(&'static str, usize),
 }
 
@@ -143,60 +141,60 @@ impl Dimension {
     }
 }
 
-/// How the value of a variable is read from and written to the model. The last argument of each function is the number of
-/// the element in an array, 0 for the first element and for a scalar.
+/// Functions that read the value of a variable from the model, or write it. The last argument of each is the number of the
+/// element in its array; it is 0 for the first element and for a scalar.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub enum Access<M: Dynamics> {
-    /// An input; the function returns references to its value and its slope.
+    /// An input. The function returns references to its value and to its slope.
     Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
     Output(fn(&M::Outputs, usize) -> f64),
     OutputInteger(fn(&M::Outputs, usize) -> i32),
     OutputBoolean(fn(&M::Outputs, usize) -> bool),
-    /// A variable that depends only on parameters and present inputs; the function returns its value, and its rate of change
-    /// if the inputs change with their slopes.
+    /// A variable that depends only on parameters and present inputs. The function returns its value, and the rate at which
+    /// it changes if the inputs follow their slopes.
     OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
     Boolean(fn(&mut M::Parameters) -> &mut bool),
     Integer(fn(&mut M::Parameters, usize) -> &mut i32),
-    /// A parameter that the model does not store as an i32, but in another type.
+    /// A parameter that the model stores in another type than i32, so that `get` and `set` convert it.
     Choice {
         get: fn(&M::Parameters, usize) -> i32,
         set: fn(&mut M::Parameters, usize, i32),
     },
-    /// A calculated parameter, which is constant in time; the function computes it from the model.
+    /// A calculated parameter, which is constant in time. The function computes it from the model.
     Calculated(fn(&M, usize) -> f64),
     /// A continuous state that is not an output.
     State,
     Derivative(Place),
 }
 
-/// A scalar variable or an array.
+/// An entry of the table of variables: a scalar variable or an array.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Variable<M: Dynamics> {
-    /// Name of the variable. An array has empty brackets in its name, which contain the first index of an element, counted
-    /// from 1; further indices follow in brackets at the end. For example, `tank[].p` with the shape 4, 3, 3 has the
-    /// elements `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
+    /// Name of the variable. In the name of an array, empty brackets stand for the first index of an element, counted from 1;
+    /// further indices follow in brackets at the end. For example, `tank[].p` with the shape 4, 3, 3 has the elements
+    /// `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
     pub description: &'static str,
     pub causality: Causality,
     pub kind: Kind,
-    /// How the value is read from and written to the model.
+    /// Functions that read the value from the model or write it.
     pub access: Access<M>,
-    /// Dimensions of an array; empty for a scalar.
+    /// Length of each dimension of an array; empty for a scalar.
     pub shape: &'static [Dimension],
-    /// For a continuous state the function that returns its number in the model; otherwise `None`.
+    /// For a continuous state, the function that returns its index in the model's state vector; otherwise `None`.
     pub state: Option<Place>,
-    /// True if events can make this state discontinuous.
+    /// True if an event can make this continuous state jump.
     pub reinit: bool,
-    /// True if other inputs determine the slope of this input over a step ([`Dynamics::set_dependent_slopes`]), whatever
-    /// slope the host sets.
+    /// True if other inputs determine how this input changes during a step, whatever slope the host sets (see
+    /// [`Dynamics::set_dependent_slopes`]).
     pub follows_inputs: bool,
-    /// True if the host can set this parameter during the simulation, too.
+    /// True if the host can set this parameter during the simulation.
     pub tunable: bool,
     /// Inputs and continuous states on which the variable depends without delay. The name of an array stands for all its
-    /// elements. The name with "[]" stands for the element that has the index of the variable.
+    /// elements; the name with "[]" stands for the element with the same index as the element of this variable.
     pub depends_on: &'static [&'static str],
     /// Further parameters and inputs on which the initial value of the variable depends. A name that ends with a dot stands
     /// for all parameters whose names begin with it.
@@ -217,8 +215,8 @@ impl<M: Dynamics> Clone for Variable<M> {
 }
 impl<M: Dynamics> Copy for Variable<M> {}
 
-/// Shortest time, s, in which an input may cross its range. If inputs changed faster, values that depend on
-/// their rates might overflow.
+/// Shortest time, s, in which an input may cross its range. If an input changed faster, values that depend on its rate might
+/// overflow.
 const CROSSING: f64 = 1e-9;
 
 const fn variable<M: Dynamics>(
@@ -248,8 +246,8 @@ const fn quantity(unit: &'static str) -> Kind {
     Kind::Real(Quantity { unit, display_unit: None, min: None, max: None, nominal: None })
 }
 
-/// Defines functions that declare a variable. Each row contains the arguments between name and description, the causality,
-/// the type and the access.
+/// Defines functions that declare a variable. Each row contains the arguments between name and description, then causality,
+/// type and access of the variable.
 macro_rules! declarations {
     ($($(#[$doc:meta])* $function:ident($($argument:ident: $type:ty),*) =
         $causality:ident, $kind:expr, $access:expr;)*) => {
@@ -276,13 +274,13 @@ declarations! {
         Input, quantity(unit), Access::Input(ramp);
     /// Declares an output; `get` reads element n from the model's outputs.
     output(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Output, quantity(unit), Access::Output(get);
-    /// Declares a real local variable; `get` reads element n from the model's outputs.
+    /// Declares a real local variable. `get` reads element n from the model's outputs.
     local(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Local, quantity(unit), Access::Output(get);
-    /// Declares a real local variable that depends only on parameters and present inputs; `get` returns its value, and its
-    /// rate if the inputs change with their slopes.
+    /// Declares a real local variable that depends only on parameters and present inputs. `get` returns its value, and the
+    /// rate at which it changes if the inputs follow their slopes.
     local_of_inputs(get: fn(&M, &M::Inputs, usize) -> [f64; 2], unit: &'static str) =
         Local, quantity(unit), Access::OfInputs(get);
-    /// Declares the derivative of a continuous state, whose name is "der(", the name of the state, and ")".
+    /// Declares the derivative of a continuous state. Its name must be "der(", the name of the state, and ")".
     derivative(of: Place, unit: &'static str) = Local, quantity(unit), Access::Derivative(of);
     /// Declares a Boolean local variable; `get` reads element n from the model's outputs.
     local_boolean(get: fn(&M::Outputs, usize) -> bool) = Local, Kind::Boolean, Access::OutputBoolean(get);
@@ -371,13 +369,14 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Declares that events can make this continuous state discontinuous, such as a velocity at an impact.
+    /// Declares that an event can make this continuous state jump, for example a velocity at an impact.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
     }
 
-    /// Declares that other inputs determine this input during a step, for example a rate by its derivative.
+    /// Declares that other inputs determine how this input changes during a step. For example, an angular velocity follows
+    /// from the angular acceleration.
     pub const fn follows_inputs(mut self) -> Self {
         self.follows_inputs = true;
         self
@@ -401,7 +400,7 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Returns the number of scalars that the variable has: the product of the largest lengths of all dimensions.
+    /// Returns the number of scalars of the variable, which is the product of the largest lengths of all dimensions.
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {
@@ -416,7 +415,7 @@ impl<M: Dynamics> Variable<M> {
         self.shape.iter().map(|dimension| dimension.most())
     }
 
-    /// Returns the name for the layout in which an array is one variable: `tank[].p` becomes `tank.p`.
+    /// Returns the name of the variable in a description with array variables: `tank[].p` becomes `tank.p`.
     pub fn array_name(&self) -> String {
         self.name.replace("[]", "")
     }
@@ -426,7 +425,7 @@ impl<M: Dynamics> Variable<M> {
         false
     }
 
-    /// Returns the indices of an element, each counted from 0. The number of the first element is 0.
+    /// Converts the number of an element to its indices, which all count from 0 as the number does.
     pub fn indices(&self, element: usize) -> Vec<usize> {
         let mut indices = Vec::with_capacity(self.shape.len());
         let mut rest = element;
@@ -438,7 +437,7 @@ impl<M: Dynamics> Variable<M> {
         indices
     }
 
-    /// Returns the name of an element. The number of the first element is 0.
+    /// Returns the name of an element, for example `tank[1].p[1,2]`. The first element has the number 0.
     pub fn element_name(&self, element: usize) -> String {
         let indices: Vec<_> = self.indices(element).iter().map(|i| (i + 1).to_string()).collect();
         self.indexed(&indices)
@@ -469,7 +468,8 @@ impl<M: Dynamics> Variable<M> {
         name + closing
     }
 
-    /// Returns the start value; `None` if the value of the variable is computed.
+    /// Returns the start value of an element, from the default `parameters` and `inputs` of the model; `None` if the value is
+    /// computed. Neither argument is changed.
     pub fn start(
         &self,
         parameters: &mut M::Parameters,
@@ -482,8 +482,8 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the value in `parameters`; `None` if the variable is not a parameter. `parameters` are not changed; the
-    /// reference is mutable because the same accessor functions read and write.
+    /// Returns the value of an element in `parameters`; `None` if the variable is not a parameter. The reference is mutable
+    /// only because the same functions read and write a parameter; nothing is changed.
     pub fn parameter_value(&self, parameters: &mut M::Parameters, element: usize) -> Option<Value> {
         match self.access {
             Access::Real(field) => Some(Value::Real(*field(parameters, element))),
@@ -494,7 +494,7 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Stores a value of the parameter's type in `parameters`.
+    /// Sets an element of this parameter in `parameters` to a value, which must have the type of the parameter.
     pub fn set_parameter(&self, parameters: &mut M::Parameters, element: usize, value: Value) {
         match (self.access, value) {
             (Access::Real(field), Value::Real(x)) => *field(parameters, element) = x,
@@ -513,8 +513,8 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the largest rate of an input: the bound of its range with the larger magnitude divided by [`CROSSING`], or
-    /// infinity if it has no range.
+    /// Returns the largest allowed rate of an input, in its unit per second: the bound of its range with the larger magnitude
+    /// divided by [`CROSSING`], or infinity if the range has no bounds.
     pub fn fastest(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { min: Some(min), max: Some(max), .. }) => {
@@ -534,7 +534,7 @@ impl<M: Dynamics> Variable<M> {
             && (max.is_none_or(|max| change <= max) || min.is_none_or(|min| change <= -min))
     }
 
-    /// Returns the unit of a real variable; "" for other types.
+    /// Returns the unit of a real variable, and "" for other types.
     pub const fn unit(&self) -> &'static str {
         match self.kind {
             Kind::Real(quantity) => quantity.unit,
@@ -542,7 +542,7 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the nominal value of a quantity; 1 if none is set.
+    /// Returns the nominal value of a real variable; 1 if none is declared.
     pub const fn nominal_value(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { nominal: Some(nominal), .. }) => nominal,
@@ -560,7 +560,8 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns an error message if `value` is not allowed for an element, in the form `name = value unit (allowed: …)`.
+    /// Returns an error message in the form `name = value unit (allowed: …)` if `value` is not allowed for an element of this
+    /// variable; otherwise `None`.
     #[inline]
     pub fn problem(&self, element: usize, value: Value) -> Option<String> {
         if self.allows(value) { None } else { Some(self.refusal(element, value)) }

@@ -5,23 +5,23 @@ use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
 use crate::table::{Layout, Scalar};
 
-/// A version of FMI. Each constant of the type [`Call`] names the function that performs an operation of
-/// [`Instance`](crate::instance::Instance) in this version. Functions that read and set values are not among the constants,
-/// because a version has several of them.
+/// A version of FMI. Each constant of the type [`Call`] is the function of this version that performs an operation of
+/// [`Instance`](crate::instance::Instance). Functions that get and set values are not among the constants, because a version
+/// has several of them.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
     const PREFIX: &'static str;
 
-    /// Data about its host that an instance stores in this version of FMI, except for the logger.
+    /// Data about the host that an instance of this version stores in addition to the logger, for example callbacks.
     type Host<M: Model>;
 
-    /// The instance state after a call has failed; `None` if the state does not change.
+    /// State that an instance enters after a call has failed; `None` if a failed call does not change the state.
     const AFTER_ERROR: Option<InstanceState>;
-    /// Severity of the failure if a call sets a value outside its range.
+    /// Severity of the fault if a host sets a value outside its range.
     const OUT_OF_RANGE: Severity;
-    /// The instance state that follows initialization mode if the host handles events.
+    /// State that an instance enters after initialization mode if the host handles events.
     const FIRST_EVENT: InstanceState;
-    /// True if Model Exchange hosts may set single continuous states, and may not set a time before the last event.
+    /// True if a host of Model Exchange may set single continuous states, but may not set a time before the last event.
     const SETS_STATES: bool;
 
     const SETUP_EXPERIMENT: &'static Call;
@@ -47,25 +47,25 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// Returns the text by which the FMU recognises its model description: the GUID (FMI 2.0) or
-    /// the instantiationToken (FMI 3.0).
+    /// Returns the text by which the binary recognises its model description: the GUID in FMI 2.0, the instantiationToken in
+    /// FMI 3.0.
     fn token<M: Model>(layout: Layout) -> &'static str;
 
-    /// Returns how events are handled in an instance with this interface if the host does not choose.
+    /// Returns who handles events in an instance with this interface if the host does not choose.
     fn events(interface: Interface) -> Events;
 
-    /// Returns true if a host may choose this handling of events for an interface.
+    /// Returns true if a host may create an instance with this interface and this handling of events.
     fn allows(interface: Interface, events: Events) -> bool {
         events == Self::events(interface)
     }
 
-    /// Returns the value reference by which the host refers to a scalar in this version of FMI.
+    /// Returns the value reference with which hosts of this version refer to the scalar.
     fn reference<M: Model>(scalar: &Scalar<M>) -> u32;
 
-    /// Returns the scalar of a host's value reference.
+    /// Returns the scalar with this value reference.
     ///
     /// # Errors
-    /// If there is no such scalar, or it does not have this C type.
+    /// A message if no scalar has the value reference, or if the scalar is not of the type `c_type`.
     fn scalar<M: Model>(
         reference: u32,
         c_type: Option<CType>,

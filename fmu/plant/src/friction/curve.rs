@@ -8,11 +8,12 @@ use taylor::series::{self, Series, ZERO};
 
 use crate::parameters::Friction;
 
-/// Ratio of the hub's rate to the Stribeck speed w_s up to which the excess over Coulomb friction is above 1e-4 of its value
-/// d at rest. Up to this rate the terms of its power series are visible at every usual tolerance.
+/// Ratio of the hub's rate to the Stribeck speed up to which the excess over Coulomb friction is above 1e-4 of its value at
+/// rest. Up to this rate the terms of its power series are visible at every usual tolerance.
 const VISIBLE: f64 = 3.0;
 
-/// Ratio of the rate to the Stribeck speed w_s above which the excess d exp(-(w/w_s)^2) is below 1e-12 d, so that it counts as 0.
+/// Ratio of the hub's rate to the Stribeck speed above which the excess over Coulomb friction is below 1e-12 of its value at
+/// rest, so that it counts as 0.
 const FLAT: f64 = 5.3;
 
 #[derive(Clone, Debug)]
@@ -31,12 +32,13 @@ impl StribeckCurve {
         StribeckCurve { c: p.c, d: p.d, inv_omega_s2, u_d: ZERO, e: ZERO, torque: ZERO }
     }
 
-    /// Estimates the time, s, over which the power series of the dry friction torque T_C converges reliably, from the
-    /// hub's rate w and its derivatives w' and w''.
+    /// Estimates the time, s, over which the power series of the dry friction torque converges reliably. `omega` is the
+    /// series of the hub's rate.
     ///
-    /// If the hub is far from rest, exp(-v^2) with v = w/w_s is so small that its terms are below any tolerance, but they
-    /// grow before they decay. Over dv the term of order n is (2 v dv)^n/n!, which is largest at n = 2 v dv. The limit is
-    /// chosen so that either the curve is still flat at the end, or the terms decay from order 5 on.
+    /// At a high rate, v times the Stribeck speed, the excess over Coulomb friction, exp(-v^2), is below any tolerance, but
+    /// the terms of its series grow before they decay. Over a change dv the term of order n is (2 v dv)^n/n!, which is
+    /// largest at n = 2 v dv. The limit is chosen so that either the curve is still flat at the end, or the terms decay from
+    /// order 5 on.
     pub fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] =
             [omega[0], omega[1], omega[2]].map(|w| w.abs() * libm::sqrt(self.inv_omega_s2));

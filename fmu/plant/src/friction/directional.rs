@@ -15,8 +15,8 @@ use taylor::series::{self, Series, ZERO};
 use crate::contact::Contact;
 use crate::parameters::Friction;
 
-/// The factor B+-(theta) for one direction of rotation: its mean, and the coefficients of cos theta, sin theta, cos 2
-/// theta, sin 2 theta.
+/// The directional factor of dry friction for one direction of rotation: its mean, and the coefficients of cos theta, sin
+/// theta, cos 2 theta and sin 2 theta for the angle theta of the hub.
 #[derive(Clone, Copy, Debug)]
 struct OneWay {
     mean: f64,
@@ -34,8 +34,8 @@ impl OneWay {
         self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
     }
 
-    /// Returns a lower bound of B over all angles. It is below the true minimum by at most 2e-6 of
-    /// the amplitude of the terms that depend on the angle.
+    /// Returns a lower bound of the factor over all angles of the hub. It is below the true minimum by at most 2e-6 of the
+    /// amplitude of the terms that depend on the angle.
     fn lowest(&self) -> f64 {
         if self.harmonics == [0.0; 4] {
             return self.mean;
@@ -58,9 +58,9 @@ impl OneWay {
     }
 }
 
-/// The factor B of both directions of rotation, with the power series of the harmonics of the angle. If B depends on
-/// the angle, `trig` contains cos and sin of theta and of 2 theta in the order of `OneWay::harmonics`. `angles_d` are
-/// theta' and 2 theta'.
+/// The directional factor of dry friction for both directions of rotation, with the power series of the terms that depend on
+/// the angle theta of the hub. `trig` contains cos and sin of theta and of 2 theta, in the order of `OneWay::harmonics`; it
+/// is `None` if the factor does not depend on the angle. `angles_d` are the derivatives of theta and of 2 theta.
 #[derive(Clone, Debug)]
 pub struct DirectionalFactor {
     forward: OneWay,
@@ -78,8 +78,8 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Returns a message for each invalid parameter. B must be positive at every angle, because otherwise dry friction
-    /// would drive the hub.
+    /// Returns a message for each direction of rotation in which the factor is not positive at every angle. Dry friction
+    /// would drive the hub where the factor is negative.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
@@ -96,8 +96,7 @@ impl DirectionalFactor {
             .collect()
     }
 
-    /// Returns the smallest and the largest value of the factor B over both directions of rotation
-    /// and all angles of the hub.
+    /// Returns the smallest and the largest value of the factor over both directions of rotation and all angles of the hub.
     pub fn bounds(&self) -> (f64, f64) {
         let both = [self.forward, self.backward];
         let mirrored = both.map(|b| OneWay { mean: -b.mean, harmonics: b.harmonics.map(|h| -h) });
@@ -113,7 +112,7 @@ impl DirectionalFactor {
         self.trig.is_some()
     }
 
-    /// Returns the mean over the hub's angle of the factor B for one direction of rotation, the direction of `contact`.
+    /// Returns the mean of the factor over all angles of the hub, for the direction of rotation that `contact` states.
     pub fn mean(&self, contact: Contact) -> f64 {
         self.one_way(contact).mean
     }
@@ -155,8 +154,8 @@ mod tests {
 
     use super::*;
 
-    /// The expected friction factor is 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a hub at rest and for
-    /// a hub that turns.
+    /// The expected factor is 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a hub at rest and for a hub that
+    /// turns.
     #[test]
     fn each_harmonic_of_the_friction_over_the_angle_has_the_documented_sign() {
         let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };

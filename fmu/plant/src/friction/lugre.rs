@@ -141,13 +141,14 @@ impl FrictionLaw for Lugre {
         [*z] = series::values([&self.z], n, t);
     }
 
-    /// Returns coefficient n of the bristles' deflection, divided by the largest deflection. The error of the friction
-    /// torque is then within the same tolerance as under dry friction.
+    /// Returns the size of coefficient n of the bristles' deflection, divided by the largest deflection. The integrator then
+    /// keeps the error of the friction torque within the same tolerance as under dry friction.
     fn coefficient_norm(&self, n: usize) -> f64 {
         self.z[n].abs() * self.inv_deflection
     }
 
-    /// Returns the contact that follows from the net torque and the bristles' torque -sigma_0 z, which also acts at rest.
+    /// Determines the direction in which a hub at rest begins to turn, from the sum of the net torque and the torque of the
+    /// bristles, which also acts at rest.
     fn contact_at_rest(&self, [net, slope]: [f64; 2], _: f64, before: Contact) -> Contact {
         let torque = net - self.sigma0 * self.z[0];
         match if torque != 0.0 { torque } else { slope } {

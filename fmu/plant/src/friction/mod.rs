@@ -19,16 +19,16 @@ use crate::parameters::{Friction, FrictionModel};
 use directional::DirectionalFactor;
 
 /// A friction law as a set of power series in time. A law may have one continuous state of its own, for example the
-/// deflection of bristles, and may change its formula at w = 0.
+/// deflection of bristles, and may use another formula for each direction of rotation.
 pub trait FrictionLaw {
-    /// True if the law changes its formula at w = 0, so that this instant must be located. If false, the
+    /// True if the law changes its formula when the hub comes to rest, so that this instant must be located. If false, the
     /// contact is always [`Contact::Forward`].
     const SWITCHES_AT_REST: bool = false;
 
     const STICKS: bool = false;
 
-    /// Number of successive negligible terms of the power series that end the search for its order. A law whose terms vanish
-    /// by symmetry needs more than the usual two.
+    /// Number of successive negligible terms of a power series that end the search for its order. A law whose terms vanish by
+    /// symmetry needs more than the usual two.
     const NEGLIGIBLE_TERMS: usize = 2;
 
     fn new(p: &Friction) -> Self;
@@ -37,17 +37,16 @@ pub trait FrictionLaw {
         Vec::new()
     }
 
-    /// Sets coefficient n of the series of the law's own state, for example the deflection of the bristles. Coefficient 0 is
-    /// the value of the state, and coefficient 1 its change for a directional derivative.
+    /// Sets coefficient n of the law's own state, for example the deflection of the bristles. Coefficient 0 is the value of
+    /// the state; coefficient 1 is its change if a directional derivative is computed.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
-    /// Returns coefficient n of the friction torque tau_f while the hub is not stuck. It follows from the coefficients
-    /// up to order n of the hub's angle theta, its rate w, w^2 and the state of the friction law, if the law has one.
-    /// Sets coefficient n + 1 of this state.
+    /// Returns coefficient n of the friction torque on a hub that is not stuck, N m. The coefficients of the hub's motion and
+    /// of the law's own state must be known up to order n; coefficient n + 1 of the law's own state is set.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
-    /// Returns coefficient n of the bearing's dissipated power, W. [`FrictionLaw::torque`] must have
-    /// computed coefficient n before.
+    /// Returns coefficient n of the power that the bearing dissipates, W. `tau_f` is the series of the friction torque, whose
+    /// coefficient n must be known, and `omega` the series of the hub's rate.
     #[inline(always)]
     fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
         -series::mul(n, tau_f, omega)
@@ -62,8 +61,8 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Advances the law's own state z, for example the deflection of the bristles, by `t` seconds, from its series
-    /// up to order n.
+    /// Advances the law's own state `z`, for example the deflection of the bristles, by `t` seconds, from its series up to
+    /// order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
     #[inline(always)]
@@ -71,30 +70,31 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Estimates the time, s, over which the series of the friction torque tau_f converges, from the hub's rate w, w'
-    /// and w''. Only laws whose coefficients do not show this time override the default.
+    /// Estimates the time, s, over which the series of the friction torque converges, from the hub's rate `omega` and its
+    /// first two derivatives. Only laws whose coefficients do not show this time override the default.
     fn convergence_radius(&self, _omega: &Series) -> f64 {
         f64::INFINITY
     }
 
-    /// Returns the largest torques, N m, that the bearing holds at rest against a backward and a forward
-    /// torque; both are positive or 0.
+    /// Returns the largest torques, N m, that the bearing holds at rest, at the hub angle `theta`: against a backward and
+    /// against a forward torque. Both are positive or 0.
     fn holding_torques(&self, _theta: f64) -> (f64, f64) {
         (0.0, 0.0)
     }
 
-    /// Returns the contact of a hub at w = 0 whose previous contact is `before`. `net` is the torque on the hub without
-    /// friction, and, if the law does not stick, its rate while the hub is held.
+    /// Returns the contact of a hub at rest whose previous contact is `before`. `net` is the torque on the hub without
+    /// friction and, if the law does not stick, the rate of this torque while the hub is held; `theta` is the angle of the
+    /// hub.
     fn contact_at_rest(&self, _net: [f64; 2], _theta: f64, _before: Contact) -> Contact {
         Contact::Forward
     }
 }
 
-/// Defines an enumeration of all friction laws, which passes each call of a function of [`FrictionLaw`] on to the law that the
+/// Defines an enumeration of all friction laws, which passes each call of a function of [`FrictionLaw`] to the law that the
 /// plant uses. The compiler reports a missing law, because there must be one for every [`FrictionModel`].
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
-        /// The friction law that the plant uses, with the functions of [`FrictionLaw`].
+        /// The friction law that the plant uses.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
         pub enum Law {

@@ -35,8 +35,8 @@ pub struct StribeckSmooth {
 }
 
 impl FrictionLaw for StribeckSmooth {
-    /// Four terms, because three successive terms of tanh(w/eps) vanish by symmetry if the motion
-    /// starts with w = w' = 0.
+    /// Four terms instead of two, because three successive terms of tanh(w/eps) vanish by symmetry if the hub starts with a
+    /// rate and an acceleration of 0.
     const NEGLIGIBLE_TERMS: usize = 4;
 
     fn new(p: &Friction) -> StribeckSmooth {
@@ -73,9 +73,12 @@ impl FrictionLaw for StribeckSmooth {
         -self.b * hub.omega[n] - series::mul(n, &self.curve.torque, &self.sign)
     }
 
-    /// Estimates the time, s, over which the series of the friction torque converges reliably. The nearest poles of tanh(v),
-    /// v = w/eps with the hub's rate w, are at the distance sqrt(v^2 + (pi/2)^2), of which half is used, because tanh is so
-    /// flat away from 0 that its coefficients do not show the poles. T_C has a limit of its own.
+    /// Estimates the time, s, over which the series of the friction torque converges reliably. `omega` is the series of the
+    /// hub's rate.
+    ///
+    /// The function tanh(v), where v is the rate divided by eps, has its nearest poles at the distance sqrt(v^2 + (pi/2)^2).
+    /// Half of this distance is used, because away from 0 tanh is so flat that its coefficients do not show the poles.
+    /// Stribeck's curve has a limit of its own.
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;

@@ -95,8 +95,8 @@ impl SloshMode for Linear {
         self.al_d[0].abs() + self.p.omega_n * self.al[0].abs()
     }
 
-    /// Returns coefficient n of the slosh mass times its height above rest, kg m: m l al^2/2, where al is its angle. On a
-    /// tilted bench, m times the height of the slosh mass in the hub's frame is added.
+    /// Returns coefficient n of the slosh mass times its height above rest, kg m. The pendulum rises by l/2 times the squared
+    /// angle; on a tilted bench the height of the slosh mass in the hub's frame is added.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
@@ -113,9 +113,10 @@ impl SloshMode for Linear {
         [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns the force on the tank. The tangential component is -m (r w' + l al'' n_t). The radial one follows from the
-    /// slosh mass's position (r + l al n_x, l al n_t): -m l al'' n_x and, of second order in the motion, m (r w^2 + 2 w l
-    /// al' n_t + w' l al n_t).
+    /// Returns the radial and the tangential force of the slosh mass on the tank, N. With the slosh angle al along the
+    /// direction (n_x, n_t), the hub's rate w, and the distance r of the hinge from the axis, the tangential force is -m (r
+    /// w' + l al'' n_t). The radial force follows from the position (r + l al n_x, l al n_t) of the slosh mass: -m l al'' n_x
+    /// plus terms of second order, m (r w^2 + 2 w l al' n_t + w' l al n_t).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
@@ -126,8 +127,8 @@ impl SloshMode for Linear {
         [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
-    /// Returns the torque of the liquid on the hub, r times the tangential force, because in the linear model the force
-    /// acts at the hinge. Gravity of a tilted bench acts at the slosh mass instead.
+    /// Returns the torque of the liquid on the hub, N m: the tangential force times the distance r, because the linear model
+    /// lets the force act at the hinge. Gravity of a tilted bench acts at the slosh mass instead.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
         let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());

@@ -44,8 +44,8 @@ macro_rules! own_pendulum {
 }
 use own_pendulum;
 
-/// Defines functions of [`SloshMode`] for a model with one angle `al` along the direction of its pendulum `p`, its
-/// derivatives `al_d` and `al_dd`, and the rate `drag` on which the damping acts.
+/// Defines the functions of [`SloshMode`] for a model with one angle `al` along the direction of its pendulum `p`. `al_d` and
+/// `al_dd` are its derivatives, and `drag` is the rate on which the damping acts.
 macro_rules! one_angle {
     () => {
         own_pendulum!();
@@ -142,15 +142,15 @@ impl Liquid {
     }
 }
 
-/// Contribution of a mode to the hub's equation: inertia J, kg m2, and torque T, N m.
+/// What one mode contributes to the hub's equation: an inertia, kg m2, and a torque, N m.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct HubReaction {
     pub j: f64,
     pub t: f64,
 }
 
-/// Displacement of a mode as radial and tangential angles with sin(angle) = displacement/l, rad, and the rates
-/// of these angles, rad/s.
+/// Displacement of a mode as a radial and a tangential angle, rad, and the rates of these angles, rad/s. The sine of an angle
+/// is the displacement divided by the pendulum length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles<T = f64> {
     pub angle: [T; 2],
@@ -166,59 +166,58 @@ impl<T: Number> Angles<T> {
 
 /// One slosh mode as a set of power series in time.
 ///
-/// Functions that are generic over [`Number`] apply to the start of an expansion: they return a value, or its directional
-/// derivative. `ramp` is true if g changes along the expansion.
+/// Functions that are generic over [`Number`] apply to the start of the series: they return a value, or its directional
+/// derivative. In the other functions `ramp` is true if the specific force changes along the series, and `varies` is true if
+/// specific force, drag or weight changes.
 pub trait SloshMode {
-    /// True if steps with a single mode and constant g are compiled with the sums of every order written out, which is twice
-    /// as fast and takes 40 to 100 KB of code.
+    /// True if the code for a single mode and constant specific force is compiled with the sums of every order written out,
+    /// which is twice as fast and takes 40 to 100 KB of code.
     const UNROLLED: bool = false;
     const MOVES_INERTIA: bool = true;
     fn new(pendulum: &Pendulum) -> Self;
-    /// Returns the reason why the motion cannot start with these parameters, if any.
+    /// Returns the reason why the motion cannot start as `_init` says, if any.
     fn start_problem(&self, _init: &Init) -> Option<String> {
         None
     }
     fn pendulum(&self) -> &Pendulum;
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Returns the squares of slosh angle, rad2, and its rate, rad2/s2, at the start of the expansion. In the model
+    /// Returns the squares of the slosh angle, rad2, and of its rate, rad2/s2, at the start of the series. In the model
     /// `ThirdOrder`, displacement divided by length replaces the angle.
     fn amplitude2<T: Number>(&self) -> [T; 2];
     fn coordinates(&self, at: &Angles) -> [f64; 4];
     fn angles<T: Number>(&self) -> Angles<T>;
-    /// Sets the coordinates at the start of the expansion. Coefficient 0 of the hub's rate w must be known.
+    /// Sets the coordinates `q` at the start of the series. Coefficient 0 of the hub's rate must be known.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
-    /// Sets coefficient 1 of the coordinates to their change `dq` for a directional derivative. Coefficients 0 and 1 of the
-    /// hub's rate w must be known.
+    /// Sets coefficient 1 of the coordinates to `dq`, their change in a directional derivative. Coefficients 0 and 1 of the
+    /// hub's rate must be known.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
     fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
-    /// Returns coefficient n of the inertia J and of the torque T with which the mode acts on the hub (see the module's
-    /// head), from the coefficients of q, q' and the hub's rate w up to order n.
+    /// Returns coefficient n of the inertia and of the torque with which the mode acts on the hub, from the coefficients of
+    /// the coordinates, their rates and the hub's rate up to order n. The equations are at the head of the file.
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction;
-    /// Computes coefficient n of q'' and coefficient n + 1 of q and q'. It is called after `hub_reaction`, when the
-    /// hub's angular acceleration w' is known up to order n.
+    /// Computes coefficient n of the acceleration of the coordinates, and coefficient n + 1 of the coordinates and their
+    /// rates. It is called after `hub_reaction`, when the hub's angular acceleration is known up to order n.
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
     fn error_scale(&self) -> f64;
     fn coefficient_norm(&self, n: usize) -> f64;
     /// Returns coefficient n of the power that the mode dissipates, W. `hub_reaction` must have computed order n.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
-    /// Returns coefficient n of the slosh mass times its height above rest (kg m), which is the potential
-    /// energy divided by g.
+    /// Returns coefficient n of the slosh mass times its height above rest, kg m, which is the potential energy divided by
+    /// the specific force.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
-    /// Returns the coordinates at the time `t` (s) after the start of the expansion, when the hub has the rate `omega`,
-    /// from their series up to order n. `varies` is true if g, drag or weight change along the expansion; otherwise the
-    /// modes move along the tangent.
+    /// Returns the coordinates `t` seconds after the start of the series, when the hub has the rate `omega`, rad/s. They are
+    /// computed from their series up to order n. If `varies` is false, the mode moves along the tangent.
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
-    /// Returns the slosh mass times its height above rest, kg m, which is the potential energy divided by g, and the
-    /// rate of this product.
+    /// Returns the slosh mass times its height above rest, kg m, and the rate of this product. The potential energy is the
+    /// specific force times the product.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
-    /// Returns the force of the slosh mass on the tank, N, radial and tangential.
+    /// Returns the radial and the tangential force of the slosh mass on the tank, N.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
     /// Returns the torque about the bearing axis with which the slosh mass acts on the hub, N m.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T;
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns the angular momentum of the slosh mass about the bearing axis, kg m2/s.
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns the reason why the slosh model is not valid at these coordinates of a mode, if any.
+    /// Returns the reason why the slosh model is not valid at the coordinates `_q`, if any.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

@@ -141,9 +141,8 @@ impl SloshMode for Planar {
         [half * 2.0 * half * (m * l) + tilted[0] * m, s * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns the force of the slosh mass on the tank, which is minus its mass times its acceleration. The slosh mass
-    /// is at (r + u n_x, u n_t), where u is its displacement along its direction n. The guide that keeps the slosh mass in its
-    /// plane carries the force across the plane.
+    /// Returns the radial and the tangential force of the slosh mass on the tank, N, which is minus its mass times its
+    /// acceleration. The slosh mass moves in a plane; the guide that keeps it there carries the force across the plane.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [s, c, ad, al_dd] = [&self.s, &self.c, &self.al_d, &self.al_dd].map(number::<T>);

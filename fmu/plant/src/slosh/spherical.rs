@@ -59,8 +59,8 @@ pub struct Spherical {
     dir: Vector2,
     dir_z: Series,
     dir_d: Vector2,
-    /// The rate p' of the slosh mass's direction, multiplied by the drag coefficient, which is divided by its value at the start
-    /// of the expansion. The elements are the two horizontal components in exchanged order, and then the upward component.
+    /// Drag coefficient, divided by its value at the start of the series, times the horizontal rate of the slosh mass's
+    /// direction. The two components are exchanged, tangential first; `drag_z` is the upward component.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,
@@ -75,8 +75,8 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// Sets coefficient n of the direction p and the velocity v from coefficient n of the coordinates xi, by p' = k xi' -
-    /// v_z xi and v_z = k^2 xi.xi'.
+    /// Computes coefficient n of the direction p and the velocity v of the slosh mass from coefficient n of the coordinates
+    /// xi, by p' = k xi' - v_z xi and v_z = k^2 xi.xi' (symbols at the head of the file).
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
         let one = constant(n, 1.0);
@@ -93,8 +93,8 @@ impl Spherical {
         self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Returns coefficient n of k times the acceleration xi'' of the coordinates. It is p'' + 2 v_z xi' + v_z' xi with
-    /// p'' = v' - w' R p - w R p', where p is the slosh mass's direction and v its velocity.
+    /// Returns coefficient n of k times the acceleration of the coordinates xi. In the symbols at the head of the file it is
+    /// p'' + 2 v_z xi' + v_z' xi with p'' = v' - w' R p - w R p'.
     fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale(n, &hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
@@ -179,7 +179,7 @@ impl SloshMode for Spherical {
         })
     }
 
-    /// Computes the coordinates from the slosh angles, whose sines are the components p_x and p_y of the slosh mass's
+    /// Computes the coordinates from the slosh angles, whose sines are the horizontal components of the slosh mass's
     /// direction. The slosh mass is below its hinge.
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         let [p_x, p_y] = at.angle.map(libm::sin);
@@ -307,8 +307,9 @@ impl SloshMode for Spherical {
         self.p.c * self.p.l * self.p.l * speed2
     }
 
-    /// Returns coefficient n of the slosh mass times its height above rest, m l (1 + p_z). It is computed with 1 + p_z =
-    /// |xi|^2 k, because this form has no cancellation near rest.
+    /// Returns coefficient n of the slosh mass times its height above rest, m l (1 + p_z), kg m, where p_z is the upward
+    /// component of its direction. The term 1 + p_z is computed as |xi|^2 k from the coordinates xi, because this form has no
+    /// cancellation near rest.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];
@@ -318,8 +319,9 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the coordinates xi and their rates from the direction p of the slosh mass, by xi = p/k and k xi' = p' + v_z
-    /// xi. If the slosh mass is above the horizontal, k = 1 - p_z is computed from |p| = 1.
+    /// Computes the coordinates xi and their rates from the direction p and the velocity v of the slosh mass, by xi = p/k and
+    /// k xi' = p' + v_z xi (symbols at the head of the file). If the slosh mass is above its hinge, k = 1 - p_z is computed
+    /// from |p| = 1, because the difference would lose digits.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
@@ -345,8 +347,8 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// Returns the torque about the bearing axis: the moment of the tension, which acts at the hinge, and of the drag, which
-    /// acts at the slosh mass.
+    /// Returns the torque of the slosh mass about the bearing axis, N m: the moment of the tension, which acts at the hinge,
+    /// and of the drag, which acts at the slosh mass.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
@@ -383,8 +385,9 @@ mod tests {
     use super::*;
     use taylor::series::ORDER;
 
-    /// Returns the acceleration xi'' of the coordinates xi by Lagrange's equations of the slosh mass, with v = xi' + w
-    /// R xi and rho = xi.xi':
+    /// Returns the acceleration of the coordinates xi by Lagrange's equations, as an independent reference. `q` contains the
+    /// coordinates and their rates, `w` and `w_d` are rate and acceleration of the hub, and `g` is the specific force. With v
+    /// = xi' + w R xi and rho = xi.xi',
     ///
     /// ```text
     /// xi'' = B + A w'
@@ -418,8 +421,8 @@ mod tests {
         }
     }
 
-    /// Checks that the direction p of the slosh mass and its velocity v describe the same motion as
-    /// the coordinates xi, for angles between hanging and 20 degrees from straight up.
+    /// Compares the two descriptions of the motion: direction and velocity of the slosh mass, which the model integrates, and
+    /// the coordinates xi by Lagrange's equations. The random angles lie between hanging and 20 degrees from straight up.
     #[test]
     fn direction_and_velocity_follow_lagranges_equations() {
         let mut rng = fastrand::Rng::with_seed(3);

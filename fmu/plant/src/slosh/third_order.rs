@@ -221,8 +221,8 @@ impl SloshMode for ThirdOrder {
         [height * (m / l) + tilted[0] * m, height_d * (m / l) + tilted[1] * m]
     }
 
-    /// Returns the force of the slosh mass on the tank, which is minus its mass times its acceleration: -m (q'' - a -
-    /// w' (y, -(r + x))).
+    /// Returns the radial and the tangential force of the slosh mass on the tank, N, which is minus its mass times its
+    /// acceleration. In the symbols at the head of the file it is -m (q'' - a - w' (y, -(r + x))).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let (wd, y, arm) =
             (number::<T>(&hub.omega_dot), number::<T>(&self.q[1]), number::<T>(&self.arm));
@@ -272,8 +272,8 @@ impl SloshMode for ThirdOrder {
 mod tests {
     use super::*;
 
-    /// The range of the model ends at a displacement of one length. With a softening spring it ends earlier, where only a tenth
-    /// of the spring's stiffness is left.
+    /// The range ends at a displacement of one pendulum length, or at a smaller displacement where only a tenth of a
+    /// softening spring's stiffness is left.
     #[test]
     fn the_third_order_model_ends_at_a_displacement_of_one_length_or_at_a_tenth_of_its_stiffness() {
         let outside = |spring: f64, q: [f64; 2]| {

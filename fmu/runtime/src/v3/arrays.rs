@@ -11,24 +11,24 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Dimension, Value, Variable};
 
-/// The scalars of each array variable, for the present array sizes, which the structural parameters determine.
+/// The scalars of each array variable, for the present array sizes.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
-    /// For each variable, the value references that its scalars have in the layout of scalars.
+    /// Value references that the scalars have in the layout of scalars, for one array variable after the other.
     scalars: Vec<u32>,
     ends: Vec<usize>,
     types: Vec<CType>,
-    /// For each scalar the value reference of its array and its position in the array, counted from 1. Position 0 means that the
-    /// scalar is outside the array's present length.
+    /// For each scalar, the value reference of its array and its position in the array, counted from 1. The position is 0 if
+    /// the scalar is outside the present length of the array.
     places: Vec<(u32, usize)>,
     /// Positions of the continuous states that exist with the present array sizes, in the order in which the host reads them.
-    /// They are positions in the list of all states that exist with the largest sizes, in the order of the table.
+    /// They are positions in the list of all states that exist with the largest sizes.
     states: Vec<usize>,
 }
 
 impl Arrays {
-    /// Creates the arrays with the sizes that the parameters of an instance give. `parameters` are in the
-    /// order of the table.
+    /// Creates the arrays with the sizes that the `parameters` of an instance give. `parameters` are in the order of the
+    /// table.
     pub fn new<M: Model>(parameters: &[Value]) -> Arrays {
         let table = M::table();
         let mut arrays = Arrays::default();
@@ -65,21 +65,22 @@ impl Arrays {
         arrays
     }
 
-    /// Returns the scalars of the variable with this value reference, as the value references that they have in the layout
-    /// of scalars. `None` if there is no such variable.
+    /// Returns the scalars of the array variable with this value reference, as value references in the layout of scalars;
+    /// `None` if there is no such variable.
     pub fn scalars(&self, reference: u32) -> Option<&[u32]> {
         let n = (reference as usize).checked_sub(1)?;
         let begin = if n == 0 { 0 } else { *self.ends.get(n - 1)? };
         self.scalars.get(begin..*self.ends.get(n)?)
     }
 
-    /// Returns the C type of a variable. Variables that follow those of the table are real.
+    /// Returns the C type of the variable with this value reference. Time and event indicators, which follow the variables of
+    /// the table, are real.
     pub fn c_type(&self, reference: u32) -> CType {
         let n = (reference as usize).wrapping_sub(1);
         self.types.get(n).copied().unwrap_or(CType::Real)
     }
 
-    /// Returns the number of variables with their own value reference in this layout.
+    /// Returns the number of variables that have a value reference in this layout.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
@@ -89,15 +90,15 @@ impl Arrays {
         self.ends.is_empty()
     }
 
-    /// Returns the value reference of a scalar's array and the scalar's position in the array, counted from 1; `None` if the
-    /// position is outside the array's present length.
+    /// Returns where a scalar is: the value reference of its array, and its position in the array, counted from 1. Returns
+    /// `None` if it is outside the present length of the array.
     pub fn place(&self, scalar: u32) -> Option<(u32, usize)> {
         let place = *self.places.get((scalar as usize).checked_sub(1)?)?;
         (place.1 > 0).then_some(place)
     }
 
     /// Returns the positions of the continuous states that exist with the present array sizes, in the order in which the host
-    /// reads them. They are positions in the list of all states that exist with the largest sizes, in the order of the table.
+    /// reads them. They are positions in the list of all states that exist with the largest sizes.
     pub fn states(&self) -> &[usize] {
         &self.states
     }
@@ -116,7 +117,8 @@ fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     }
 }
 
-/// Returns the lengths of a variable along its dimensions. `size` returns the value of the structural parameter with a name.
+/// Returns the length of each dimension of a variable. `size` returns the value of the structural parameter with a given
+/// name.
 pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
     let length = |dimension: &Dimension| match dimension {
         Dimension::Fixed(length) | Dimension::Used(_, length) => *length,
@@ -125,7 +127,8 @@ pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -
     variable.shape.iter().map(length).collect()
 }
 
-/// Returns true if an element, counted in row-major order in the largest array, is within these lengths.
+/// Returns true if an element is within the present `lengths` of its array. `element` is its number in row-major order in the
+/// array with the largest lengths.
 fn is_within<M: Model>(variable: &Variable<M>, element: usize, lengths: &[usize]) -> bool {
     let mut rest = element;
     variable.lengths().zip(lengths).rev().all(|(most, length)| {
@@ -135,14 +138,14 @@ fn is_within<M: Model>(variable: &Variable<M>, element: usize, lengths: &[usize]
     })
 }
 
-/// Returns the value reference of an entry of the table.
+/// Returns the value reference that an entry of the table has in the layout of arrays.
 pub fn reference<M: Model>(variable: &Variable<M>) -> u32 {
     let place = M::table().variables.iter().position(|v| v.name == variable.name);
     place.map_or(0, |place| place as u32 + 1)
 }
 
-/// Returns the value reference of the independent variable (time), which follows the variables of the table. The value reference
-/// after it is that of the array of event indicators.
+/// Returns the value reference of the independent variable, the time, which follows the variables of the table. The next
+/// value reference is that of the array of event indicators.
 pub fn time<M: Model>() -> u32 {
     M::table().variables.len() as u32 + 1
 }
@@ -150,7 +153,7 @@ pub fn time<M: Model>() -> u32 {
 /// Name of the array variable of event indicators, which FMI 3.0 requires in addition to the variables of the table.
 pub const INDICATORS: &str = "event_indicator";
 
-/// Returns the name of a variable by its value reference; `None` if there is none.
+/// Returns the name of the variable with this value reference; `None` if there is no such variable.
 pub fn name<M: Model>(reference: u32) -> Option<String> {
     let beyond = reference.checked_sub(time::<M>());
     match beyond {
@@ -163,7 +166,7 @@ pub fn name<M: Model>(reference: u32) -> Option<String> {
     }
 }
 
-/// Returns the name of a variable for messages, with the present lengths if it is an array: `tank.p[1,3,3]`.
+/// Returns the name of a variable for messages, with the present lengths if it is an array, for example `tank.p[1,3,3]`.
 pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     let name = name::<M>(reference).unwrap_or_default();
     let lengths = match M::table().variables.get((reference as usize).wrapping_sub(1)) {
@@ -175,7 +178,7 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
 }
 
-/// Returns the arrays if each array is one variable in this layout; `None` if each scalar is one.
+/// Returns the arrays if the layout has one variable for each array; `None` if it has one for each scalar.
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }

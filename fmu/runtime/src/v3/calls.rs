@@ -11,7 +11,6 @@ use crate::version::Version;
 pub(super) const GET: u16 = ANY;
 pub(super) const SET: u16 = I | M | S | E | C;
 
-/// Functions of FMI 3.0 that are not in [`Version`], with the instance states in which they are allowed.
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {

@@ -15,8 +15,8 @@ pub(super) struct Dependency {
     independent_element: usize,
 }
 
-/// Finds the scalars on which a variable depends in the present state, each with the kind of the
-/// dependency.
+/// Returns the scalars on which the variable with the value reference `reference` depends in the present state, each with the
+/// kind of the dependency.
 pub(super) fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
@@ -56,8 +56,9 @@ pub(super) fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// Writes the dependencies of a variable to the host's arrays. Until the end of initialization mode they are the dependencies of
-/// the variable's initial value, afterwards the dependencies in the present state.
+/// Writes the dependencies of the variable `dependent` to four arrays of the host, which have `n` elements each. Until the
+/// end of initialization mode they are the dependencies of the initial value, and afterwards the dependencies in the present
+/// state.
 pub(super) unsafe fn write_dependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,

@@ -42,8 +42,8 @@ pub(super) unsafe fn directional_derivative<M: Model>(
     }
 }
 
-/// Computes the derivative of a weighted sum of the unknowns with respect to each known, as a directional
-/// derivative along this known.
+/// Computes the derivative of a weighted sum of the unknowns with respect to each known. `seed` contains the weights, and the
+/// results are written to `sensitivity`. Each result is computed from a directional derivative along one known.
 pub(super) unsafe fn adjoint_derivative<M: Model>(
     instance: fmi3Instance,
     (unknowns, n_unknowns): References,

@@ -12,7 +12,7 @@ use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::{Dimension, Value};
 
-/// Checks that the host passes one value for each value reference, if every variable is a scalar.
+/// Checks that the host passes one value for each value reference, as it must if every variable is a scalar.
 #[inline]
 pub(super) fn check_count(call: &Call, references: usize, values: usize) -> Result<(), Fault> {
     if references == values {
@@ -46,7 +46,10 @@ pub(super) fn scalars_of<'a, M: Model>(
     }
 }
 
-/// Returns the scalars of array variables. Their type must be the C type of the call.
+/// Returns the value references of all scalars of the array variables `references`.
+///
+/// # Errors
+/// If the type of a variable is not the C type of the call.
 pub(super) fn expand<M: Model>(
     arrays: &Arrays,
     call: &Call,
@@ -113,8 +116,9 @@ pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     }
 }
 
-/// Sets all variables whose size depends on the changed structural parameters to their start values. If the host had set
-/// other values, a warning in its log states that they are lost.
+/// Sets each array whose size `call` has changed to its start values. `scalars` are the structural parameters that the call
+/// has set, and `before` are the values that all parameters had before the call. If the host had set other values in these
+/// arrays, a warning in its log says that they are lost.
 pub(super) fn start_resized<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

@@ -4,7 +4,6 @@ use super::arrays::Arrays;
 use super::types::*;
 use crate::model::Model;
 
-/// Data about the host that an instance of FMI 3.0 stores.
 #[allow(missing_docs)]
 pub struct Host<M: Model> {
     pub(super) environment: fmi3InstanceEnvironment,
@@ -12,8 +11,8 @@ pub struct Host<M: Model> {
     pub(super) early_return_allowed: bool,
     pub(super) required: Vec<fmi3ValueReference>,
     pub(super) phase: Phase,
-    /// Values of inputs that the host has set in an intermediate update. The inputs reach these values at the end of the
-    /// following part of the step.
+    /// Values of inputs that the host has set in an intermediate update. The inputs reach them at the end of the part of the
+    /// step that follows.
     pub(super) ends: M::Inputs,
     pub(super) set: Vec<fmi3ValueReference>,
     pub(super) indicators: Vec<f64>,

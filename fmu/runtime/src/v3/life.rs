@@ -19,7 +19,7 @@ use crate::model::Model;
 use crate::table::Layout;
 use crate::version::Version;
 
-/// Returns a logger that calls the host's logger. Each '#' in a message is doubled, because for the host it would begin a
+/// Returns a logger that calls the host's logger. Each '#' in a message is doubled, because in FMI 3.0 a single '#' begins a
 /// reference to a variable.
 fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) -> Option<Logger> {
     let logger = logger?;
@@ -64,8 +64,8 @@ pub(super) unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Returns two properties of the model description to which the host's instantiationToken belongs: the layout of its variables
-/// (scalars or arrays), and which part of the variables it contains.
+/// Returns two properties of the model description to which the host's instantiationToken belongs: the layout of its
+/// variables (scalars or arrays), and the part of the variables that it contains (`None` for all).
 ///
 /// # Errors
 /// If the token or the instance's name is not accepted.
@@ -99,8 +99,8 @@ pub(super) struct Stepping {
     pub(super) update: fmi3IntermediateUpdateCallback,
 }
 
-/// Creates an instance for Co-Simulation. `variables` is the host's list requiredIntermediateVariables: a pointer to the value
-/// references of the variables that it reads or sets within steps, and their number.
+/// Creates an instance for Co-Simulation. `variables` points to the `count` value references of the variables that the host
+/// reads or sets within steps (requiredIntermediateVariables).
 ///
 /// # Errors
 /// If one of these variables cannot be read or set within a step.

@@ -30,8 +30,9 @@ pub(super) unsafe fn set_states<M: Model>(
     }
 }
 
-/// Fills an array of the host with one value per continuous state that exists with the present array sizes. `body` writes the
-/// values of all states that exist with the largest sizes.
+/// Fills an array of the host with one value for each continuous state that exists with the present array sizes. `body`
+/// writes the values of all states that exist with the largest sizes, from which the present ones are selected. The host
+/// passes the array as the argument `name`.
 pub(super) unsafe fn fill_states<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,

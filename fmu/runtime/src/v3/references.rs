@@ -5,7 +5,6 @@ use crate::model::Model;
 use crate::table::Scalar;
 use crate::variable::{Causality, Kind, Variable};
 
-/// Returns the value reference of a scalar: its position among the scalars, counted from 1.
 #[inline]
 pub(super) fn scalar_reference<M: Model>(scalar: &Scalar<M>) -> u32 {
     scalar.index + 1
@@ -59,7 +58,7 @@ pub(super) fn wrong_reference<M: Model>(
     }
 }
 
-/// A variable of FMI 3.0 that is not in the table: the time or an event indicator.
+/// A variable of FMI 3.0 that is not in the table of variables: the time or an event indicator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Extra {
@@ -84,8 +83,8 @@ pub fn extra_names<M: Model>() -> Vec<String> {
     std::iter::once("time".to_string()).chain(indicators).collect()
 }
 
-/// Returns the value reference of the time, the independent variable. The event indicators have the
-/// value references after it.
+/// Returns the value reference of the independent variable, the time. The event indicators have the value references after
+/// it.
 pub fn time_reference<M: Model>() -> u32 {
     M::table().scalars.len() as u32 + 1
 }
@@ -95,8 +94,8 @@ fn extra_name<M: Model>(reference: u32) -> Option<String> {
     extra_names::<M>().into_iter().nth(place as usize)
 }
 
-/// Returns true if hosts may read or set a variable within a step. An input that is determined by other inputs cannot be
-/// set, because it has no independent value at the end of the step.
+/// Returns true if hosts may read or set this variable within a step. Inputs that other inputs determine are excluded,
+/// because they have no value of their own at the end of the step.
 pub fn has_intermediate_update<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Output)
         && variable.c_type() == CType::Real

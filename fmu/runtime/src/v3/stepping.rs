@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::number::is_finite;
 use crate::version::Version;
 
-/// Computes the time derivatives of outputs at the end of the last step; only order 1 is supported.
+/// Computes the time derivatives of outputs at the end of the last step. All `orders` must be 1.
 pub(super) unsafe fn output_derivatives<M: Model>(
     instance: fmi3Instance,
     (references, count): References,
@@ -58,8 +58,9 @@ struct Wish {
     early_return: Option<f64>,
 }
 
-/// Calls the host's callback intermediateUpdate at `time`. During the call there must be no reference into the instance,
-/// because the host calls the FMU from within its callback.
+/// Calls the host's callback intermediateUpdate at `time`, s, and returns the host's wish, for example to return early. While
+/// the callback runs there must be no reference into the instance, because the host calls functions of the FMU from within
+/// its callback.
 unsafe fn intermediate_update<M: Model>(
     instance: fmi3Instance,
     time: f64,
@@ -139,8 +140,8 @@ impl Answers {
     }
 }
 
-/// Makes one step. If the host allows early return, the step stops at an event. `eventHandlingNeeded` is set for an event
-/// within the step or at its end. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU stores no past states.
+/// Makes one communication step of `h` seconds from the time `at`, s. If the host allows early return, the step stops at an
+/// event; eventHandlingNeeded is set for an event within the step or at its end.
 pub(super) unsafe fn do_step<M: Model>(
     instance: fmi3Instance,
     (at, h): (fmi3Float64, fmi3Float64),
@@ -185,8 +186,8 @@ unsafe fn write_step_results<M: Model>(
     log.report_step_warning(instance);
 }
 
-/// Makes one step with two intermediate updates: at its start, when the host may set the inputs for the end of the step and
-/// request an early return, and at its end.
+/// Makes one step with two intermediate updates. In the first, at the start of the step, the host may set the inputs for the
+/// end of the step and request an early return; the second is at the end.
 unsafe fn step_with_updates<M: Model>(
     instance: fmi3Instance,
     at: f64,

@@ -16,8 +16,8 @@ pub type fmi3Float32 = f32;
 pub type fmi3Int32 = i32;
 pub type fmi3Int64 = i64;
 pub type fmi3UInt64 = u64;
-/// The bool of C: one byte, in which 0 is false and any other value is true. It is not a Rust bool, because bytes other than
-/// 0 and 1 would be undefined behaviour.
+/// The bool of C: one byte, in which 0 is false and any other value is true. It is not Rust's bool, because in a Rust bool
+/// any byte except 0 and 1 is undefined behaviour.
 pub type fmi3Boolean = u8;
 pub type fmi3String = *const c_char;
 pub type fmi3Byte = u8;

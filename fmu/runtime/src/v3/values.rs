@@ -89,8 +89,8 @@ fn extra_value<M: Model>(
     }
 }
 
-/// Checks that a variable may be read or set within a step: the host must have declared it at instantiation
-/// (requiredIntermediateVariables), and `phase` must be the present phase of the intermediate update.
+/// Checks that the host may get or set the variable `reference` within a step. The host must have declared it at
+/// instantiation (requiredIntermediateVariables), and the present phase of the intermediate update must be `phase`.
 #[cold]
 pub(super) fn check_intermediate<M: Model>(
     component: &Component<M, Fmi3>,
@@ -166,7 +166,8 @@ fn set_arrays<M: Model>(
     Ok(())
 }
 
-/// Sets inputs within a step. The values apply to the end of the following part of the step.
+/// Sets inputs during an intermediate update. Element n of `references` gets `value(n)`, which applies to the end of the part
+/// of the step that follows.
 #[cold]
 fn set_ends<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -198,8 +199,8 @@ fn set_ends<M: Model>(
     Ok(())
 }
 
-/// Checks the arguments of a getter or setter for a type that no variable has. The call succeeds if it has no value
-/// references, and otherwise fails.
+/// Checks the arguments of a getter or setter for a type that no variable has. The call is allowed without value references,
+/// and otherwise fails.
 fn check_no_variable<M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
@@ -218,7 +219,6 @@ fn check_no_variable<M: Model>(
     }
 }
 
-/// Executes a getter or setter for a type that no variable has; see [`check_no_variable`].
 pub(super) unsafe fn access_no_variable<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
