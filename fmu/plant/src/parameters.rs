@@ -3,10 +3,12 @@
 //! (`hub.I` in the FMU), `wheel.inertia` (`wheel.I`) and `own_inertia` (`I_own`). Meanings, units and ranges are in
 //! the FMU's variable table.
 
+// The variable table has the texts.
+#![allow(missing_docs)]
+
 use crate::slosh_model::SloshModel;
 
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[allow(missing_docs)]
 pub struct Parameters {
     pub hub: Hub,
     pub tank: Tank,
@@ -22,7 +24,6 @@ pub struct Parameters {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Hub {
     pub inertia: f64,
     pub imbalance: f64,
@@ -34,7 +35,6 @@ pub struct Hub {
 
 /// An upright cylindrical tank, whose axis is parallel to the bearing axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Tank {
     pub d: f64,
     pub h: f64,
@@ -43,7 +43,6 @@ pub struct Tank {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Fluid {
     pub rho: f64,
     pub nu: f64,
@@ -53,14 +52,12 @@ pub struct Fluid {
 /// Source of the modal parameters: the dimensions of an upright cylinder, or a table of modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-#[allow(missing_docs)]
 pub enum SloshSource {
     Geometry = 1,
     Table = 2,
 }
 
 impl SloshSource {
-    /// All values in the order of their numbers.
     pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
 }
 
@@ -73,7 +70,6 @@ pub const MODES: usize = 10;
 /// `ConstantRatio` if it is a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-#[allow(missing_docs)]
 pub enum DampingLaw {
     Laminar = 1,
     ConstantRatio = 2,
@@ -81,14 +77,12 @@ pub enum DampingLaw {
 }
 
 impl DampingLaw {
-    /// All values in the order of their numbers.
     pub const ALL: [DampingLaw; 3] =
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::BySource];
 }
 
 /// The slosh model and its parameters. `modes` is the number of modes, 1 to [`MODES`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Slosh {
     pub model: SloshModel,
     pub source: SloshSource,
@@ -109,7 +103,6 @@ pub struct Slosh {
 /// - `direction`: angle, rad, from the tangent to the direction in which a mode moves its mass, positive outwards.
 /// - `one_axis`: true if the tank also has modes along a second axis, which the table does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct ModeTable {
     pub one_axis: bool,
     pub m_liq: f64,
@@ -148,7 +141,6 @@ impl ModeTable {
 
 /// A flat ring baffle at the wall of the tank, `depth` m below the surface. A `width` of 0 m means that there is no baffle.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[allow(missing_docs)]
 pub struct Ring {
     pub width: f64,
     pub depth: f64,
@@ -157,7 +149,6 @@ pub struct Ring {
 /// Attitude of the bench: the angle `tilt` between its axis and gravity, rad, and the azimuth `tilt_azimuth` of gravity's
 /// component across the axis, rad.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[allow(missing_docs)]
 pub struct Bench {
     pub tilt: f64,
     pub tilt_azimuth: f64,
@@ -168,7 +159,6 @@ pub struct Bench {
 /// describes when to choose it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-#[allow(missing_docs)]
 pub enum FrictionModel {
     None = 1,
     Viscous = 2,
@@ -178,7 +168,6 @@ pub enum FrictionModel {
 }
 
 impl FrictionModel {
-    /// All values in the order of their numbers.
     pub const ALL: [FrictionModel; 5] = [
         FrictionModel::None,
         FrictionModel::Viscous,
@@ -191,7 +180,6 @@ impl FrictionModel {
 /// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are, for each direction of rotation, the
 /// coefficients of cos theta, sin theta, cos 2 theta and sin 2 theta in the directional factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Friction {
     pub model: FrictionModel,
     pub b: f64,
@@ -208,7 +196,6 @@ pub struct Friction {
 
 /// Initial conditions. The slosh angles and rates belong to mode 1; all other modes start at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[allow(missing_docs)]
 pub struct Init {
     pub theta: f64,
     pub omega: f64,
@@ -219,7 +206,6 @@ pub struct Init {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Wheel {
     pub enabled: bool,
     pub inertia: f64,
@@ -230,7 +216,6 @@ pub struct Wheel {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Imu {
     pub enabled: bool,
     pub rate: f64,
@@ -245,7 +230,6 @@ pub struct Imu {
 
 /// Limits of the integrator. `max_steps` is the largest number of internal steps and gyro samples in one call.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Solver {
     pub max_steps: usize,
 }

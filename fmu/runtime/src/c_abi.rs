@@ -134,7 +134,6 @@ pub fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// Copies a C string that the host passes; `None` if the pointer is NULL.
 pub unsafe fn text(string: *const c_char) -> Option<String> {
     if string.is_null() {
         return None;
@@ -227,7 +226,6 @@ pub struct Component<M: Model, V: Version> {
     pub host: V::Host<M>,
 }
 
-/// Creates the component of an instance on the heap and returns the handle for the host, which points to it.
 pub fn new_component<M: Model, V: Version>(
     instance: Instance<M, V>,
     log: Log,
@@ -441,7 +439,6 @@ struct SavedState<M: Model, V: Version> {
     instance: Instance<M, V>,
 }
 
-/// Creates a saved state, which is a copy of an instance, and returns the handle for the host.
 pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void {
     let mut state = Box::new(SavedState { mark: 0, instance });
     state.mark = mark::<M, V>(STATE, ptr::from_ref(&*state).cast());
@@ -485,8 +482,6 @@ pub unsafe fn save_state<M: Model, V: Version>(
     Ok(())
 }
 
-/// Writes the number of bytes of a serialised state to the host's variable `size`. `name` and `saved` are name and handle of
-/// the saved state.
 pub unsafe fn serialized_size<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,

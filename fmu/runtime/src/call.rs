@@ -5,18 +5,18 @@
 
 use std::fmt;
 
-/// Type of the interface for which a host creates an instance.
+/// Type of the interface for which a host creates an instance: in Model Exchange the host integrates the equations of the
+/// FMU, in Co-Simulation the FMU does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum Interface {
-    /// Model Exchange, in which the host integrates the equations of the FMU.
     ModelExchange = 0,
-    /// Co-Simulation, in which the FMU integrates its equations itself.
     CoSimulation = 1,
 }
 
+#[allow(missing_docs)]
 impl Interface {
-    /// Returns the name of the interface for messages.
     pub const fn name(self) -> &'static str {
         match self {
             Interface::ModelExchange => "Model Exchange",
@@ -28,8 +28,8 @@ impl Interface {
 /// Who handles events, such as the start of sticking: the FMU within its steps, or the host in event mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum Events {
-    /// The FMU handles events within its steps.
     InStep = 0,
     /// The host handles events in event mode. Discrete values change only there.
     ByHost = 1,
@@ -37,8 +37,8 @@ pub enum Events {
     Reported = 2,
 }
 
+#[allow(missing_docs)]
 impl Events {
-    /// All variants in the order of their numbers.
     pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
@@ -64,8 +64,8 @@ pub enum InstanceState {
     Intermediate = 10,
 }
 
+#[allow(missing_docs)]
 impl InstanceState {
-    /// All states, in the order of their numbers.
     pub const ALL: [InstanceState; 11] = [
         InstanceState::Instantiated,
         InstanceState::Initialization,
@@ -80,7 +80,6 @@ impl InstanceState {
         InstanceState::Intermediate,
     ];
 
-    /// Returns the name of the state for messages.
     pub const fn name(self) -> &'static str {
         match self {
             InstanceState::Instantiated => "instantiated",
@@ -257,8 +256,8 @@ pub enum Severity {
 
 /// The reason why a call has failed.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Fault {
-    /// Severity of the fault.
     pub severity: Severity,
     /// Message for the log, which names the function and the variable and states the allowed values.
     pub text: String,

@@ -5,8 +5,8 @@
 #[derive(Clone, Copy, Debug)]
 pub struct Hash(u128);
 
+#[allow(missing_docs)]
 impl Hash {
-    /// Returns the hash of an empty string.
     pub const fn new() -> Hash {
         Hash(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
@@ -26,7 +26,6 @@ impl Hash {
         self.bytes(text.as_bytes()).bytes(&[0xff])
     }
 
-    /// Returns the hash value.
     pub const fn value(self) -> u128 {
         self.0
     }

@@ -50,7 +50,6 @@ pub struct Instance<M: Model, V: Version> {
     /// The model, which is created when a call first needs it in initialization mode. It is dropped if a parameter or input
     /// is set before the simulation starts.
     pub(crate) model: Option<M>,
-    /// The outputs that were computed last. `known` says which of them are valid at the present instant.
     pub(crate) outputs: Option<M::Outputs>,
     pub(crate) known: Known,
     /// Values of the discrete outputs that the host saw when it was last in event mode, by slot. They are needed if events
@@ -148,6 +147,7 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
     }
 }
 
+#[allow(missing_docs)]
 impl<M: Model, V: Version> Instance<M, V> {
     /// Creates an instance for a host that does not choose who handles events: in Model Exchange the host handles them, in
     /// Co-Simulation the FMU within its steps.
@@ -202,7 +202,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Places { extent: self.extent.clone(), next: 0, model: PhantomData }
     }
 
-    /// Returns the interface for which the instance was created.
     pub fn interface(&self) -> Interface {
         self.interface
     }
@@ -217,7 +216,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(call)
     }
 
-    /// Returns the state of the instance in the standard's state machine, which determines the allowed calls.
     pub fn state(&self) -> InstanceState {
         self.state
     }
@@ -276,7 +274,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Enters initialization mode. From then on the host can read all variables.
     pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
         self.check(V::ENTER_INITIALIZATION)?;
         self.state = InstanceState::Initialization;
@@ -520,7 +517,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(all.any(|(scalar, shown)| discrete(scalar, &outputs) != *shown))
     }
 
-    /// Stores the value of an input or a parameter, and drops all results that depend on it.
     #[inline(always)]
     fn store(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
@@ -860,10 +856,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.known = Known::Nothing;
     }
 
-    /// Computes the directional derivative of the `unknowns` in initialization mode and writes it to `answers`. It uses
+    /// Computes the directional derivatives of the unknowns in initialization mode and writes them to `answers`. It uses
     /// central differences with Richardson extrapolation between instances with different start values, because there are no
-    /// equations for derivatives with respect to parameters. Each known is changed by about a thousandth of its value, or of
-    /// its nominal value if that is larger.
+    /// equations for derivatives with respect to parameters. The step is so short that each known changes by at most some
+    /// thousandths of its value, or of its nominal value if its value is 0.
     fn initial_derivative(
         &self,
         call: &Call,
@@ -922,10 +918,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes the directional derivatives of the unknowns in initialization mode and writes them to `answers`. It uses
-    /// central differences with Richardson extrapolation between instances with different start values, because there are no
-    /// equations for derivatives with respect to parameters. The step is so short that each known changes by at most some
-    /// thousandths of its value, or of its nominal value if its value is 0.
+    /// Makes a step as [`Instance::do_step`] does, for a host that handles events between steps. If `stops` is true, the step
+    /// stops at its first event.
     #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
@@ -1017,7 +1011,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(ended)
     }
 
-    /// Drops the slopes of the last step, so that the inputs are constant until new slopes are set.
     #[inline]
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
@@ -1145,20 +1138,12 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Leaves event mode, so that steps can follow.
-    ///
-    /// # Errors
-    /// If the present state does not allow `call`.
     pub fn enter_step_mode(&mut self, call: &'static Call) -> Result<(), Fault> {
         self.check(call)?;
         self.state = InstanceState::Stepping;
         Ok(())
     }
 
-    /// Enters continuous-time mode, in which the host integrates.
-    ///
-    /// # Errors
-    /// If the present state does not allow it.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_CONTINUOUS_TIME)?;
         self.leave_initialized(call)?;
@@ -1315,7 +1300,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
-    /// Writes the nominal values of the continuous states to `nominals`. Hosts scale their tolerances by them.
     pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_NOMINALS)?;
         let places = self.places();
@@ -1405,7 +1389,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
     }
 
-    /// Returns the parameters in the model's own type, without a check of their values.
     fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
@@ -1461,7 +1444,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(query_model(*events, model, inputs, question))
     }
 
-    /// Returns a warning about the host's step sizes; see [`Model::step_warning`].
     pub fn step_warning(&self) -> Option<&'static str> {
         self.model.as_ref().and_then(M::step_warning)
     }
@@ -1473,7 +1455,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.model.as_ref().map_or(0, M::event_count)
     }
 
-    /// Returns the text of the last event for the log.
     pub fn last_event(&self) -> String {
         self.model.as_ref().map_or(String::new(), M::last_event)
     }

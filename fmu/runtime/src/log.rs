@@ -75,13 +75,12 @@ pub struct Filter {
     fatal: bool,
 }
 
+#[allow(missing_docs)]
 impl Filter {
     /// Failures and warnings but no events. A new instance starts with this selection.
     pub const FAILURES: Filter =
         Filter { events: false, warning: true, discard: true, error: true, fatal: true };
-    /// All messages.
     pub const ALL: Filter = Filter { events: true, ..Filter::FAILURES };
-    /// No messages.
     pub const NONE: Filter =
         Filter { events: false, warning: false, discard: false, error: false, fatal: false };
 
@@ -118,7 +117,6 @@ impl Filter {
         Err(format!("unknown log category {}; known: {}", unknown.join(", "), known.join(", ")))
     }
 
-    /// Returns true if messages on `topic` are passed to the host's log.
     pub fn wants(mut self, topic: Topic) -> bool {
         *self.switch(topic)
     }

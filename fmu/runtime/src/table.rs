@@ -17,7 +17,6 @@ use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Va
 pub struct About {
     /// Name of the FMU, from which modelName, modelIdentifier and the name of the file are made.
     pub model: &'static str,
-    /// Version of the model and its table.
     pub version: &'static str,
     pub description: &'static str,
     /// Description of the log category for events; "" if the model has no events.
@@ -32,7 +31,6 @@ pub struct About {
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Table<M: Dynamics> {
-    /// Properties of the FMU as a whole.
     pub about: About,
     pub variables: &'static [Variable<M>],
     pub scalars: &'static [Scalar<M>],
@@ -43,19 +41,20 @@ pub struct Table<M: Dynamics> {
     tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
 }
 
-/// Form of arrays in the model description that the host has read.
+/// Form of arrays in the model description that the host has read: in `Scalars` each element of an array is a variable, in
+/// `Arrays` the array is one variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum Layout {
-    /// Each element of an array is a variable of its own.
     Scalars = 0,
-    /// Each entry of the table is one variable, with dimensions if it is an array. Then the integer parameters that determine
-    /// the lengths of arrays are structural.
+    /// Each entry of the table is one variable, with dimensions if it is an array. The integer parameters that determine the
+    /// lengths of arrays are then structural.
     Arrays = 1,
 }
 
+#[allow(missing_docs)]
 impl Layout {
-    /// Both layouts.
     pub const ALL: [Layout; 2] = [Layout::Scalars, Layout::Arrays];
 }
 
@@ -195,8 +194,8 @@ const fn is_discrete<M: Dynamics>(variable: &Variable<M>) -> bool {
     matches!(variable.access, Access::OutputInteger(_) | Access::OutputBoolean(_))
 }
 
+#[allow(missing_docs)]
 impl<M: Dynamics> Scalar<M> {
-    /// Returns the name of the scalar, with indices if it is an element of an array.
     pub fn name(&self) -> String {
         self.variable.element_name(self.element)
     }
@@ -207,13 +206,11 @@ impl<M: Dynamics> Scalar<M> {
         self.state.map(|place| place(self.element))
     }
 
-    /// Returns an error message if `value` is not allowed for this scalar, otherwise `None`.
     #[inline]
     pub fn problem(&self, value: Value) -> Option<String> {
         self.variable.problem(self.element, value)
     }
 
-    /// Returns the start value; `None` if the value of the scalar is computed.
     pub fn start(&self) -> Option<Value> {
         let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
         self.variable.start(&mut parameters, &mut inputs, self.element)
@@ -234,6 +231,7 @@ impl<M: Dynamics> Scalar<M> {
     }
 }
 
+#[allow(missing_docs)]
 impl<M: Dynamics> Table<M> {
     /// Creates the table of a model from its entries `variables` and their `scalars` (see [`scalars`]).
     pub const fn new(
@@ -304,21 +302,18 @@ impl<M: Dynamics> Table<M> {
         self.scalars.iter().filter(|scalar| is_discrete(scalar.variable))
     }
 
-    /// Returns the start values of the parameters in the order of the table.
     pub fn starts(&self) -> Vec<Value> {
         let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
         let start = |s: &Scalar<M>| s.variable.start(&mut parameters, &mut inputs, s.element);
         self.parameters().iter().filter_map(start).collect()
     }
 
-    /// Returns the scalar inputs in the order of the table.
     #[inline]
     pub const fn inputs(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.inputs;
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the scalar parameters in the order of the table.
     #[inline]
     pub const fn parameters(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.parameters;
@@ -346,7 +341,6 @@ impl<M: Dynamics> Table<M> {
         self.scalars.iter().find(|s| s.state() == Some(place))
     }
 
-    /// Returns the units that the variables of the table use.
     pub fn units(&self) -> impl Iterator<Item = &'static Unit> {
         let used = |unit: &&Unit| {
             self.variables
@@ -356,7 +350,6 @@ impl<M: Dynamics> Table<M> {
         unit::UNITS.iter().filter(used)
     }
 
-    /// Returns the enumerations that the variables use, in the order of their first use.
     pub fn enumerations(&self) -> Vec<&'static Enumeration> {
         let mut all: Vec<&'static Enumeration> = Vec::new();
         for v in self.variables {

@@ -118,7 +118,6 @@ mod list {
 }
 pub use list::*;
 
-/// FMI 2.0, as an implementation of [`Version`].
 #[derive(Clone, Copy, Debug)]
 pub struct Fmi2;
 

@@ -14,8 +14,8 @@ pub enum Value {
     Boolean(bool),
 }
 
+#[allow(missing_docs)]
 impl Value {
-    /// Returns the number if the value is a real number; otherwise `None`.
     #[inline]
     pub fn real(self) -> Option<f64> {
         match self {
@@ -24,7 +24,6 @@ impl Value {
         }
     }
 
-    /// Returns the number if the value is an integer or the item of an enumeration; otherwise `None`.
     #[inline]
     pub fn integer(self) -> Option<i32> {
         match self {
@@ -33,7 +32,6 @@ impl Value {
         }
     }
 
-    /// Returns true or false if the value is a Boolean; otherwise `None`.
     #[inline]
     pub fn boolean(self) -> Option<bool> {
         match self {
@@ -75,13 +73,12 @@ pub struct Item {
     pub description: &'static str,
 }
 
+#[allow(missing_docs)]
 impl Item {
-    /// Creates an item of an enumeration with its description.
     pub const fn new(name: &'static str, description: &'static str) -> Item {
         Item { name, description }
     }
 
-    /// Creates the items of an enumeration from pairs of name and description.
     pub const fn list<const N: usize>(rows: [(&'static str, &'static str); N]) -> [Item; N] {
         let mut items = [Item { name: "", description: "" }; N];
         let mut i = 0;
@@ -93,7 +90,6 @@ impl Item {
     }
 }
 
-/// Type of a variable whose values are named items, for example the slosh models.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Enumeration {
@@ -102,7 +98,6 @@ pub struct Enumeration {
     pub items: &'static [Item],
 }
 
-/// Type of a variable with its properties.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub enum Kind {
@@ -130,8 +125,8 @@ pub enum Dimension {
     Used(&'static str, usize),
 }
 
+#[allow(missing_docs)]
 impl Dimension {
-    /// Returns the largest number of elements that the array can have.
     pub const fn most(self) -> usize {
         match self {
             Dimension::Fixed(length) | Dimension::Sized(_, length) | Dimension::Used(_, length) => {
@@ -180,7 +175,6 @@ pub struct Variable<M: Dynamics> {
     pub description: &'static str,
     pub causality: Causality,
     pub kind: Kind,
-    /// Functions that read the value from the model or write it.
     pub access: Access<M>,
     /// Length of each dimension of an array; empty for a scalar.
     pub shape: &'static [Dimension],
@@ -191,7 +185,6 @@ pub struct Variable<M: Dynamics> {
     /// True if other inputs determine how this input changes during a step, whatever slope the host sets (see
     /// [`Dynamics::set_dependent_slopes`]).
     pub follows_inputs: bool,
-    /// True if the host can set this parameter during the simulation.
     pub tunable: bool,
     /// Inputs and continuous states on which the variable depends without delay. The name of an array stands for all its
     /// elements; the name with "[]" stands for the element with the same index as the element of this variable.
@@ -251,6 +244,7 @@ const fn quantity(unit: &'static str) -> Kind {
 macro_rules! declarations {
     ($($(#[$doc:meta])* $function:ident($($argument:ident: $type:ty),*) =
         $causality:ident, $kind:expr, $access:expr;)*) => {
+        #[allow(missing_docs)]
         impl<M: Dynamics> Variable<M> {
             $(
                 $(#[$doc])*
@@ -269,12 +263,9 @@ macro_rules! declarations {
 const INTEGER: Kind = Kind::Integer { min: None, max: None };
 
 declarations! {
-    /// Declares an input; `ramp` returns references to its value and its slope.
     input(ramp: fn(&mut M::Inputs, usize) -> [&mut f64; 2], unit: &'static str) =
         Input, quantity(unit), Access::Input(ramp);
-    /// Declares an output; `get` reads element n from the model's outputs.
     output(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Output, quantity(unit), Access::Output(get);
-    /// Declares a real local variable. `get` reads element n from the model's outputs.
     local(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Local, quantity(unit), Access::Output(get);
     /// Declares a real local variable that depends only on parameters and present inputs. `get` returns its value, and the
     /// rate at which it changes if the inputs follow their slopes.
@@ -282,19 +273,13 @@ declarations! {
         Local, quantity(unit), Access::OfInputs(get);
     /// Declares the derivative of a continuous state. Its name must be "der(", the name of the state, and ")".
     derivative(of: Place, unit: &'static str) = Local, quantity(unit), Access::Derivative(of);
-    /// Declares a Boolean local variable; `get` reads element n from the model's outputs.
     local_boolean(get: fn(&M::Outputs, usize) -> bool) = Local, Kind::Boolean, Access::OutputBoolean(get);
-    /// Declares an integer local variable; `get` reads element n from the model's outputs.
     local_integer(get: fn(&M::Outputs, usize) -> i32) = Local, INTEGER, Access::OutputInteger(get);
-    /// Declares a local variable that is an enumeration; `get` reads element n from the model's outputs.
     local_enumeration(of: &'static Enumeration, get: fn(&M::Outputs, usize) -> i32) =
         Local, Kind::Enumeration(of), Access::OutputInteger(get);
-    /// Declares a real parameter; `field` returns a reference to element n in the model's parameters.
     parameter(field: fn(&mut M::Parameters, usize) -> &mut f64, unit: &'static str) =
         Parameter, quantity(unit), Access::Real(field);
-    /// Declares a Boolean parameter; `field` returns a reference to it in the model's parameters.
     switch(field: fn(&mut M::Parameters) -> &mut bool) = Parameter, Kind::Boolean, Access::Boolean(field);
-    /// Declares an integer parameter; `field` returns a reference to element n in the model's parameters.
     integer(field: fn(&mut M::Parameters, usize) -> &mut i32) = Parameter, INTEGER, Access::Integer(field);
     /// Declares an integer parameter that the model stores in another type; `get` and `set` convert it.
     count(get: fn(&M::Parameters, usize) -> i32, set: fn(&mut M::Parameters, usize, i32)) =
@@ -302,11 +287,11 @@ declarations! {
     /// Declares a parameter that is an enumeration; `get` and `set` convert the number of the item.
     choice(of: &'static Enumeration, get: fn(&M::Parameters, usize) -> i32, set: fn(&mut M::Parameters, usize, i32)) =
         Parameter, Kind::Enumeration(of), Access::Choice { get, set };
-    /// Declares a calculated parameter; `get` computes element n from the model with its parameters.
     calculated(get: fn(&M, usize) -> f64, unit: &'static str) =
         CalculatedParameter, quantity(unit), Access::Calculated(get);
 }
 
+#[allow(missing_docs)]
 impl<M: Dynamics> Variable<M> {
     /// Declares a continuous state that is not an output.
     pub const fn state(
@@ -318,7 +303,6 @@ impl<M: Dynamics> Variable<M> {
         variable(name, Causality::Local, quantity(unit), Access::State, description).is_state(place)
     }
 
-    /// Sets the unit in which hosts show the variable by default.
     pub const fn display_unit(mut self, unit: &'static str) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.display_unit = Some(unit);
@@ -326,7 +310,6 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Sets the range of allowed values of a real variable.
     pub const fn range(mut self, min: f64, max: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.min = Some(min);
@@ -335,13 +318,11 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Sets the allowed range of an integer.
     pub const fn between(mut self, min: i32, max: i32) -> Self {
         self.kind = Kind::Integer { min: Some(min), max: Some(max) };
         self
     }
 
-    /// Sets the smallest allowed value of a real variable.
     pub const fn at_least(mut self, min: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.min = Some(min);
@@ -349,7 +330,6 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Sets the nominal value, which hosts use to scale tolerances.
     pub const fn nominal(mut self, nominal: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.nominal = Some(nominal);
@@ -357,13 +337,11 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Makes the variable an array with these dimensions.
     pub const fn shape(mut self, shape: &'static [Dimension]) -> Self {
         self.shape = shape;
         self
     }
 
-    /// Makes the variable a continuous state of the model.
     pub const fn is_state(mut self, place: Place) -> Self {
         self.state = Some(place);
         self
@@ -382,19 +360,16 @@ impl<M: Dynamics> Variable<M> {
         self
     }
 
-    /// Makes the parameter tunable, so that it can be set while the simulation runs.
     pub const fn tunable(mut self) -> Self {
         self.tunable = true;
         self
     }
 
-    /// Declares the inputs and states on which the variable depends without delay.
     pub const fn depends_on(mut self, known: &'static [&'static str]) -> Self {
         self.depends_on = known;
         self
     }
 
-    /// Declares further parameters and inputs on which the initial value depends.
     pub const fn initial_depends_on(mut self, known: &'static [&'static str]) -> Self {
         self.initial_depends_on = known;
         self
@@ -410,7 +385,6 @@ impl<M: Dynamics> Variable<M> {
         len
     }
 
-    /// Returns the largest length of each dimension.
     pub fn lengths(&self) -> impl DoubleEndedIterator<Item = usize> + ExactSizeIterator + use<M> {
         self.shape.iter().map(|dimension| dimension.most())
     }
@@ -505,7 +479,6 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the smallest allowed value of a real variable; `None` if there is no limit.
     pub const fn min(&self) -> Option<f64> {
         match self.kind {
             Kind::Real(quantity) => quantity.min,
@@ -534,7 +507,6 @@ impl<M: Dynamics> Variable<M> {
             && (max.is_none_or(|max| change <= max) || min.is_none_or(|min| change <= -min))
     }
 
-    /// Returns the unit of a real variable, and "" for other types.
     pub const fn unit(&self) -> &'static str {
         match self.kind {
             Kind::Real(quantity) => quantity.unit,
@@ -542,7 +514,6 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the nominal value of a real variable; 1 if none is declared.
     pub const fn nominal_value(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { nominal: Some(nominal), .. }) => nominal,
@@ -550,7 +521,6 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the C type in which the variable is read and set.
     #[inline]
     pub const fn c_type(&self) -> CType {
         match self.kind {

@@ -80,12 +80,10 @@ impl Arrays {
         self.types.get(n).copied().unwrap_or(CType::Real)
     }
 
-    /// Returns the number of variables that have a value reference in this layout.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Returns true if there are no variables.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
@@ -178,7 +176,6 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
     if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
 }
 
-/// Returns the arrays if the layout has one variable for each array; `None` if it has one for each scalar.
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }
@@ -194,8 +191,8 @@ mod tests {
         all
     }
 
-    /// The variables of the test model have the numbers 1 to 10: level, square, der(level), q, rows, w, m, k, time,
-    /// indicators. With 3 trays the time is scalar number 25.
+    /// The variables of the test model have the value references 1 to 10: level, square, der(level), q, rows, w, m, k, then
+    /// the time and the event indicators.
     #[test]
     fn an_array_has_the_number_of_elements_that_its_size_parameter_gives() {
         let scalars_of_rows = |rows: i32| {

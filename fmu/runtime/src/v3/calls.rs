@@ -47,7 +47,6 @@ mod list {
 }
 pub use list::*;
 
-/// FMI 3.0, as an implementation of [`Version`].
 #[derive(Clone, Copy, Debug)]
 pub struct Fmi3;
 
