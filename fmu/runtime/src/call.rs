@@ -271,7 +271,7 @@ mod tests {
     use crate::version::Version;
 
     #[test]
-    fn numbers_of_instance_states_match_their_order() {
+    fn the_number_of_each_instance_state_is_its_position_in_the_list() {
         for (n, state) in InstanceState::ALL.iter().enumerate() {
             assert_eq!(*state as usize, n);
         }
@@ -281,7 +281,7 @@ mod tests {
     const ME: Interface = Interface::ModelExchange;
 
     #[test]
-    fn refusal_names_call_state_and_allowed_states() {
+    fn the_message_of_a_refused_call_names_its_state_and_the_allowed_states() {
         let fault = Fmi2::DO_STEP.check(CS, InStep, InstanceState::Instantiated).unwrap_err();
         assert_eq!(
             fault.text,

@@ -82,8 +82,8 @@ fn instance_goes_through_the_states_of_its_interface() {
     }
 }
 
-/// Two start levels are both too high. One error at the end of initialisation contains both problems, and the
-/// levels can be corrected.
+/// Two start levels are both too high. The error at the end of initialisation contains both problems, and the host can then
+/// correct the levels.
 #[test]
 fn contradicting_parameters_end_initialization_with_all_faults_named() {
     let mut instance = fresh(CS);
@@ -149,7 +149,6 @@ const CALLS: [&Call; 40] = [
     Fmi2::GET_NOMINALS,
 ];
 
-/// Names of the functions that both interfaces allow in every instance state except "fatal".
 const ALWAYS: [&str; 12] = [
     "SetDebugLogging",
     "Reset",
@@ -169,8 +168,8 @@ const STATUS: [&str; 5] =
 const SET: [&str; 4] = ["SetReal", "SetInteger", "SetBoolean", "SetString"];
 const LOOK: [&str; 3] = ["GetDerivatives", "GetEventIndicators", "GetContinuousStates"];
 
-/// The state machines of FMI 2.0.1 (sections 3.2.3 and 4.2.4), state by state. In addition, this FMU allows hosts to enter
-/// event mode again from event mode, to set time and states in event mode, and to terminate after a failed step.
+/// The expected calls are those of FMI 2.0.1, sections 3.2.3 and 4.2.4. In addition, this FMU lets hosts enter event mode
+/// again from event mode, set time and states in event mode, and terminate after a failed step.
 #[test]
 fn calls_allowed_in_each_state_equal_those_of_the_standard() {
     use InstanceState::*;

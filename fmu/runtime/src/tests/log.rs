@@ -25,7 +25,7 @@ fn line(status: Status, category: &str, message: &str) -> Line {
 }
 
 #[test]
-fn failures_come_with_status_and_category() {
+fn the_log_of_a_failure_has_its_status_and_category() {
     let (mut log, lines) = log();
     for (severity, status, category) in [
         (Severity::Discard, c_abi::DISCARD, "logStatusDiscard"),
@@ -61,7 +61,6 @@ fn events_are_logged_on_request_with_the_last_one_and_their_number() {
     assert!(lines.take().is_empty());
 }
 
-/// The warnings depend on the model at the start of the motion: its parameters, states and present inputs.
 #[test]
 fn warnings_concern_the_parameters_at_the_start_of_the_motion() {
     let mut instance = fresh(ME);
@@ -147,7 +146,7 @@ fn log_categories_are_the_standards_and_include_events_only_if_the_model_has_eve
 }
 
 #[test]
-fn log_categories_are_enabled_by_name() {
+fn only_messages_in_log_categories_that_the_host_names_are_logged() {
     let all = [
         Topic::Event,
         Topic::Warning,

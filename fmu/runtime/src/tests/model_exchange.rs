@@ -47,7 +47,7 @@ fn arrays_of_states_and_derivatives_with_a_wrong_length_are_refused() {
 }
 
 #[test]
-fn states_that_are_too_large_are_discarded() {
+fn setting_continuous_states_that_are_too_large_is_discarded() {
     let mut instance = continuous(&[]);
     for x in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
         let before = to_bytes(&instance);
@@ -63,7 +63,7 @@ fn states_that_are_too_large_are_discarded() {
 }
 
 #[test]
-fn derivatives_that_are_not_finite_are_discarded() {
+fn reading_derivatives_that_are_not_finite_is_discarded() {
     let mut instance = continuous(&[("leak", 1e300)]);
     instance.set_continuous_states(&[0.0, 1e29]).unwrap();
     let mut x = [0.0; 2];
@@ -98,8 +98,8 @@ fn discrete_changes_happen_only_at_events() {
     );
 }
 
-/// Before the simulation starts, a variable depends on the values from which its initial value is computed. Afterwards it
-/// depends on those states and inputs that have an effect at present: without a leak a rate depends only on the inflow.
+/// In the test model a rate depends on the inflow and, only if there is a leak, on the level. Before the simulation starts, a
+/// variable depends on the values from which its initial value is computed.
 #[test]
 fn only_declared_dependencies_that_have_an_effect_now_are_reported() {
     let of = |instance: &mut Subject, name: &str| {
@@ -132,7 +132,7 @@ fn outputs_have_the_values_for_the_time_states_and_inputs_that_the_host_set_last
 }
 
 #[test]
-fn invalid_continuous_states_end_the_simulation() {
+fn invalid_continuous_states_in_model_exchange_end_the_simulation() {
     let mut instance = continuous(&[]);
     instance.set_continuous_states(&[-2.0, 1.0]).unwrap();
     assert_eq!(

@@ -41,8 +41,8 @@ fn valve_outputs(host: &mut Host) -> [Value; 3] {
 const CLOSED: [Value; 3] = [Value::Boolean(false), Value::Integer(0), Value::Integer(1)];
 const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Integer(2)];
 
-/// In FMI 3.0 with event mode, discrete outputs do not change in a step that ends at an event, but only in
-/// the following event mode.
+/// In FMI 3.0 with event mode, discrete outputs do not change in the step that ends at an event, but only in the event mode
+/// that follows.
 #[test]
 fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
@@ -71,7 +71,7 @@ fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     assert_eq!(valve_outputs(&mut host), OPENED);
 }
 
-/// An error ends the simulation of an instance in FMI 3.0, but its variables can still be read.
+/// In FMI 3.0 an error ends the simulation of an instance, but the host can still read its variables.
 #[test]
 fn after_an_error_before_initialization_discrete_outputs_have_their_start_values() {
     let mut host = Host::with_events(CS, Events::Reported);
@@ -100,7 +100,8 @@ fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value()
     assert!(host.get(&GET_FLOAT64, number("level[1]")).is_err());
 }
 
-/// In the test model a platform rises at w = 0.25 m/s from height 0 at t = 1 s. It opens a valve, which is the event.
+/// In the test model a platform rises at 0.25 m/s from height 0, from t = 1 s on. At a certain height it opens a valve, which
+/// is the event.
 #[test]
 fn a_step_ends_at_an_event_if_the_host_allows_early_return_and_input_ramps_end_there_too() {
     let real = |host: &mut Host, name: &str| match host.get(&GET_FLOAT64, number(name)) {
@@ -124,8 +125,8 @@ fn a_step_ends_at_an_event_if_the_host_allows_early_return_and_input_ramps_end_t
     assert_eq!(after(Events::InStep, true, 6.0), ((false, false), (7.0, 1.5)), "not told");
 }
 
-/// A time before the last event is allowed within 1e-9 of the time since the start, plus 8 rounding errors
-/// of the largest time.
+/// A time before the last event is allowed within 1e-9 of the time since the start, plus 8 rounding errors of the largest
+/// time.
 #[test]
 fn time_may_go_back_to_the_last_event_at_most() {
     for (start, last, slack) in [
@@ -154,7 +155,7 @@ fn time_may_go_back_to_the_last_event_at_most() {
     }
 }
 
-/// In FMI 3.0 an input outside its range and invalid continuous states return Discard, after which the host may continue.
+/// In FMI 3.0 these calls return the status Discard, after which the host may continue.
 #[test]
 fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     let mut host = stepping(Events::Reported, 0.0, &[]);
@@ -189,9 +190,9 @@ fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     assert!(refused(set(&mut two, "level[2]", 1.0)).contains("level[2]"));
 }
 
-/// In FMI 3.0 a step that needs more than a million internal steps is discarded, because a smaller step may succeed. A
-/// step in which a vessel overflows is an error, because no smaller step would succeed. In FMI 2.0 both are errors,
-/// which end the simulation.
+/// In FMI 3.0 a step that needs more than a million internal steps is discarded, because a shorter step may succeed. A step
+/// in which a vessel overflows is an error, because no shorter step would succeed. In FMI 2.0 both are errors, which end the
+/// simulation.
 #[test]
 fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
     let too_long = |discards: bool, done: Result<(), Fault>| {
@@ -212,8 +213,6 @@ fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
     assert_eq!(host.state(), InstanceState::Failed);
 }
 
-/// In FMI 3.0 Co-Simulation either the FMU handles events within the step, or events are reported to a host with event mode.
-/// In Model Exchange the host handles events.
 #[test]
 fn events_are_handled_by_the_interface_or_reported_in_co_simulation() {
     let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));

@@ -103,8 +103,8 @@ fn an_instance_restored_from_bytes_continues_bit_identically() {
     assert!(refused(again.do_step(2.0, 8.0)).contains("stop time 9.0 s"));
 }
 
-/// The inputs changed linearly in the step before. The outputs use these slopes until an input is set, also after
-/// the state is restored.
+/// The inputs have changed linearly in the last step. The outputs use these slopes until an input is set, also after the
+/// state was saved and restored.
 #[test]
 fn input_slopes_of_the_last_step_are_part_of_a_saved_state() {
     let mut instance = eventful();
@@ -181,7 +181,7 @@ fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     }
 }
 
-/// Single fields of a saved state are set to invalid values, and the checksum is adjusted.
+/// Single fields of a saved state get invalid values, and the checksum is adjusted to them.
 #[test]
 fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());

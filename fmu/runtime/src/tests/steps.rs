@@ -3,8 +3,8 @@
 use super::*;
 use crate::variable::Access;
 
-/// Returns the level of a vessel, m, after `h` seconds with a leak of k = 1/2 1/s. The level starts at `x`, and `q` is the
-/// inflow, whose slope is `slope`.
+/// Returns the level of a vessel, m, after `h` seconds, in closed form. The vessel leaks at the rate of 1/2 of its level per
+/// second. The level starts at `x`, m, and the inflow at `q` with the slope `slope`.
 fn level(x: f64, q: f64, slope: f64, h: f64) -> f64 {
     let e = (-0.5 * h).exp();
     x * e + 2.0 * q * (1.0 - e) + 2.0 * slope * (h - 2.0 * (1.0 - e))
@@ -54,8 +54,8 @@ fn a_step_must_be_longer_than_zero_and_begin_at_the_end_of_the_step_before() {
     assert!(unchanged(&mut instance, |i| i.do_step(-0.5, 1.0)).contains("= -0.5 s"));
 }
 
-/// Hosts add up step sizes in different ways. Times are equal within 1e-9 of the step size or the time since the start,
-/// whichever is larger, plus 8 rounding errors of the largest time.
+/// Hosts add up step sizes in different ways. Two times count as equal within 1e-9 of the step size or of the time since the
+/// start, whichever is larger, plus 8 rounding errors of the largest time.
 #[test]
 fn communication_point_may_be_off_by_rounding_errors() {
     for (start, before, h, slack) in [
@@ -81,8 +81,8 @@ fn communication_point_may_be_off_by_rounding_errors() {
     }
 }
 
-/// The stop time may be passed by 1e-9 of the step size or the time since the start, whichever is larger,
-/// plus 8 rounding errors.
+/// The stop time may be passed by 1e-9 of the step size or of the time since the start, whichever is larger, plus 8 rounding
+/// errors.
 #[test]
 fn the_last_step_may_pass_the_stop_time_by_rounding_errors() {
     for (start, stop, slack) in [
@@ -117,8 +117,8 @@ fn no_step_is_allowed_after_a_step_that_ends_at_the_stop_time() {
     );
 }
 
-/// q must not fall below 1. If a ramp from 4 ends below this value by at most 1e-9 of the ramp's height, it
-/// ends at exactly 1.
+/// The inflow q must not fall below 1. A ramp that starts at 4 and ends below 1 by at most 1e-9 of its height ends at
+/// exactly 1.
 #[test]
 fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     let after = |end: f64| {
@@ -166,8 +166,8 @@ fn an_input_that_is_the_derivative_of_another_input_changes_the_other_input() {
     assert_eq!(real(&mut instance, "z"), 1.25 + 0.5 * 0.5 + 0.5 * 2.0 * 0.25);
 }
 
-/// At the end of a step outputs are limits from the left, computed with the slopes of this step. After a value or slope of any
-/// input is set, the outputs belong to the next step, without the old slopes.
+/// At the end of a step the outputs are limits from the left, computed with the slopes of this step. After the host has set a
+/// value or slope of any input, the outputs belong to the next step and no longer use the old slopes.
 #[test]
 fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     let ramped = || {
@@ -254,8 +254,8 @@ fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
     assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
 }
 
-/// Between steps the outputs show the valve in the position that the present inputs cause, but the valve in the model moves only
-/// in the next step.
+/// Between steps the outputs show the valve in the position that the present inputs cause, but the valve in the model moves
+/// only in the next step.
 #[test]
 fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     let mut instance = started(CS, &[]);

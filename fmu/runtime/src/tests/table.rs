@@ -69,10 +69,10 @@ fn start_values_equal_those_of_the_model() {
     assert_eq!(scalar("sum").start(), None);
 }
 
-/// A table states dependencies by the name of an array or of an element; for example `net[2]` depends
-/// on `level[2]` and `q[2]`.
+/// A table states dependencies by the name of an array or of an element of the same index. For example, `net[2]` depends on
+/// `level[2]` and `q[2]`.
 #[test]
-fn dependencies_are_resolved_to_array_elements() {
+fn names_of_arrays_in_dependency_lists_stand_for_their_elements() {
     let depends = |name: &str| names(scalar(name).depends_on());
     let initially = |name: &str| names(scalar(name).initial_depends_on());
     assert_eq!(depends("level[2]"), ["level[2]"]);
@@ -86,7 +86,7 @@ fn dependencies_are_resolved_to_array_elements() {
 }
 
 #[test]
-fn only_used_units_and_enumerations_are_declared() {
+fn the_table_declares_only_units_and_enumerations_that_it_uses() {
     let units: Vec<_> = TABLE.units().map(|unit| unit.name).collect();
     assert_eq!(units, ["m", "s", "1/s", "1/s2", "m/s"]);
     let enumerations: Vec<_> = TABLE.enumerations().iter().map(|e| e.name).collect();
@@ -97,7 +97,7 @@ fn only_used_units_and_enumerations_are_declared() {
     assert!(Spring::table().enumerations().is_empty());
 }
 
-/// Returns the exponents of kg, m, s and rad of one factor in a unit's name, for example [1, 1, -2, 0] for `N` in `N.m`.
+/// Returns the exponents of kg, m, s and rad of one factor in the name of a unit, for example [1, 1, -2, 0] for `N` in `N.m`.
 fn base(symbol: &str) -> [i32; 4] {
     match symbol {
         "1" => [0, 0, 0, 0],
@@ -114,7 +114,7 @@ fn base(symbol: &str) -> [i32; 4] {
 }
 
 #[test]
-fn a_units_exponents_follow_from_its_name() {
+fn the_exponents_of_every_unit_follow_from_its_name() {
     for unit in UNITS {
         let Some(found) = unit.base else {
             assert!(["sqrt", "^0.5"].iter().any(|root| unit.name.contains(root)), "{}", unit.name);
@@ -135,7 +135,7 @@ fn a_units_exponents_follow_from_its_name() {
 }
 
 #[test]
-fn display_units_are_common_units() {
+fn every_display_unit_is_a_common_unit() {
     let of = |name: &str| unit::find(name).unwrap().display_units;
     assert_eq!(of("m"), [("mm", 1e3)]);
     for (turn, name) in [(360.0, "deg/s"), (3600.0 * 360.0, "deg/h"), (60.0, "rpm")] {
@@ -240,9 +240,8 @@ fn a_table_whose_inputs_are_not_adjacent_is_refused() {
     Table::new(TABLE.about, apart, scalars::<Vessels, N>(apart).to_vec().leak());
 }
 
-/// Only the description with arrays names the parameters that determine their sizes.
 #[test]
-fn token_with_arrays_changes_with_structural_parameters() {
+fn the_token_of_a_description_with_arrays_depends_on_its_structural_parameters() {
     let tokens = |shape: &'static [Dimension]| {
         let mut variables = TABLE.variables.to_vec();
         variables[0] = variables[0].shape(shape);

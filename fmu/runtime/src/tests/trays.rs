@@ -10,7 +10,8 @@ use crate::variable::Variable;
 
 pub const MOST: usize = 3;
 
-/// Number of trays, and arrays without effect: by tray, by side, and of length zero.
+/// The number of trays, and arrays that have no effect: one with an element per tray, one with an element per side, and one
+/// of length zero.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     rows: u8,
@@ -31,7 +32,6 @@ pub struct Inputs {
     q: [[f64; 2]; MOST],
 }
 
-/// Levels of the trays, m.
 #[derive(Clone, Debug)]
 pub struct Trays {
     x: [f64; MOST],

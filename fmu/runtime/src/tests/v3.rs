@@ -28,9 +28,9 @@ fn reference(name: &str) -> u32 {
 struct TestHost {
     instance: Option<usize>,
     lines: Vec<(fmi3Status, String, String)>,
-    /// Times of the intermediate updates that the host has received, each with true if the host could set inputs then.
+    /// The intermediate updates that the host has received: the time of each, and true if the host could set inputs then.
     updates: Vec<(f64, bool)>,
-    /// The force that the host sets in an intermediate update, for the end of the following part of the step.
+    /// The force that the host sets in an intermediate update. It applies to the end of the part of the step that follows.
     force: Option<f64>,
     wish: Option<f64>,
     statuses: Vec<fmi3Status>,
@@ -129,8 +129,8 @@ fn step(instance: fmi3Instance, at: f64, h: f64) -> (fmi3Status, bool, f64) {
     (status, early == 1, last)
 }
 
-/// A host of FMI 3.0 changes an input linearly within a step by intermediate updates, and a host of FMI 2.0 sets the
-/// derivative of the input before the step. The results are bit-identical.
+/// A host of FMI 3.0 changes an input within a step by intermediate updates; a host of FMI 2.0 sets the derivative of the
+/// input before the step.
 #[test]
 fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bit() {
     let (instance, host) = stepping(false);
@@ -166,8 +166,8 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
     assert!(host.lock().unwrap().statuses.iter().all(|status| *status == fmi3OK));
 }
 
-/// A host of FMI 3.0 requests an early return time in its intermediate update. If the time is before the step or NaN, the
-/// step ends at once; if it is after the end of the step, it has no effect.
+/// If the requested time is before the step or NaN, the step ends at once; if it is after the end of the step, it has no
+/// effect.
 #[test]
 fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_return() {
     let (instance, host) = stepping(true);
@@ -190,7 +190,7 @@ fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_re
     unsafe { fmi3FreeInstance::<Spring>(instance) };
 }
 
-/// The host lets the force rise to 1 within a step, but requests a return at once. In the next step the host
+/// In an intermediate update the host lets the force rise to 1, but also requests a return at once. In the next step the host
 /// sets no force, so that the force stays 0.
 #[test]
 fn after_a_return_at_the_start_of_a_step_inputs_keep_their_values() {
@@ -207,8 +207,7 @@ fn after_a_return_at_the_start_of_a_step_inputs_keep_their_values() {
     assert_eq!(force, 0.0);
 }
 
-/// In an intermediate update a host sets a force to NaN. fmi3SetFloat64 returns fmi3Discard, and fmi3DoStep reaches the
-/// end of the step.
+/// The host sets the force to NaN. fmi3SetFloat64 returns fmi3Discard, and fmi3DoStep still reaches the end of the step.
 #[test]
 fn a_value_out_of_range_in_intermediate_update_is_discarded_and_the_step_goes_on() {
     let (instance, host) = stepping(false);
@@ -350,7 +349,7 @@ fn log_messages_of_fmi_3_double_number_signs_and_keep_percent_signs() {
 }
 
 #[test]
-fn the_version_is_3_0() {
+fn fmi3_get_version_returns_3_0() {
     assert_eq!(unsafe { text(fmi3GetVersion::<Spring>()) }, Some("3.0".into()));
 }
 
@@ -382,9 +381,10 @@ fn a_directional_derivative_with_wrong_numbers_of_seeds_or_sensitivities_is_refu
     }
 }
 
-/// w.(J v) equals (J^T w).v; the two sides sum the same products in different orders.
+/// For the matrix J of partial derivatives and random vectors v and w, w.(J v) must equal (J^T w).v. The two sides sum the
+/// same products in different orders.
 #[test]
-fn adjoint_derivatives_are_the_transposed_directional_ones() {
+fn adjoint_derivatives_are_the_transpose_of_directional_derivatives() {
     let (instance, _host) = stepping(false);
     let unknowns = ["a", "der(x)", "der(v)"].map(reference);
     let knowns = [reference("F"), reference("x"), reference("v"), time_reference::<Spring>()];
@@ -547,7 +547,7 @@ fn only_real_outputs_and_independent_inputs_have_intermediate_updates() {
 }
 
 #[test]
-fn an_fmi3_boolean_may_be_any_byte() {
+fn every_byte_except_0_counts_as_true_in_an_fmi3_boolean() {
     assert_eq!(size_of::<fmi3Boolean>(), 1);
     let (instance, _host) = stepping(false);
     unsafe {
@@ -596,7 +596,7 @@ fn initialization_sets_start_and_stop_time_and_undefined_times_may_be_nan() {
     }
 }
 
-/// fmusim 0.8 calls these two functions in continuous-time mode, in which the standard's table does not allow them.
+/// The program fmusim 0.8 calls these two functions in continuous-time mode, in which the standard does not allow them.
 #[test]
 fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
     let host = Mutex::new(TestHost::default());

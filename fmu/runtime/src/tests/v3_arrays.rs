@@ -65,7 +65,7 @@ fn values_of_arrays_are_read_and_set_in_row_major_order() {
     assert_eq!(*lines.lock().unwrap(), [""; 0]);
 }
 
-/// The messages contain the error and the lengths of the arrays; of five or more arrays they contain the first four.
+/// Each message contains the error and the lengths of the arrays; of five or more arrays it contains the first four.
 #[test]
 fn wrong_counts_types_and_references_of_arrays_are_described() {
     let all = [6, 7, 8, 6, 8];
@@ -99,7 +99,7 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
     }
 }
 
-/// If the number of trays changes, arrays whose size depends on it get their start values, and all other variables keep
+/// If the number of trays changes, the arrays whose size depends on it get their start values, and all other variables keep
 /// their values. If the number is set to its present value, nothing changes.
 #[test]
 fn changing_the_size_of_an_array_resets_its_elements() {
@@ -137,8 +137,7 @@ fn changing_the_size_of_an_array_resets_its_elements() {
     assert_eq!(*lines.lock().unwrap(), [told]);
 }
 
-/// The table has 24 scalars, the last of which is k. After them follow the time and two event indicators; each can
-/// be read as Float64.
+/// The table has 24 scalars. The time and two event indicators follow, and the host can read each of them as a Float64.
 #[test]
 fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     let lines = Lines::default();
@@ -189,8 +188,8 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// An element of `square` depends on all levels and inflows of the present trays, even where all are 0 and the derivatives
-/// vanish. A rate depends on its own inflow.
+/// An element of `square` depends on all levels and inflows of the present trays, even where all of them are 0, so that the
+/// derivatives vanish. A rate depends on its own inflow.
 #[test]
 fn array_elements_depend_on_others_even_where_the_derivative_vanishes() {
     let lines = Lines::default();

@@ -111,7 +111,6 @@ fn setting_several_values_succeeds_or_fails_as_a_whole() {
     assert_eq!(real(&mut instance, "net[1]"), 10.0 - 0.5 * 3.0);
 }
 
-/// Parameters out of range are accepted one by one, and fmi2ExitInitializationMode reports all of them together.
 #[test]
 fn all_wrong_parameters_are_reported_when_initialization_ends() {
     let mut instance = fresh(CS);
@@ -166,8 +165,7 @@ fn only_inputs_and_tunable_parameters_can_be_set_during_the_simulation() {
     assert_eq!(real(&mut instance, "time_constant"), 0.25);
 }
 
-/// The model refuses a tunable parameter that contradicts its state. An input that is set by the same call
-/// keeps its old value.
+/// The model refuses a tunable parameter that contradicts its state. An input that the same call sets keeps its old value.
 #[test]
 fn a_call_with_one_refused_tunable_parameter_sets_no_variable() {
     let mut instance = started(CS, &[("z", 3.0)]);
@@ -249,8 +247,8 @@ fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     assert!(refused(ask("sum", "z", f64::INFINITY)).contains("direction of z = inf"));
 }
 
-/// After fmi2DoStep has returned fmi2Error, the instance has the time and the values of the start of the step. Only reading,
-/// reset, termination and restoring a state are allowed.
+/// After fmi2DoStep has returned fmi2Error, the instance has time and values of the start of the step. Reading, reset,
+/// termination and restoring a state are still allowed.
 #[test]
 fn after_a_step_that_failed_the_last_values_can_be_read() {
     let mut instance = started(CS, &[("z", 101.0)]);

@@ -92,7 +92,7 @@ fn values_out_of_range_are_refused_with_the_range_and_unit() {
 }
 
 #[test]
-fn values_of_another_type_are_refused() {
+fn a_value_of_another_type_than_the_variable_is_refused() {
     let switch = V::switch("b", |p| &mut p.has_lid, "");
     assert_eq!(why(&switch, Integer(1)), "b = 1 (allowed: true, false)");
     assert_eq!(why(&an_integer(), Boolean(true)), "n = true (allowed: any integer)");
@@ -100,7 +100,7 @@ fn values_of_another_type_are_refused() {
     assert_eq!(why(&a_real("m"), Integer(1)), "p = 1 (allowed: any finite number)");
 }
 
-/// The largest rate of an input is that with which it crosses its allowed range in 1 ns.
+/// The largest allowed rate of an input is the rate at which it crosses its allowed range in 1 ns.
 #[test]
 fn the_rate_of_an_input_is_bounded_by_the_range_of_its_value() {
     let free = a_real("m");

@@ -69,7 +69,8 @@ impl Version for Other {
     }
 }
 
-/// The test version of FMI has other function names, value references from 100 on, and another handling of events.
+/// The test defines a version of FMI that has other function names, value references from 100 on, and another handling of
+/// events.
 #[test]
 fn names_references_and_event_handling_depend_on_the_fmi_version() {
     let mut instance = Instance::<Vessels, Other>::new(CS);

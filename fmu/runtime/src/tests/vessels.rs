@@ -16,7 +16,7 @@ pub const OPENS: f64 = 2.0;
 /// Level at which a vessel overflows, m.
 pub const OVERFLOWS: f64 = 80.0;
 
-/// Leak, 1/s, levels at the start, m, time of an inspection, s, and further parameters without effect.
+/// Leak of the vessels, 1/s; their levels at the start, m; time of an inspection, s; and further parameters without effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     pub k: f64,
@@ -42,7 +42,7 @@ impl Default for Parameters {
     }
 }
 
-/// Inputs, each with its slope.
+/// The inputs, each with its value and its slope.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
     q: [[f64; 2]; 2],
@@ -67,7 +67,8 @@ pub struct Outputs {
     valve: i32,
 }
 
-/// The vessels. The model stores their levels in the opposite order of that in which the host reads them.
+/// Vessels with a leak, and a valve that a rising platform opens. The model stores the levels in the opposite order of that
+/// in which the host reads them.
 #[derive(Clone, Debug)]
 pub struct Vessels {
     k: f64,
