@@ -125,9 +125,9 @@ impl Growth {
         both
     }
 
-    /// Computes coefficient n of the series of the drag, which is divided by its value at the start, from coefficient n of
-    /// three other series: the squared slosh angle `q2`, its squared rate `v2`, and the drag `other` that does not depend on
-    /// the amplitude.
+    /// Computes Taylor coefficient n of the drag, which is divided by its value at the start, from coefficient
+    /// n of three other series: the squared slosh angle `q2`, its squared rate `v2`, and the drag `other` that does not
+    /// depend on the amplitude.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;

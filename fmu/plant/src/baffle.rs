@@ -188,8 +188,8 @@ impl Baffle {
         both
     }
 
-    /// Computes coefficient n of the baffle's drag, which is divided by the whole drag at the start of the series, from
-    /// coefficient n of the squared slosh angle `q2` and of its squared rate `v2`.
+    /// Computes Taylor coefficient n of the baffle's drag, which is divided by the whole drag at the start of the series,
+    /// from coefficient n of the squared slosh angle `q2` and of its squared rate `v2`.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2]) -> f64 {
         self.q2[n] = q2 + if n == 0 { self.floor2 } else { 0.0 };
         self.v2[n] = v2;

@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn directional_derivatives_agree_with_finite_differences() {
+    fn directional_derivatives_of_the_states_agree_with_finite_differences() {
         compare_directional_derivatives(|_| {});
         compare_directional_derivatives(every_option);
         compare_directional_derivatives(every_direction);
@@ -662,7 +662,7 @@ mod tests {
 
     /// A torque of −0.03 N·m turns the hub. After the Coulomb friction is raised to 1 N·m between two steps, the hub sticks.
     #[test]
-    fn friction_can_be_changed_while_running() {
+    fn a_hub_sticks_after_its_friction_was_raised_between_two_steps() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Stribeck);
         let held = Inputs { tau_cmd: Ramp::held(0.0), ..inputs };
         plant.set_continuous_states(&[0.0; STATES]);

@@ -37,8 +37,8 @@ pub struct Tilt {
 impl Tilt {
     const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
 
-    /// Computes coefficient n of both series from the hub's angle `theta`, which must be known up to order n, and from the
-    /// specific force `g` with its rate.
+    /// Computes Taylor coefficient n of both series from the hub's angle `theta`, which must be known up to order n, and from
+    /// the specific force `g` with its rate.
     pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
         if self.tangent == 0.0 {
             return;
@@ -60,7 +60,7 @@ impl Tilt {
         }
     }
 
-    /// Returns coefficient n of the height, m, of a point of the hub above the plane through the origin. `x` returns
+    /// Returns Taylor coefficient n of the height, m, of a point of the hub above the plane through the origin. `x` returns
     /// coefficients of the position of the point in the hub's frame, m.
     pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
         if self.tangent == 0.0 {

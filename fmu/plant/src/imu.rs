@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_are_multiples_of_the_quantisation_step() {
+    fn gyro_readings_are_multiples_of_the_quantisation_step() {
         let imu = Imu { lsb: 1e-3, ..Imu::default() };
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 0.012_3);
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn random_numbers_equal_splitmix64() {
+    fn the_random_numbers_of_the_gyro_equal_splitmix64() {
         assert_eq!(mix(0), 0xE220_A839_7B1D_CDAF);
         assert_eq!(mix(1_234_567), 6_457_827_717_110_365_317);
         let [(a, b), (c, d)] = [normals(1, 0), normals(-3, 12)];

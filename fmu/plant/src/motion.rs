@@ -197,9 +197,9 @@ impl Motion {
             + self.hub.tilt.height(n, moment)
     }
 
-    /// Computes coefficient n of every quantity, and coefficient n + 1 of the state, from the coefficients of the state up to
-    /// n. `ramp` is true if specific force, drag or weight changes in time, and `hangs` if the hub hangs from a suspension
-    /// line.
+    /// Computes Taylor coefficient n of every quantity, and coefficient n + 1 of the state, from the coefficients of the
+    /// state up to n. `ramp` is true if specific force, drag or weight changes in time, and `hangs` if the hub hangs from a
+    /// suspension line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,

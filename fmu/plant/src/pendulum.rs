@@ -112,8 +112,8 @@ impl Pendulum {
         self.course[0] = 1.0;
     }
 
-    /// Computes coefficient n of the drag, which depends on the amplitude. `at` contains coefficient n of the squared slosh
-    /// angle and of its squared rate.
+    /// Computes Taylor coefficient n of the drag, which depends on the amplitude. `at` contains coefficient n of the squared
+    /// slosh angle and of its squared rate.
     pub fn expand_drag(&mut self, n: usize, at: [f64; 2]) {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
@@ -199,7 +199,7 @@ impl Pendulum {
         if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
-    /// Returns coefficient n of the component of the vector (`a_x`, `a_t`) along the slosh mass's direction of motion.
+    /// Returns Taylor coefficient n of the component of the vector (`a_x`, `a_t`) along the slosh mass's direction of motion.
     #[inline(always)]
     pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
         self.along[0] * a_x[n] + self.along[1] * a_t[n]
@@ -211,8 +211,8 @@ impl Pendulum {
         radial + self.along[1] * mul(n, a_t, b)
     }
 
-    /// Returns coefficient n of a product: the component of the vector (`a_x`, `a_t`) across the slosh mass's direction of
-    /// motion, times the series `b`.
+    /// Returns Taylor coefficient n of a product: the component of the vector (`a_x`, `a_t`) across the slosh mass's
+    /// direction of motion, times the series `b`.
     #[inline(always)]
     pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };
@@ -228,8 +228,8 @@ impl Pendulum {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
     }
 
-    /// Returns coefficient n of drag coefficient times the rate `v`. The drag coefficient is divided by its value at the
-    /// start of the series; if `varies` is false, it is constant.
+    /// Returns Taylor coefficient n of drag coefficient times the rate `v`. The drag coefficient is divided by its value at
+    /// the start of the series; if `varies` is false, it is constant.
     #[inline(always)]
     pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
         if varies { mul(n, &self.course, v) } else { v[n] }

@@ -237,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_valid_saved_data_restores_the_state() {
+    fn saved_words_that_are_not_a_valid_state_are_refused() {
         let state = State {
             time: 1.5,
             x: core::array::from_fn(|i| i as f64 - 3.0),

@@ -441,7 +441,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn warnings_name_shallow_liquid_and_secondary_resonances() {
+    fn a_warning_names_shallow_liquid_or_a_secondary_resonance() {
         assert!(third_order_warning(0.3).is_some_and(|text| text.contains("shallow")));
         assert!(third_order_warning(SHALLOW).is_none());
         for fill in [0.71, 0.831, 1.01, 1.19] {

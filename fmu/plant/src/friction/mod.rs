@@ -37,22 +37,22 @@ pub trait FrictionLaw {
         Vec::new()
     }
 
-    /// Sets coefficient n of the law's own state, for example the deflection of the bristles. Coefficient 0 is the value of
-    /// the state; coefficient 1 is its change if a directional derivative is computed.
+    /// Sets Taylor coefficient n of the law's own state, for example the deflection of the bristles. Coefficient 0 is the
+    /// value of the state; coefficient 1 is its change if a directional derivative is computed.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
-    /// Returns coefficient n of the friction torque on a hub that is not stuck, N m. The coefficients of the hub's motion and
-    /// of the law's own state must be known up to order n; coefficient n + 1 of the law's own state is set.
+    /// Returns Taylor coefficient n of the friction torque on a hub that is not stuck, N m. The coefficients of the hub's
+    /// motion and of the law's own state must be known up to order n; coefficient n + 1 of the law's own state is set.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
-    /// Returns coefficient n of the power that the bearing dissipates, W. `tau_f` is the series of the friction torque, whose
-    /// coefficient n must be known, and `omega` the series of the hub's rate.
+    /// Returns Taylor coefficient n of the power that the bearing dissipates, W. `tau_f` is the series of the friction
+    /// torque, whose coefficient n must be known, and `omega` the series of the hub's rate.
     #[inline(always)]
     fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
         -series::mul(n, tau_f, omega)
     }
 
-    /// Returns coefficient n (0 or 1) of the energy that is stored in the bearing, J.
+    /// Returns Taylor coefficient n (0 or 1) of the energy that is stored in the bearing, J.
     fn energy(&self, _n: usize) -> f64 {
         0.0
     }

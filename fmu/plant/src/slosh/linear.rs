@@ -95,8 +95,8 @@ impl SloshMode for Linear {
         self.al_d[0].abs() + self.p.omega_n * self.al[0].abs()
     }
 
-    /// Returns coefficient n of the slosh mass times its height above rest, kg m. The pendulum rises by l/2 times the squared
-    /// angle; on a tilted bench the height of the slosh mass in the hub's frame is added.
+    /// Returns Taylor coefficient n of the slosh mass times its height above rest, kg m. The pendulum rises by l/2 times the
+    /// squared angle; on a tilted bench the height of the slosh mass in the hub's frame is added.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;

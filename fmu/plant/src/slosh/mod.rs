@@ -188,22 +188,23 @@ pub trait SloshMode {
     fn angles<T: Number>(&self) -> Angles<T>;
     /// Sets the coordinates `q` at the start of the series. Coefficient 0 of the hub's rate must be known.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
-    /// Sets coefficient 1 of the coordinates to `dq`, their change in a directional derivative. Coefficients 0 and 1 of the
-    /// hub's rate must be known.
+    /// Sets Taylor coefficient 1 of the coordinates to `dq`, their change in a directional derivative. Coefficients 0 and 1
+    /// of the hub's rate must be known.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
     fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
-    /// Returns coefficient n of the inertia and of the torque with which the mode acts on the hub, from the coefficients of
-    /// the coordinates, their rates and the hub's rate up to order n. The equations are at the head of the file.
+    /// Returns Taylor coefficient n of the inertia and of the torque with which the mode acts on the hub, from the
+    /// coefficients of the coordinates, their rates and the hub's rate up to order n. The equations are at the head of the
+    /// file.
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction;
-    /// Computes coefficient n of the acceleration of the coordinates, and coefficient n + 1 of the coordinates and their
-    /// rates. It is called after `hub_reaction`, when the hub's angular acceleration is known up to order n.
+    /// Computes Taylor coefficient n of the acceleration of the coordinates, and coefficient n + 1 of the coordinates and
+    /// their rates. It is called after `hub_reaction`, when the hub's angular acceleration is known up to order n.
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
     fn error_scale(&self) -> f64;
     fn coefficient_norm(&self, n: usize) -> f64;
-    /// Returns coefficient n of the power that the mode dissipates, W. `hub_reaction` must have computed order n.
+    /// Returns Taylor coefficient n of the power that the mode dissipates, W. `hub_reaction` must have computed order n.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
-    /// Returns coefficient n of the slosh mass times its height above rest, kg m, which is the potential energy divided by
-    /// the specific force.
+    /// Returns Taylor coefficient n of the slosh mass times its height above rest, kg m, which is the potential energy
+    /// divided by the specific force.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
     /// Returns the coordinates `t` seconds after the start of the series, when the hub has the rate `omega`, rad/s. They are
     /// computed from their series up to order n. If `varies` is false, the mode moves along the tangent.

@@ -75,8 +75,8 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// Computes coefficient n of the direction p and the velocity v of the slosh mass from coefficient n of the coordinates
-    /// xi, by p' = k xi' - v_z xi and v_z = k^2 xi.xi' (symbols at the head of the file).
+    /// Computes Taylor coefficient n of the direction p and the velocity v of the slosh mass from coefficient n of the
+    /// coordinates xi, by p' = k xi' - v_z xi and v_z = k^2 xi.xi' (symbols at the head of the file).
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
         let one = constant(n, 1.0);
@@ -93,8 +93,8 @@ impl Spherical {
         self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Returns coefficient n of k times the acceleration of the coordinates xi. In the symbols at the head of the file it is
-    /// p'' + 2 v_z xi' + v_z' xi with p'' = v' - w' R p - w R p'.
+    /// Returns Taylor coefficient n of k times the acceleration of the coordinates xi. In the symbols at the head of the file
+    /// it is p'' + 2 v_z xi' + v_z' xi with p'' = v' - w' R p - w R p'.
     fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale(n, &hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
@@ -307,9 +307,9 @@ impl SloshMode for Spherical {
         self.p.c * self.p.l * self.p.l * speed2
     }
 
-    /// Returns coefficient n of the slosh mass times its height above rest, m l (1 + p_z), kg m, where p_z is the upward
-    /// component of its direction. The term 1 + p_z is computed as |xi|^2 k from the coordinates xi, because this form has no
-    /// cancellation near rest.
+    /// Returns Taylor coefficient n of the slosh mass times its height above rest, m l (1 + p_z), kg m, where p_z is the
+    /// upward component of its direction. The term 1 + p_z is computed as |xi|^2 k from the coordinates xi, because this form
+    /// has no cancellation near rest.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];

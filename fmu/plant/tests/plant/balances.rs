@@ -3,8 +3,8 @@
 use super::common::{FRICTION, SLOSH, anywhere, bench, has_rim};
 use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
 
-/// Tolerance of the solver in these tests. The errors of the plant are two to three decades below the tolerance, so that
-/// bounds of 1e-8 leave a margin, while a wrong term would be a visible fraction of the energy throughput.
+/// Tolerance of the solver in these tests. The errors of the plant are two to three decades below it, so that a bound of 1e-8
+/// leaves a margin, while a wrong term would be a visible fraction of the energy throughput.
 const TOLERANCE: f64 = 1e-9;
 
 fn plant(p: &plant::Parameters, inputs: &Inputs) -> Plant {
@@ -34,7 +34,7 @@ impl Turnover {
 }
 
 #[test]
-fn energy_balances_for_every_model_friction_and_damping() {
+fn energy_is_balanced_with_every_slosh_model_friction_law_and_damping() {
     let mut rng = fastrand::Rng::with_seed(1);
     for slosh in SLOSH {
         for friction in FRICTION {
@@ -154,7 +154,7 @@ fn energy_never_grows_without_torque() {
 }
 
 #[test]
-fn hub_equation_holds_between_the_outputs() {
+fn the_outputs_fulfil_the_equation_of_motion_of_the_hub() {
     let mut rng = fastrand::Rng::with_seed(4);
     for slosh in SLOSH {
         for friction in FRICTION {
@@ -226,7 +226,7 @@ fn trajectory_does_not_depend_on_the_communication_step() {
 /// If the amplitude of the motion is halved, the relative difference of each nonlinear slosh model from the linear model
 /// falls to a quarter.
 #[test]
-fn nonlinear_models_approach_the_linear_one_quadratically() {
+fn nonlinear_slosh_models_approach_the_linear_model_quadratically() {
     // Halving the amplitude must quarter the largest difference from the linear model, relative to the size of the motion.
     // The difference is a cubic term.
     for slosh in SLOSH {
@@ -315,8 +315,8 @@ fn hub_liquid_and_wheel_together_keep_their_momentum() {
     assert!(last.wheel_speed > p.wheel.speed_min, "the reversed command must speed up the rotor");
 }
 
-/// The axial acceleration falls to 0, so that nothing restores the liquid. All results stay finite. In a slosh model with a
-/// largest displacement, the run may end with an error when the liquid drifts beyond it.
+/// The specific force falls to 0, so that nothing restores the liquid. All results must stay finite, or the run must end with
+/// an error because the liquid has drifted beyond the largest displacement of the slosh model.
 #[test]
 fn without_gravity_results_stay_finite_or_the_liquid_drifts_over_the_rim() {
     for slosh in SLOSH {
@@ -362,9 +362,9 @@ fn gyro_readings_are_equal_for_any_communication_step() {
     }
 }
 
-/// Number of random steps in the test, which is smaller without `--release`. `.ci/run --nightly` sets HUBSLOSH_RANDOM_STEPS
-/// to 20,000; a million steps take some 25 minutes. `HUBSLOSH_RANDOM_SEED` sets the first seed, so that several processes
-/// can share the steps.
+/// Number of random steps, which is smaller without `--release`. `.ci/run --nightly` sets HUBSLOSH_RANDOM_STEPS to 20,000; a
+/// million steps take some 25 minutes. `HUBSLOSH_RANDOM_SEED` sets the first seed, so that several processes can share the
+/// steps.
 const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 1_000 };
 
 #[test]

@@ -21,7 +21,7 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// The specific force over 4 s: ramps, a jump upwards, a ramp to 0 and a ramp from 0.
+/// Specific force over 4 s: ramps, a jump upwards, a ramp to 0 and a ramp from 0.
 const PIECES: [(Ramp, f64); 7] = [
     (Ramp { value: 9.81, slope: -3.0 }, 1.0),
     (Ramp { value: 6.81, slope: 0.0 }, 0.5),
@@ -54,10 +54,9 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
     all
 }
 
-/// The axial specific force changes in ramps and jumps. The energy balances if the output `work_axial` is included as the
-/// work of these changes.
+/// The specific force changes in ramps and jumps. The output `work_axial` is the work that these changes do.
 #[test]
-fn energy_balances_with_the_work_of_a_changing_g() {
+fn energy_is_balanced_if_the_work_of_a_changing_g_is_included() {
     for slosh in SloshModel::ALL {
         for friction in FrictionModel::ALL {
             for (correlation, zeta, modes) in [(true, 0.0, 1), (false, 0.05, 3), (false, 0.0, 1)] {
@@ -87,8 +86,8 @@ fn energy_balances_with_the_work_of_a_changing_g() {
     }
 }
 
-/// A jump of g does the work jump times mass times height of hub and liquid. The energy is computed in another way, from the
-/// components of gravity across the axis. Both give the same result, and so do their derivatives.
+/// A jump of the specific force does the work jump times mass times height of hub and liquid. The expected energy, and its
+/// derivative, is computed in another way, from the components of gravity across the axis.
 #[test]
 fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
     for slosh in SloshModel::ALL {
@@ -128,8 +127,8 @@ fn motion_under_ramps_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// The reference integrates the linear pendulum by classical Runge-Kutta in steps of 20 µs, with the damping formula
-/// written out; the hub is too heavy to move.
+/// The reference integrates the linear pendulum by classical Runge–Kutta in steps of 20 µs, with the damping formula written
+/// out; the hub is too heavy to move.
 #[test]
 fn damping_follows_its_formula_while_g_ramps_through_zero() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -168,7 +167,7 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
 }
 
 #[test]
-fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
+fn ramps_of_g_to_zero_and_from_zero_take_a_bounded_number_of_internal_steps() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::None);
         // The limit of 100 internal steps allows for 20 halvings of g down to a millionth, for 34 steps in which g grows by half
@@ -186,7 +185,8 @@ fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     }
 }
 
-/// Returns the damping ratio from the logarithmic decrement of the free tangential motion, while the hub is held.
+/// Returns the damping ratio from the logarithmic decrement of a free tangential motion on a heavy hub. The plant starts at
+/// the specific force `g_start`, m/s2, and the motion takes place at `g`.
 fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
     let length = plant.calculated().length[0];
@@ -208,8 +208,8 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * core::f64::consts::TAU * 10.0)
 }
 
-/// After g has fallen from 9.81 to 1, 0.1 or 0.01 m/s², the measured damping ratio equals that of a run that
-/// starts at this g.
+/// The specific force falls from 9.81 to 1, 0.1 or 0.01 m/s². The measured damping ratio must equal that of a run that starts
+/// at the lower value.
 #[test]
 fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
     for correlation in [true, false] {
@@ -232,8 +232,8 @@ fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
     }
 }
 
-/// A plant that starts without axial acceleration dissipates nothing. If 1 m/s² acts later, its damping ratio is that of a
-/// plant that starts at 1 m/s².
+/// A plant that starts without specific force dissipates nothing. If 1 m/s² acts later, its damping ratio is that of a plant
+/// that starts at 1 m/s².
 #[test]
 fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
     for correlation in [true, false] {
@@ -251,7 +251,7 @@ fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
 }
 
 #[test]
-fn derivatives_along_g_equal_those_of_the_changing_damping() {
+fn directional_derivatives_along_g_include_the_change_of_the_damping() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.init.slosh_rate = 1.0;
@@ -298,8 +298,8 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
     }
 }
 
-/// Simulates Model Exchange with fixed steps of a Runge-Kutta method of order 4. Returns the residual of the energy balance,
-/// divided by the work of g.
+/// Simulates a host of Model Exchange with a Runge–Kutta method of order 4 and steps of `h` seconds, while the specific force
+/// is `g(t)`. Returns the residual of the energy balance, divided by the work of the changing specific force.
 fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g(0.0)), 0.0, TOLERANCE).unwrap();
     let energy = plant.outputs_held(&inputs_with_gravity(g(0.0))).energy;
@@ -332,8 +332,8 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     ((o.energy - energy - o.work - o.work_axial + o.heat) / o.work_axial).abs()
 }
 
-/// In Model Exchange the residual of the energy balance falls with the step size, with the order of the integrator, because trial
-/// evaluations of the integrator do not change `work_axial`.
+/// The residual of the energy balance must fall with the step size as the order of the integrator says. If trial evaluations
+/// of the integrator changed `work_axial`, it would not.
 #[test]
 fn work_of_a_changing_g_is_added_at_accepted_steps_only() {
     for (slosh, tilt) in SLOSHING.into_iter().flat_map(|slosh| [(slosh, 0.0), (slosh, 0.1)]) {

@@ -45,9 +45,9 @@ fn table(rng: &mut fastrand::Rng, varies: bool) -> Vec<Row> {
     (0..8).map(row).collect()
 }
 
-/// Returns parameters of the default bench with a random slosh model and friction law. Each of the following has a probability of
-/// one half: drag that grows with the amplitude, breaking waves, a ring baffle, a tilt, friction that depends on direction and
-/// angle, a spring, and a wheel at its limits.
+/// Returns the default bench with a random slosh model and friction law. Each of the following is added with a probability of
+/// one half: drag that grows with the amplitude, breaking waves, a ring baffle, a tilt, friction that depends on direction
+/// and angle, a spring, and a wheel at its limits.
 fn parameters(rng: &mut fastrand::Rng) -> Parameters {
     let slosh = SloshModel::ALL[rng.usize(..SloshModel::ALL.len())];
     let friction = FrictionModel::ALL[rng.usize(..FrictionModel::ALL.len())];
@@ -79,8 +79,8 @@ fn parameters(rng: &mut fastrand::Rng) -> Parameters {
     p
 }
 
-/// Returns the states after each row. Returns the reason instead if the motion ends because large waves leave the range
-/// of the slosh model.
+/// Simulates a table of inputs, whose `rows` contain their values, with steps of at most `longest` seconds. Returns the
+/// states after each row, or the reason why the motion ends because large waves leave the range of the slosh model.
 fn run(p: &Parameters, rows: &[Row], tolerance: f64, longest: f64) -> Result<Vec<f64>, String> {
     let first = rows[0].inputs(0.0);
     let mut plant = Plant::new(p, &first, 0.0, tolerance).map_err(|why| why.join("; "))?;
@@ -101,9 +101,9 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
 }
 
-/// Compares steps that are as long as the rows of random tables of torque with a reference that is computed in steps of 1 ms at a
-/// tolerance of 1e-13. The allowed error is 30 times the tolerance. Where the motion itself amplifies errors, the allowed error
-/// is multiplied by the growth of a small change of the initial state.
+/// Simulates random tables of torque in steps that are as long as the rows of the table, and compares the states with a
+/// reference in steps of 1 ms at a tolerance of 1e-13. The allowed error is 30 times the tolerance. Where the motion itself
+/// amplifies errors, it is multiplied by the growth of a small change of the initial state.
 fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
     let (mut worst, mut compared, mut ended) = ((0.0, 0, 0.0), 0, 0);
     for seed in seeds {
@@ -137,11 +137,10 @@ fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
     println!("worst error: {:.2} tolerances, seed {} at {:e}", worst.0, worst.1, worst.2);
 }
 
-/// The drag of liquid at rest under zero specific force starts with the fourth power of time, which the first terms of its
-/// series do not show. A step that did not take this into account had an error of 6e-4 at every tolerance (seed 1651). In
-/// seed 52 a step never ended, because rounding at a wheel's limit left the torque command just before the limit. Near zero
-/// specific force the drag of growing and breaking waves has singularities, for which the radius of convergence was not
-/// limited (seeds 234, 1040, 1224).
+/// The named seeds have shown errors in the past. The drag of liquid at rest under zero specific force starts with the fourth
+/// power of time, which the first terms of its series do not show; the error was 6e-4 at every tolerance (seed 1651). In seed
+/// 52 a step never ended, because rounding left the torque command just before a limit of the wheel. Near zero specific force
+/// the drag has singularities, which once did not limit the step (seeds 234, 1040, 1224).
 #[test]
 fn amplitude_damping_keeps_the_solver_tolerance_where_g_vanishes() {
     keep_the_tolerance((0..60).chain([234, 1040, 1224, 1651]));

@@ -10,7 +10,7 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// Returns a hub without friction that does not move, because the liquid has 2 kg and the hub has 1e9 kg m2.
+/// Returns a hub without friction that hardly moves, because the liquid has 2 kg and the hub 1e9 kg m2.
 fn held(model: SloshModel) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -18,8 +18,8 @@ fn held(model: SloshModel) -> Parameters {
     p
 }
 
-/// Returns the damping ratio of a small free oscillation at `g` in a plant that has started at `g_start`. It is computed
-/// from the logarithmic decrement over ten periods of omega = sqrt((g + a)/l), between zeros of the angle.
+/// Returns the damping ratio of a small free oscillation at the specific force `g`, in a plant that has started at `g_start`,
+/// both m/s2. The ratio follows from the logarithmic decrement over ten periods of the angular frequency `omega`, rad/s.
 fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     let mut plant = Plant::new(p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
     let amplitude2 = |plant: &Plant| {
@@ -35,8 +35,8 @@ fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * TAU * 10.0)
 }
 
-/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency, and with it the damping
-/// of a laminar layer, reach a finite limit. Without capillarity they follow g^(1/2) and g^(-1/4).
+/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency reaches a finite limit,
+/// and the damping of a laminar layer with it. Without capillarity they follow g^(1/2) and g^(-1/4).
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for capillarity in [true, false] {
@@ -72,9 +72,9 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
     }
 }
 
-/// A damping ratio that is given as a parameter applies at the specific force at which the motion starts. In a start
-/// without gravity it applies, too, if capillarity restores the liquid; otherwise nothing restores the liquid, and the
-/// ratio applies at 1 m/s2.
+/// A damping ratio that is given as a parameter applies at the specific force at which the motion starts. If the motion
+/// starts without specific force, it still applies if capillarity restores the liquid. Otherwise nothing restores the liquid
+/// at the start, and the ratio applies at 1 m/s2.
 #[test]
 fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
     let mut p = held(SloshModel::Linear);
@@ -113,9 +113,9 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     found
 }
 
-/// The damping ratio that follows from each decrement is zeta + zeta_A A, up to an amplitude of 0.3 rad. In the nonlinear
-/// models the decrement also depends on the amplitude by itself, by about A^2/16 for a pendulum. The measured difference is
-/// 0.8 %, which is within the tolerance; for the linear model it is 5e-5.
+/// The damping ratio that follows from each decrement must be zeta + zeta_A A, up to an amplitude A of 0.3 rad. In the
+/// nonlinear models the decrement also depends on the amplitude by itself, by about A^2/16 for a pendulum. The measured
+/// difference of 0.8 % is within the tolerance; for the linear model it is 5e-5.
 #[test]
 fn the_damping_ratio_is_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -138,13 +138,13 @@ fn the_damping_ratio_is_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     }
 }
 
-/// Steepness of mode 1 in an upright cylinder divided by the slosh angle, k a/A = (xi_1/R) 2 R/(xi_1^2 - 1).
+/// Steepness of mode 1 in an upright cylinder per slosh angle, 2 xi_1/(xi_1^2 - 1).
 const STEEPNESS: f64 = 2.0 * 1.8411837813 / (1.8411837813 * 1.8411837813 - 1.0);
 
-/// Above the onset of breaking the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A, with the solution 1/A =
-/// sigma/s_b + (1/A_1 - sigma/s_b) exp(-omega zeta_b s_b t).
-///
-/// The rounded corner adds up to 4e-4 to a steepness that exceeds the onset by 0.26 to 0.72.
+/// Above the onset of breaking, the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A, where sigma is the steepness
+/// per slosh angle and s_b the steepness at the onset. The solution is 1/A = sigma/s_b + (1/A_1 - sigma/s_b) exp(-omega
+/// zeta_b s_b t). The rounded corner of the damping law adds up to 4e-4 to a steepness that exceeds the onset by 0.26 to
+/// 0.72.
 #[test]
 fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     let (zeta_b, onset) = (0.05, 0.2);
@@ -165,11 +165,11 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     }
 }
 
-/// The damping ratio that follows from each decrement is zeta + zeta_b max(0, k a - s_b). The tested steepness differs by 0.1
-/// from the onset s_b. At this difference the rounded corner changes zeta by 1 %. In a nonlinear model the amplitude varies
-/// within a period by the relative amount A^2/16, as for a pendulum.
+/// The damping ratio that follows from each decrement must be zeta + zeta_b max(0, steepness - onset). The tested steepness
+/// differs from the onset by 0.1, where the rounded corner of the damping law changes zeta by 1 %. In a nonlinear model the
+/// amplitude varies within a period by the relative amount A^2/16, as for a pendulum.
 #[test]
-fn breaking_adds_damping_above_the_steepness_in_every_model() {
+fn breaking_waves_have_more_damping_above_the_onset_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
         let (zeta_b, onset) = (0.05, 0.3);
         let mut p = held(model);
@@ -193,8 +193,8 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
     }
 }
 
-/// Without other damping, the dissipated power equals the power that breaking waves lose, from far above the onset to rest.
-/// It is never negative.
+/// There is no other damping, so that the dissipated power must equal the power that the waves lose, from far above the onset
+/// of breaking to rest. It is never negative.
 #[test]
 fn breaking_waves_only_dissipate_energy() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -218,10 +218,10 @@ fn breaking_waves_only_dissipate_energy() {
     }
 }
 
-/// Because of the constant A_0 = 1e-4 rad, the amplitude-dependent damping ratio of a vanishing wave is 1e-4 zeta_A instead
-/// of 0. This is tested without other damping.
+/// For a vanishing wave the amplitude-dependent damping ratio is 1e-4 zeta_A instead of 0, because the small constant A_0 =
+/// 1e-4 rad is added to the amplitude. The viscous damping ratio is added to it.
 #[test]
-fn at_vanishing_amplitude_the_viscous_damping_remains() {
+fn a_wave_of_vanishing_amplitude_keeps_its_viscous_damping() {
     let mut p = held(SloshModel::Linear);
     (p.slosh.zeta_amplitude, p.init.slosh_angle) = (1.0, 1e-6);
     let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
@@ -230,8 +230,8 @@ fn at_vanishing_amplitude_the_viscous_damping_remains() {
     assert!((measured - zeta - 1e-4).abs() < 2e-8, "{measured} {zeta}");
 }
 
-/// For `zeta_amplitude` and for a ring baffle, the amplitude A is the slosh angle in the tangential plane. The sine of the
-/// angle would be 6 % smaller at the tested angle.
+/// Amplitude-dependent damping (`zeta_amplitude`, ring baffle) uses the slosh angle in the tangential plane. Its sine would
+/// be 6 % smaller at the tested angle.
 #[test]
 fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
     for (zeta_a, width) in [(0.05, 0.0), (0.0, 0.01)] {

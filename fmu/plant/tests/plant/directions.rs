@@ -9,7 +9,7 @@ const G: f64 = 9.81;
 /// Tolerance of the balances, relative to the energy throughput. It allows for the rounding errors of some thousand steps.
 const TOLERANCE: f64 = 1e-13;
 
-/// Returns 5 kg of liquid with one mode along the tangent, one in an oblique direction and one along the radius.
+/// Returns a bench with 5 kg of liquid and three modes: along the tangent, in an oblique direction, and along the radius.
 fn askew(model: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(model, friction);
     (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 3);
@@ -29,9 +29,10 @@ fn plant(p: &Parameters) -> Plant {
 
 const MODELS: [SloshModel; 2] = [SloshModel::Linear, SloshModel::Planar];
 
-/// On a tilted bench with damping and every friction law, E(t) - E(0) - work + heat is 0 relative to the energy throughput.
+/// On a tilted bench with damping and every friction law, energy - (energy at the start) - work + dissipated energy must be 0
+/// relative to the energy throughput.
 #[test]
-fn energy_balances_along_any_direction() {
+fn energy_is_balanced_with_modes_in_any_direction() {
     for model in MODELS {
         for friction in FrictionModel::ALL {
             let mut p = askew(model, friction);
@@ -70,10 +71,11 @@ fn damping_of_modes_in_any_direction_does_not_change_momentum() {
     }
 }
 
-/// Newton's equations of hub and slosh masses, in which the forces of the guides are unknowns, integrated by Runge-Kutta.
-/// The states are theta and w, then al and al' of each mode. A slosh mass at P = (r + l s n_x, l s n_t, -l c) in the hub's
-/// frame has the acceleration P'' + 2 w x P' + w' x P + w x (w x P). Gravity, drag along its path and the guide's force N
-/// across the path act on it; -N and minus the drag act on the hub.
+/// Newton's equations of hub and slosh masses, in which the forces of the guides are unknowns, integrated by Runge–Kutta. The
+/// states are the angle of the hub and its rate w, then the angle al of each mode and its rate. A slosh mass at P = (r + l s
+/// n_x, l s n_t, -l c) in the hub's frame (s and c are sine and cosine of al) has the acceleration P'' + 2 w x P' + w' x P +
+/// w x (w x P). Gravity, drag along its path and the guide's force N across the path act on it; -N and minus the drag act on
+/// the hub.
 struct Newton<'a> {
     p: &'a Parameters,
     drag: Vec<f64>,
@@ -157,8 +159,8 @@ impl Newton<'_> {
     }
 }
 
-/// The independent motion is integrated by Runge-Kutta in steps of 0.1 ms. At 14 rad/s its error is (14e-4)^4/120 per
-/// radian, 1e-12 after three seconds. The slosh angles reach 40 degrees.
+/// The independent motion is integrated by Runge–Kutta in steps of 0.1 ms. At 14 rad/s its error is (14e-4)^4/120 per radian,
+/// which is 1e-12 after three seconds. The slosh angles reach 40 degrees.
 #[test]
 fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
     for tilt in [0.0, 0.1] {
@@ -193,8 +195,8 @@ fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
     }
 }
 
-/// Returns the inertia J of hub and liquid about the axis if one mode along the radius is at the angle be, and its first two
-/// derivatives with respect to be.
+/// Returns the inertia J of hub and liquid about the axis while one radial mode is at the angle `be`, and the first two
+/// derivatives of J with respect to `be`.
 fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     let (m, l, r) = (p.slosh.table.mass[0], p.slosh.table.length[0], p.tank.r);
     let m_0 = p.slosh.table.m_liq - m;
@@ -204,10 +206,10 @@ fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     [value, 2.0 * m * x * l * c, 2.0 * m * l * (l * c * c - x * s)]
 }
 
-/// On a hub that rotates at w, the pendulum of a radial mode is in equilibrium at the angle be with g tan(be) = w^2 (r + l
-/// sin be). Small oscillations about this angle, at constant angular momentum H = J(be) w, have the effective potential V =
-/// H^2/(2 J) + m g l (1 - cos be), where J is the total inertia about the hub's axis, so that Omega^2 = V''/(m l^2). If the
-/// hub is so heavy that w is constant, Omega^2 = g/(l cos be) - w^2 cos^2 be.
+/// On a hub that rotates at the rate w, the pendulum of a radial mode is in equilibrium at the angle be with g tan(be) = w^2
+/// (r + l sin be). Small oscillations about this angle have the frequency Omega^2 = V''/(m l^2) with the effective potential
+/// V = H^2/(2 J) + m g l (1 - cos be), where H is the constant angular momentum and J(be) the inertia about the hub's axis.
+/// If the hub is so heavy that w is constant, Omega^2 = g/(l cos be) - w^2 cos^2 be.
 #[test]
 fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     for (hub, shift) in [(0.1, 1.0), (1e6, -1.0)] {
@@ -264,8 +266,8 @@ fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     }
 }
 
-/// A liquid with the same modes in all directions has no preferred axes: in linear theory two equal modes at right angles
-/// have the same effect on the hub as one mode along the tangent.
+/// In linear theory a liquid with the same modes in all directions has no preferred axes, so that two equal modes at right
+/// angles have the same effect on the hub as one mode along the tangent.
 #[test]
 fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
     let run = |directions: &[f64]| -> Vec<Outputs> {
@@ -294,10 +296,10 @@ fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
     }
 }
 
-/// `slosh.table.direction` is allowed only for the slosh models `linear` and `planar`, and the sum of the modal masses along
-/// one direction must not exceed the mass of liquid.
+/// The table of directions is allowed only for the slosh models `linear` and `planar`, and the sum of the modal masses along
+/// one direction must not exceed the mass of the liquid.
 #[test]
-fn directions_of_modes_are_refused_for_models_without_them() {
+fn directions_of_modes_are_refused_for_slosh_models_without_directions() {
     let refused = |change: fn(&mut Parameters)| {
         let mut p = askew(SloshModel::Planar, FrictionModel::None);
         change(&mut p);
@@ -319,8 +321,8 @@ fn directions_of_modes_are_refused_for_models_without_them() {
     assert!(light.unwrap().contains("most unfavourable directions"));
 }
 
-/// Mode 1 moves only along its direction. If it starts along this direction, the outputs equal the initial values exactly.
-/// Any other start is refused, with a message that contains a valid start.
+/// If the start is along the direction of mode 1, the outputs equal the initial values exactly. Any other start is refused,
+/// with a message that contains a valid start.
 #[test]
 fn an_initial_state_is_refused_if_it_is_not_along_the_direction_of_mode_1() {
     for model in MODELS {
@@ -367,8 +369,8 @@ fn an_initial_state_is_refused_if_it_is_not_along_the_direction_of_mode_1() {
     }
 }
 
-/// In the slosh models `linear` and `planar` a mode whose direction has no radial component moves only tangentially. A radial
-/// initial angle then has no effect, and a warning says so.
+/// In the slosh models `linear` and `planar` a mode without a radial component moves only tangentially, so that a radial
+/// initial angle has no effect.
 #[test]
 fn a_radial_initial_angle_without_effect_causes_a_warning() {
     for (model, direction, warned) in [

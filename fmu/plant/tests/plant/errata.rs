@@ -6,8 +6,9 @@ use std::f64::consts::{PI, TAU};
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel, x};
 
-/// Returns the matrices of the plant's linear model, computed by directional derivatives: the derivatives of theta'' and
-/// al'' with respect to theta, theta', al and al', and with respect to the torque.
+/// Returns the matrices of the plant's linear model from directional derivatives: the derivatives of the accelerations of hub
+/// angle and slosh angle with respect to both angles and their rates, and with respect to the torque. `h` is the fill height,
+/// m, and `b` is true with viscous friction.
 fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
     let mut p =
         bench(SloshModel::Linear, if b { FrictionModel::Viscous } else { FrictionModel::None });
@@ -83,8 +84,8 @@ fn errata_a1_a2_the_resonance_lies_above_the_antiresonance() {
     }
 }
 
-/// Errata A1 of Rubaga's thesis (book/errata.md) is the sign of the slosh torque on the hub: with the printed sign the
-/// energy of released liquid grows by 22 %.
+/// Errata A1 of Rubaga's thesis (book/errata.md) is the sign of the slosh torque on the hub. With the printed sign the energy
+/// of released liquid would grow by 22 %.
 #[test]
 fn errata_a1_energy_and_momentum_of_released_liquid_do_not_grow() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -121,8 +122,8 @@ fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
     assert!((mass / plant.calculated().m_liq - 1.0).abs() < 1e-3, "{mass}");
 }
 
-/// Errata A4 of Rubaga's thesis (book/errata.md): under viscous friction the rate of a hub with
-/// rigid liquid decays exponentially.
+/// Errata A4 of Rubaga's thesis (book/errata.md): under viscous friction the rate of a hub with rigid liquid decays
+/// exponentially.
 #[test]
 fn errata_a4_friction_opposes_the_motion() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -168,8 +169,8 @@ fn errata_a9_the_frequency_of_circular_motion_rises_with_amplitude() {
     assert!(o.slosh_angle.abs() < 1e-9);
 }
 
-/// Errata A10 and A11 of Rubaga's thesis (book/errata.md): after the time π/√(g/l) a pendulum on a heavy hub is
-/// at the opposite angle.
+/// Errata A10 and A11 of Rubaga's thesis (book/errata.md): after the time π/√(g/l) a pendulum on a heavy hub is at the
+/// opposite angle.
 #[test]
 fn errata_a10_a11_a_displaced_bob_swings_at_the_root_of_g_over_l() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);

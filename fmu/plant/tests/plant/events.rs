@@ -10,8 +10,8 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// At the limit of the static friction the bearing still holds the hub. After the break-away event has been handled the hub
-/// turns, and no event is overdue.
+/// A torque just below the static friction does not break the hub away, and a torque just above it makes an event overdue.
+/// After the event has been handled, the hub turns.
 #[test]
 fn after_a_break_away_no_event_is_overdue() {
     let p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
@@ -47,8 +47,8 @@ fn after_a_break_away_no_event_is_overdue() {
     }
 }
 
-/// A hub with LuGre friction that is at rest, without torque and with undeflected bristles, keeps the direction of its last
-/// motion as its contact. If a torque acts, the torque determines the direction.
+/// A hub with LuGre friction at rest, without torque and with undeflected bristles, keeps the direction of its last motion as
+/// its contact. If a torque acts, the torque determines the direction.
 #[test]
 fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     let p = bench(SloshModel::Frozen, FrictionModel::Lugre);
@@ -72,7 +72,7 @@ fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
 }
 
 #[test]
-fn indicators_of_the_wheel_are_distances_to_its_limits() {
+fn event_indicators_of_the_wheel_are_distances_to_its_limits() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
     let none = Plant::new(&p, &torque(0.1), 0.0, 1e-9).unwrap().event_indicators(&torque(0.1));
     assert_eq!(none, [1.0; 8]);
@@ -97,9 +97,10 @@ fn indicators_of_the_wheel_are_distances_to_its_limits() {
     }
 }
 
-/// Sample k is due at start + k/rate. An event that is early by at most a millionth of a sampling period takes the sample.
+/// Sample k is due k sampling periods after the start. An event that is early by at most a millionth of a period takes the
+/// sample.
 #[test]
-fn the_gyros_samples_are_time_events() {
+fn samples_of_the_gyro_are_time_events() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
     let inputs = torque(0.0);
     let next = |p: &plant::Parameters| Plant::new(p, &inputs, 3.0, 1e-9).unwrap().next_time_event();
@@ -119,10 +120,10 @@ fn the_gyros_samples_are_time_events() {
     assert!((next - 3.1).abs() < 1e-15, "all overdue samples must have been taken");
 }
 
-/// The derivatives with respect to each state are also tested where the outputs are strongly nonlinear. If the direction of the
-/// derivative is 100 times as long, the derivatives are 100 times as large, and they equal the change by a small step.
+/// The derivatives are also tested where the outputs are strongly nonlinear. If the direction is 100 times as long, the
+/// derivatives are 100 times as large; they equal the change of the outputs by a small step.
 #[test]
-fn output_derivatives_are_linear_in_each_direction() {
+fn directional_derivatives_of_outputs_are_linear_in_the_direction() {
     for slosh in SloshModel::ALL {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth, p.hub.imbalance) = (0.3, 0.4, 0.5);
@@ -165,8 +166,8 @@ fn stops(plant: &mut Plant, inputs: &Inputs, end: f64) -> Vec<StepEnd> {
     }
 }
 
-/// Returns a hub with rigid liquid that a torque brakes against Coulomb friction, and the time I w/(tau + c) after which the
-/// hub comes to rest and sticks.
+/// Returns a hub with rigid liquid that a torque brakes against Coulomb friction, and the time after which it comes to rest
+/// and sticks, s.
 fn braked() -> (Parameters, f64) {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
     (p.friction.b, p.friction.d, p.init.omega) = (0.0, 0.0, 0.02);
@@ -176,7 +177,6 @@ fn braked() -> (Parameters, f64) {
     (p, rest)
 }
 
-/// Friction and a constant torque brake a hub; the time of rest is known in closed form.
 #[test]
 fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
     let (p, rest) = braked();
@@ -196,7 +196,7 @@ fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
     }
 }
 
-/// The rotor's speed falls by 1 rad/s per second and reaches its lowest value after a quarter of a second.
+/// The speed of the rotor falls by 1 rad/s per second and reaches its lowest value after a quarter of a second.
 #[test]
 fn a_step_stops_where_the_wheel_s_torque_changes() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -237,10 +237,10 @@ fn a_step_stops_at_each_sample_of_the_gyro() {
     assert_eq!(plant.step_to_event(&inputs, 7.12 - plant.time()).unwrap(), StepEnd::EventAtEnd);
 }
 
-/// The motion includes stick and slip under oscillating liquid, a wheel that saturates, and samples of the gyro. Whether
-/// steps stop at events or not, and however often, the results are bit-identical.
+/// The motion includes stick and slip under oscillating liquid, a wheel that saturates, and samples of the gyro. The results
+/// must be bit-identical, however often steps stop at events.
 #[test]
-fn continuing_after_events_equals_one_whole_step() {
+fn a_step_continued_after_events_equals_one_whole_step_to_the_last_bit() {
     for slosh in SloshModel::ALL {
         let mut p = bench(slosh, FrictionModel::Stribeck);
         (p.imu.enabled, p.wheel.enabled) = (true, true);
@@ -270,9 +270,8 @@ fn continuing_after_events_equals_one_whole_step() {
     }
 }
 
-/// A step that stops at an event is usually continued by a step with the same end and the same torque, which skips this event. If
-/// the next step has another end or another torque instead, it is a new step from the present state, and it finds the same events
-/// as a plant that has never stopped.
+/// After a stop the host usually continues with a step that has the same end and the same torque, which skips this event. If
+/// the next step has another end or another torque, it must find the same events as in a plant that has never stopped.
 #[test]
 fn after_a_stop_at_an_event_a_step_with_another_end_or_torque_is_a_new_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -335,7 +334,7 @@ fn saved_data_that_is_not_a_stopped_step_is_refused() {
 }
 
 #[test]
-fn a_failed_step_keeps_the_stopped_step() {
+fn a_failed_step_does_not_forget_the_step_that_stopped_at_an_event() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     (p.imu.enabled, p.solver.max_steps) = (true, 20);
     let inputs = torque(0.01);

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use plant::{FrictionModel, Inputs, Parameters, Plant, SloshModel};
 
-/// Returns a hub that hardly moves, because the liquid has 2 kg and the hub has 1e9 kg m2, without damping and friction.
+/// Returns a hub without damping and friction that hardly moves, because the liquid has 2 kg and the hub 1e9 kg m2.
 pub fn held(model: SloshModel, depth: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -15,9 +15,9 @@ pub fn held(model: SloshModel, depth: f64) -> Parameters {
     p
 }
 
-/// Returns the mean angular frequency, rad/s, of the slosh angle or, in circular motion, of its direction. It is computed
-/// from the instants at which the tangential angle rises through 0. Linear interpolation between samples at intervals of `h`
-/// finds each instant to 1e-6 of a period for 1 ms, and to 4e-7 for 0.1 ms.
+/// Returns the mean angular frequency, rad/s, of the slosh angle, or in circular motion of its direction. It follows from the
+/// instants at which the tangential angle rises through 0. Linear interpolation between samples every `h` seconds finds each
+/// instant to 1e-6 of a period for 1 ms, and to 4e-7 for 0.1 ms.
 fn frequency(p: &Parameters, h: f64) -> f64 {
     let inputs = Inputs::default();
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-11).unwrap();
@@ -38,9 +38,8 @@ pub fn shifts(model: SloshModel, depth: f64, h: f64) -> [f64; 2] {
     shifts_of(held(model, depth), h)
 }
 
-/// Returns the relative change of omega^2 per squared slosh angle of planar and of circular motion, measured at
-/// 0.05 rad. The next order is 2.5e-3 (0.05 rad squared) of this change, times numbers of order 1. The motion is
-/// sampled every `h` seconds.
+/// Returns the relative change of the squared frequency per squared slosh angle, for planar and for circular motion of 0.05
+/// rad. Terms of the next order change it by some 2.5e-3 of its value. The motion is sampled every `h` seconds.
 pub fn shifts_of(mut p: Parameters, h: f64) -> [f64; 2] {
     let amplitude: f64 = 0.05;
     let plant = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();

@@ -22,11 +22,10 @@ fn moving(slosh: SloshModel) -> Parameters {
     p
 }
 
-/// Positions of the masses at an instant: the hub's angle, and for each slosh mass its position in the hub's frame.
 struct Place {
     theta: f64,
-    /// For each slosh mass, m: its coordinates x and y from the hub's axis, the height that determines its vertical
-    /// velocity, and the height that determines its potential energy.
+    /// For each slosh mass, m: its coordinates x and y in the hub's frame, the height that determines its vertical velocity,
+    /// and the height that determines its potential energy.
     bobs: Vec<[f64; 4]>,
 }
 
@@ -74,8 +73,8 @@ fn derivatives(f: [f64; 5]) -> [f64; 2] {
     ]
 }
 
-/// Simulates five samples of a motion. Returns the calculated parameters, the positions of all masses at the samples, and
-/// the outputs at the middle sample.
+/// Simulates five samples of a motion. Returns the calculated parameters, the positions of all masses at the samples, and the
+/// outputs at the middle sample.
 fn sampled(p: &Parameters) -> (Calculated, [Place; 5], Outputs) {
     let inputs = Inputs { tau_cmd: Ramp::held(0.3), ..Inputs::default() };
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-13).unwrap();
@@ -101,7 +100,7 @@ fn assert_near(got: f64, want: f64, size: f64, what: &str) {
 /// Velocities and accelerations are computed by differences from the positions of hub and slosh masses at several times.
 /// Forces, momentum and energy then follow from Newton's law.
 #[test]
-fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
+fn forces_momentum_and_energy_follow_from_the_positions_of_the_masses_by_newtons_law() {
     for slosh in SloshModel::ALL {
         let p = moving(slosh);
         let (known, places, o) = sampled(&p);
@@ -154,7 +153,7 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
     }
 }
 
-/// All liquid is at rest relative to the rotating hub, so that its force on the hub is m_liq r w^2, outwards.
+/// All liquid is at rest relative to the rotating hub, so that its force on the hub is the centrifugal force of its mass.
 #[test]
 fn liquid_that_turns_with_the_hub_pushes_outwards() {
     for slosh in SloshModel::ALL {
@@ -172,7 +171,7 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
     }
 }
 
-/// When a torque begins to act, at first only the rigid part of the liquid accelerates with the hub.
+/// When a torque begins to act, only the rigid part of the liquid accelerates with the hub at first.
 #[test]
 fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
     for slosh in SloshModel::ALL {
@@ -189,8 +188,8 @@ fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
     }
 }
 
-/// In every slosh model the outputs at the start equal the initial angles and rates of the first mode in both directions,
-/// whatever the coordinates of the model.
+/// The outputs at the start must equal the initial angles and rates of the first mode in both directions, although each slosh
+/// model has coordinates of its own.
 #[test]
 fn a_bench_starts_at_the_given_slosh_angles_and_rates() {
     for slosh in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {

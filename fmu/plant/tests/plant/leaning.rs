@@ -10,8 +10,8 @@ use crate::common::SLOSHING;
 
 const G: f64 = 9.81;
 
-/// Returns a tank of h/R = 1 without damping on a hub that its liquid cannot move. Gravity across the axis has the slope
-/// `s`, and `beta` is its direction, measured from outwards to the tangent.
+/// Returns a tank of h/R = 1 without damping on a hub that is too heavy to move. Gravity across the axis has the slope `s`,
+/// and `beta` is its direction, rad, measured from outwards to the tangent.
 fn leaning(model: SloshModel, s: f64, beta: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -85,9 +85,9 @@ fn measured(p: &Parameters) -> f64 {
     10.0 / (zeros[10] - zeros[0])
 }
 
-/// At h/R = 1, along the slope and across it, the relative change of Lambda (squared frequency) by the tilt agrees with
-/// finite elements (`hubslosh.liquid_modes`, two meshes whose results differ by 2e-4; `formulas::tilt` names the programs).
-/// The tolerance of the frequency is half the difference of the meshes plus the neglected second order, 1e-4 and 0.15 %.
+/// The expected relative changes of the squared frequency by the tilt, along the slope and across it, come from finite
+/// elements (`hubslosh.liquid_modes`; `formulas::tilt` names the programs) on two meshes, whose results differ by 2e-4. The
+/// tolerance of the frequency is half this difference plus the neglected second order, 1e-4 and 0.15 %.
 #[test]
 fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
     for (s, change, allowed) in
@@ -105,8 +105,8 @@ fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
     }
 }
 
-/// The frequency that the plant reports and the frequency of a free decay agree within the square of the amplitude, 1e-4
-/// rad, plus the measurement error of 1e-7. Models with one direction are tested in a direction oblique to the slope.
+/// The allowed difference is the square of the amplitude, 1e-4 rad, plus the measurement error of 1e-7. Models with one
+/// direction are tested in a direction oblique to the slope.
 #[test]
 fn the_stated_frequency_equals_that_of_a_free_decay() {
     for model in SLOSHING {
@@ -128,11 +128,11 @@ fn the_stated_frequency_equals_that_of_a_free_decay() {
     }
 }
 
-/// When a torque begins to act, it accelerates the hub and the liquid that does not slosh, with the inertia I + r^2
-/// (m_liq - sum of m f) in every model. A planar slosh mass cannot move radially, so that it contributes by its distance
-/// from the axis as well.
+/// When a torque begins to act, it accelerates the hub and the liquid that does not slosh, with the inertia I + r^2 (m_liq -
+/// sum of m f), where m f is the sloshing mass of a mode on the tilted bench. A planar slosh mass contributes as well,
+/// because it cannot move radially.
 #[test]
-fn rigid_liquid_follows_the_hub() {
+fn rigid_liquid_accelerates_with_the_hub() {
     for model in SLOSHING {
         for beta in [0.0, FRAC_PI_2, 0.6] {
             let mut p = leaning(model, 0.3, beta);

@@ -7,8 +7,8 @@ use plant::{Inputs, Parameters, Plant, SloshModel, SloshSource};
 
 const SAMPLE: f64 = 1e-3;
 
-/// With the large-wave coefficients s = kappa = 1 the relative change of omega^2 is −1/8 of the squared angle in planar
-/// motion and 1/2 of the squared displacement in circular motion.
+/// The relative change of the squared frequency must be −1/8 of the squared angle in planar motion, and 1/2 of the squared
+/// displacement in circular motion.
 #[test]
 fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
     let found = shifts(SloshModel::Spherical, 0.10, SAMPLE);
@@ -16,9 +16,9 @@ fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
     assert!((found[1] / 0.5 - 1.0).abs() < 0.01, "{found:?}");
 }
 
-/// The model `liquid` with the coefficients s (inertia) and kappa (spring) has the relative frequency shifts 3
-/// kappa/8 - s/2 in planar motion and kappa/2 in circular motion. `tests/physics/liquid.rs` compares them with
-/// potential flow at the two depths.
+/// For the large-wave coefficients s and kappa of a depth, the relative change of the squared frequency per squared angle
+/// must be 3 kappa/8 - s/2 in planar and kappa/2 in circular motion. `tests/physics/liquid.rs` compares these values with
+/// potential flow at the same depths.
 #[test]
 fn the_liquid_model_has_the_frequency_shifts_of_the_third_order() {
     for (depth, potential_flow) in [(0.10, [-0.4285, 0.3671]), (0.05, [-0.2566, 0.4208])] {
@@ -41,8 +41,8 @@ fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
     p
 }
 
-/// The coefficients are those of a table with soft and hard springs. For any s and kappa the measured frequency shifts equal
-/// those of the third order.
+/// The tested pairs of s and kappa include soft and hard springs. For each pair the measured change of the frequency must be
+/// that of third-order theory.
 #[test]
 fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
     for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {
@@ -55,8 +55,8 @@ fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
     }
 }
 
-/// If the table leaves s and kappa at 1, which are the coefficients of a pendulum, the model `liquid` warns, because it is
-/// meant for the tank's own coefficients.
+/// If the table leaves s and kappa at 1, the values of a pendulum, the model `liquid` warns, because it is meant for the
+/// tank's own coefficients.
 #[test]
 fn the_liquid_model_requires_s_and_kappa_of_a_table() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());

@@ -18,11 +18,11 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// Break-away torque c + d of the bench's bearing, N m.
+/// Break-away torque of the bench's bearing, N m: Coulomb friction plus the excess at rest.
 const G_MAX: f64 = 0.003498 + 0.002423;
 
 #[test]
-fn energy_balances_and_the_bearing_never_adds_energy() {
+fn with_lugre_friction_energy_is_balanced_and_the_bearing_never_adds_energy() {
     for slosh in SloshModel::ALL {
         for (sigma0, asymmetry) in [(30.0, 0.0), (1000.0, 0.05)] {
             let mut p = bench(slosh);
@@ -130,8 +130,9 @@ fn stiff_lugre_bristles_approach_the_set_valued_law() {
     assert!(differences[2] < 2e-5, "{differences:?}");
 }
 
-/// Computes tau_f along a prescribed motion of the hub, with Runge-Kutta 4 for the bristles only. Returns (rate, friction
-/// torque, dissipated power) after each step.
+/// Computes the friction torque while the hub moves at the prescribed rate `omega`, rad/s. Only the bristles are integrated,
+/// by `steps` Runge–Kutta steps of `h` seconds. Returns the rate, the friction torque and the dissipated power after each
+/// step.
 fn driven(
     p: &Parameters,
     omega: impl Fn(f64) -> f64,
@@ -179,8 +180,8 @@ fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
     }
 }
 
-/// Before a hub with LuGre friction slides, its friction torque as a function of the deflection is a hysteresis loop, which is
-/// closed from the second cycle on.
+/// Before a hub with LuGre friction slides, its friction torque as a function of the deflection is a hysteresis loop, which
+/// is closed from the second cycle on.
 #[test]
 fn friction_before_sliding_follows_a_closed_hysteresis_loop() {
     let mut p = bench(SloshModel::Frozen);
@@ -207,8 +208,8 @@ fn friction_before_sliding_follows_a_closed_hysteresis_loop() {
     assert!(third.iter().all(|(_, friction, _)| friction.abs() < 0.8 * G_MAX));
 }
 
-/// Returns the friction torque while the rate rises minus the friction torque while it falls, N m,
-/// both at the mean rate. The rate oscillates with `frequency`, rad/s.
+/// Returns the lag of the friction: the torque at the mean rate while the rate rises, minus the torque at this rate while it
+/// falls, N m. The rate oscillates with `frequency`, rad/s.
 fn lag(frequency: f64) -> f64 {
     let mut p = bench(SloshModel::Frozen);
     // Only the Stribeck effect is left: the rate is within w_s, and there is no viscous friction.
@@ -256,8 +257,7 @@ fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
     assert!(fast > 0.003498 * 0.99, "the torque must not fall below Coulomb friction: {fast}");
 }
 
-/// A torque of 2 mN·m, less than the break-away torque, turns a hub with LuGre friction by torque
-/// divided by bristle stiffness.
+/// A torque of 2 mN·m, less than the break-away torque, turns the hub by torque divided by bristle stiffness.
 #[test]
 fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     let mut p = bench(SloshModel::Frozen);
@@ -279,7 +279,7 @@ fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
 }
 
 #[test]
-fn step_length_follows_the_bristle_stiffness() {
+fn internal_steps_are_shorter_with_stiffer_lugre_bristles() {
     // The hub slides at 0.05 rad/s for 1 s, with relaxation times from 0.1 s to 0.1 ms. The number of internal steps grows
     // with the stiffness, by at most about one per ten relaxation times.
     for sigma0 in [1.0, 100.0, 10_000.0] {
@@ -294,7 +294,7 @@ fn step_length_follows_the_bristle_stiffness() {
 }
 
 #[test]
-fn a_model_exchange_host_that_locates_reversals_reproduces_co_simulation() {
+fn a_model_exchange_host_that_locates_reversals_reproduces_co_simulation_with_lugre_friction() {
     let mut p = bench(SloshModel::Spherical);
     p.friction.sigma0 = 30.0;
     p.init.slosh_angle = 0.1;

@@ -19,8 +19,8 @@ fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-/// Returns a bench with all options: tilted by 3 degrees, with an unbalanced hub, a ring baffle, damping that grows with
-/// the amplitude, and a hundred times the surface tension of water.
+/// Returns a bench that is tilted by 3 degrees and has an unbalanced hub, a ring baffle, damping that grows with the
+/// amplitude, breaking waves, and a hundred times the surface tension of water.
 fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(slosh, friction);
     (p.bench.tilt, p.bench.tilt_azimuth) = (0.05, 0.7);
@@ -69,7 +69,7 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
 }
 
 #[test]
-fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
+fn energy_is_balanced_on_a_tilted_bench_with_baffle_and_capillarity() {
     for slosh in SloshModel::ALL {
         for friction in FrictionModel::ALL {
             for modes in [1, 3] {
@@ -96,8 +96,8 @@ fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
     }
 }
 
-/// The bench is tilted and has a baffle, capillarity, imbalance and breaking waves. One step of 10 s gives the same motion
-/// as steps of 3 ms.
+/// One step of 10 s must give the same motion as steps of 3 ms, on a tilted bench with baffle, capillarity, imbalance and
+/// breaking waves.
 #[test]
 fn motion_with_all_options_does_not_depend_on_the_communication_step() {
     for slosh in SloshModel::ALL {
@@ -111,8 +111,8 @@ fn motion_with_all_options_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// The derivative of the angular momentum equals the moment of gravity on all masses at their positions. It is compared by
-/// Simpson's rule over 1 ms, whose error is (2 pi f h)^4/180 of the torque, 1e-10.
+/// The derivative of the angular momentum must equal the moment of gravity on all masses at their positions. Both are
+/// compared by Simpson's rule over 1 ms, whose error is (2 pi f h)^4/180 of the torque, 1e-10.
 #[test]
 fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
     for slosh in SloshModel::ALL {
@@ -157,8 +157,8 @@ fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
     }
 }
 
-/// If the liquid is rigid, hub and liquid are one pendulum about the bearing: omega^2 = g tan(tilt) M/I with the static
-/// moment M of all masses.
+/// With rigid liquid, hub and liquid are one pendulum about the bearing, with omega^2 = g tan(tilt) M/I, where M is the
+/// static moment of all masses and I their inertia.
 #[test]
 fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -198,10 +198,10 @@ fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
     }
 }
 
-/// On a tilted bench gravity exerts a torque on the hub's imbalance. Dry friction holds the hub as long as this torque is
+/// On a tilted bench gravity exerts a torque on the hub's imbalance. Dry friction must hold the hub while this torque is
 /// below the break-away torque.
 #[test]
-fn dry_friction_holds_a_leaning_hub() {
+fn dry_friction_holds_an_unbalanced_hub_on_a_tilted_bench() {
     // The torque is 9.81 tan(0.001) (0.3 + 2.087 0.225) N m sin(phi) = 7.5 mN m sin(phi). At 90 degrees it exceeds the
     // break-away torque of 5.9 mN m.
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -222,7 +222,8 @@ fn dry_friction_holds_a_leaning_hub() {
     assert!(moved.outputs(&inputs_with_gravity(9.81)).theta > 0.01, "the hub must turn downhill");
 }
 
-/// Returns a hub that does not move, without viscous damping, with a ring baffle of d/R = w/R = 0.1.
+/// Returns a hub that does not move, without viscous damping, with a ring baffle whose depth and width are a tenth of the
+/// radius.
 fn ringed(slosh: SloshModel) -> Parameters {
     let mut p = bench(slosh, FrictionModel::None);
     p.hub.inertia = 1e9;
@@ -266,7 +267,7 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     );
 }
 
-/// The amplitude fulfils a' = -zeta(a) omega a with zeta = Z a^(1/2), so that a^(-1/2) grows at the rate Z omega/2. The test
+/// The damping ratio of a ring baffle is Z a^(1/2) at the amplitude a, so that a^(-1/2) grows at the rate Z omega/2. The test
 /// starts at 0.2 rad and covers ten periods. The tolerance of 1 % includes the effect of the ring on the frequency and the
 /// cubic terms of the pendulum.
 #[test]
@@ -296,10 +297,10 @@ fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
     }
 }
 
-/// The first frequency is omega_1^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R), and the pendulum's length does not
-/// depend on surface tension.
+/// The first frequency must be omega_1^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R), also at g = 0. The length of the
+/// pendulum does not depend on surface tension.
 #[test]
-fn capillarity_centres_the_liquid_down_to_weightlessness() {
+fn surface_tension_restores_the_liquid_also_without_gravity() {
     let (xi, radius) = (1.841_183_781_340_66f64, 0.0815);
     for slosh in sloshing() {
         for g in [9.81, 0.01, 0.0] {
@@ -324,8 +325,8 @@ fn capillarity_centres_the_liquid_down_to_weightlessness() {
     }
 }
 
-/// The drag coefficient is c = 2 zeta m omega at every g. A ratio zeta that is a parameter is constant, and the ratio of the
-/// correlation varies as omega^(-1/2).
+/// The drag coefficient is 2 zeta m omega at every specific force. If zeta is a parameter, it is constant; if it comes from
+/// the correlation, it varies as omega^(-1/2).
 #[test]
 fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -363,8 +364,8 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     }
 }
 
-/// For example, `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the reason
-/// contains the name `slosh.zeta_from_correlation`.
+/// For example, `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the reason must contain the name
+/// `slosh.zeta_from_correlation`.
 #[test]
 fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
     let why = |p: &Parameters, name: &str| p.overridden(name).unwrap_or_default();
@@ -384,7 +385,7 @@ fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
 }
 
 #[test]
-fn warnings_name_low_bond_numbers() {
+fn a_warning_names_a_low_bond_number_of_the_tank() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.init.slosh_angle_radial = 0.0;
     assert!(Plant::warnings(&p, &inputs_with_gravity(9.81)).is_empty());
@@ -395,7 +396,8 @@ fn warnings_name_low_bond_numbers() {
     assert!(Plant::warnings(&with, &inputs_with_gravity(9.81)).is_empty());
 }
 
-/// The expected torque, with tanh(w/eps) = 1, is -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of the angle), for both
+/// At rates at which the smoothed sign is 1, the expected torque is -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of
+/// the angle), with viscous friction b, Coulomb friction C, excess at rest D, Stribeck speed w_s and asymmetry A, for both
 /// Stribeck laws and both directions of rotation.
 #[test]
 fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
@@ -433,10 +435,10 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
     }
 }
 
-/// Breaking needs both of its parameters and an onset that waves in the model can reach: the steepness is 1.541 at an
-/// amplitude of 1 rad.
+/// Breaking needs both of its parameters, and an onset that waves of the model can reach: at an amplitude of 1 rad the
+/// steepness is 1.541.
 #[test]
-fn warnings_name_breaking_parameters_without_effect() {
+fn warnings_name_parameters_of_breaking_waves_that_have_no_effect() {
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
     p.slosh.breaking_steepness = 0.66;
     assert_eq!(Plant::warnings(&p, &inputs_with_gravity(9.81)), [""; 0]);
@@ -467,8 +469,8 @@ fn warnings_name_breaking_parameters_without_effect() {
     }
 }
 
-/// For a mode of a table, the amplitude at which waves begin to break follows from the wave elevation and the wave number in the
-/// table. With the values of a cylinder it equals the amplitude in the cylinder.
+/// With the wave elevation and the wave number of a cylinder in the table, the amplitude at which waves begin to break equals
+/// that of the cylinder.
 #[test]
 fn steepness_follows_from_the_wave_elevation_and_wave_number_in_the_table() {
     let power = |p: &Parameters| plant(p).outputs(&inputs_with_gravity(9.81)).power_dissipated;

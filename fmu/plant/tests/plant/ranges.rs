@@ -9,12 +9,11 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// Height of the first mode's wave at the wall divided by slosh angle and tank radius: 2/(xi_1^2 - 1).
+/// Height of the first mode's wave at the wall divided by slosh angle and tank radius, 2/(xi_1^2 - 1).
 const WAVE: f64 = 2.0 / (1.841_183_781_340_659_5 * 1.841_183_781_340_659_5 - 1.0);
 
-/// By Rubaga's thesis (section 2.3.5) slosh is linear for waves below 0.15 R and nonlinear above 0.25 R.
 #[test]
-fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
+fn the_slosh_regime_changes_at_waves_of_0_15_and_0_25_radii() {
     let regime = |ratio: f64| {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         p.init.slosh_angle = ratio / WAVE;
@@ -36,8 +35,8 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
     }
 }
 
-/// The damping law of the baffle is valid if the stroke of the liquid at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 times
-/// the width of the ring and the ring stays covered by liquid.
+/// The law is valid if the stroke of the liquid at the ring is 0.64 to 6.4 times the width of the ring, and if the ring stays
+/// covered by liquid.
 #[test]
 fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
     let within = |width: f64, depth: f64, wave: f64| {
@@ -63,7 +62,7 @@ fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
 }
 
 #[test]
-fn warnings_name_formulas_outside_their_range() {
+fn a_warning_names_each_formula_that_is_used_outside_its_range() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     let warnings = |p: &Parameters, g: f64| Plant::warnings(p, &inputs_with_gravity(g));
     assert!(warnings(&p, 9.81).is_empty());
@@ -110,7 +109,7 @@ fn a_ring_wider_than_the_tank_or_below_its_bottom_is_refused() {
     assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "no baffle");
 }
 
-/// If the masses in the table differ from the mass of the liquid by at most 1e-9, the fixed mass is 0.
+/// The masses in the table may differ from the mass of the liquid by 1e-9 of it.
 #[test]
 fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -127,10 +126,10 @@ fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     assert!((plant.calculated().m_0 - 0.05).abs() < 1e-15);
 }
 
-/// The sum of the squared sines of the two initial angles is the squared distance of the slosh mass from the vertical
-/// through its hinge, divided by the squared length. It must be less than 1.
+/// The sum of the squared sines of the two initial angles is the squared horizontal distance of the slosh mass from its
+/// hinge, divided by the squared length. It must be less than 1.
 #[test]
-fn a_spherical_bob_starts_below_the_horizontal() {
+fn a_spherical_pendulum_that_starts_above_the_horizontal_is_refused() {
     let refused = |radial: f64, tangential: f64| {
         let mut p = bench(SloshModel::Spherical, FrictionModel::None);
         (p.init.slosh_angle_radial, p.init.slosh_angle) = (radial, tangential);
@@ -142,8 +141,8 @@ fn a_spherical_bob_starts_below_the_horizontal() {
     assert!(refused(0.9, 0.9), "beyond");
 }
 
-/// At h/R = 0.2 the coefficient s is -38.7, so that the inertia of hub and liquid would not be positive at amplitudes that
-/// depend on the hub. Near the secondary resonances at 0.829 and 1.012 the coefficients are interpolated.
+/// At h/R = 0.2 the large-wave coefficient s is -38.7, so that the inertia of hub and liquid would not be positive at
+/// amplitudes that depend on the hub. Near the secondary resonances at 0.829 and 1.012 the coefficients are interpolated.
 #[test]
 fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     let said = |fill: f64, model: SloshModel| {
@@ -162,8 +161,9 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     }
 }
 
-/// For every reason the test has a plant just beyond the limit, and a plant just within it. The bench's cylinder has h/R = 1.227;
-/// there omega^2 changes by the factors 1 - 0.429 A^2 in planar motion and 1 + 0.367 A^2 in circular motion.
+/// For every reason there is a plant just beyond the limit and a plant just within it. The bench's cylinder has h/R = 1.227;
+/// there the squared frequency changes by the factors 1 - 0.429 A^2 in planar and 1 + 0.367 A^2 in circular motion at the
+/// slosh angle A.
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {
@@ -221,8 +221,8 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     assert_eq!(reason(&p, 0.0), LimitedBy::None);
 }
 
-/// If the slosh model uses the coefficients of the table of modes, a mode is out of range above the limits in the table.
-/// With other slosh models it is out of range at smaller angles.
+/// If the slosh model uses the coefficients of the table, a mode is out of range above the limits in the table. With other
+/// slosh models it is out of range at smaller angles.
 #[test]
 fn a_table_of_modes_has_its_own_limits() {
     let reason = |model: SloshModel, limit: f64, degrees: f64| {

@@ -8,10 +8,10 @@ use ode_solvers::dop853::Dop853;
 use ode_solvers::{SVector, System};
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};
 
-/// Hub and one spherical pendulum with the unit vector p as coordinates: theta, w, p, p'. Newton's law of the slosh mass in
-/// the hub's frame, in which p.p'' = -|p'|^2 eliminates the tension of the rod. The equations of the plant differ: they
-/// have the inertial velocity of the slosh mass instead of p', and the tension acts on the hub, whereas here w' follows
-/// from the total angular momentum.
+/// Hub and one spherical pendulum with the unit vector p as coordinates: angle and rate of the hub, then p and p'. The
+/// equations are Newton's law of the slosh mass in the hub's frame, in which p.p'' = -|p'|^2 eliminates the tension of the
+/// rod. The equations of the plant differ: they contain the inertial velocity of the slosh mass instead of p', and the
+/// tension acts on the hub, whereas here the acceleration of the hub follows from the total angular momentum.
 struct UnitVector {
     i0: f64,
     m: f64,
@@ -101,9 +101,9 @@ fn stereographic_and_unit_vector_pendulums_agree_beyond_the_horizontal() {
     }
 }
 
-/// Returns true if a small radial displacement grows. The hub is too heavy for the liquid to move it, and the tank is so far
-/// from the axis that the hinge moves on a straight line: y = eps l cos(w t). The motion starts on the planar orbit with the
-/// amplitude a eps^(1/3), mu a + a^3/8 + 1 = 0.
+/// Returns true if a small radial displacement grows, that is, if planar motion is unstable. The hub is too heavy for the
+/// liquid to move it, and the tank is so far from the axis that the hinge moves on a straight line, by `eps` l cos(w t). The
+/// motion starts on the planar periodic orbit with the amplitude a eps^(1/3), where `mu` a + a^3/8 + 1 = 0.
 fn leaves_the_plane(eps: f64, mu: f64) -> bool {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.tank.r = 1000.0;

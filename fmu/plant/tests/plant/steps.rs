@@ -59,9 +59,9 @@ fn internal_steps_are_the_same_for_long_and_short_communication_steps() {
     assert_eq!(long, short);
 }
 
-/// Expected count of internal steps: rows by slosh model and columns by friction law, each in the order of the
-/// enumeration, and in each pair for the tolerances 1e-5 and 1e-10. More steps would be slower, and fewer steps less
-/// exact. A deviation of one in twenty is accepted, because rounding changes the count.
+/// Expected number of internal steps for each slosh model (rows) and friction law (columns), in the order of the
+/// enumerations, and in each pair for the tolerances 1e-5 and 1e-10. More steps would be slower, and fewer steps less exact.
+/// A deviation of one in twenty is accepted, because rounding changes the number.
 const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
     [[7, 12], [7, 12], [34, 56], [16, 29], [174, 194]],
@@ -70,8 +70,8 @@ const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[19, 36], [19, 36], [34, 57], [20, 37], [172, 192]],
 ];
 
-/// The number of internal steps for a second of motion is compared with the expected number for every slosh model and
-/// friction law, so that a change that makes the integrator slower is noticed.
+/// A change that makes the integrator slower is noticed, because the numbers of internal steps are compared for every slosh
+/// model and friction law.
 #[test]
 fn a_second_of_motion_takes_the_expected_number_of_internal_steps() {
     let found = SloshModel::ALL.map(|slosh| {
@@ -90,8 +90,8 @@ fn a_second_of_motion_takes_the_expected_number_of_internal_steps() {
     );
 }
 
-/// The tolerance is relative to the size of the motion, so that small waves on a hub at rest take no more
-/// steps than large waves.
+/// The tolerance is relative to the size of the motion, so that small waves on a hub at rest take no more steps than large
+/// waves.
 #[test]
 fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     for slosh in SloshModel::ALL {
@@ -106,7 +106,7 @@ fn a_small_motion_takes_no_more_steps_than_a_large_one() {
 }
 
 /// The hub is too heavy to move. The scale of the allowed error includes both angles and rates, so that a motion that starts
-/// at an angle with the rate 0 needs no more steps than a motion that starts with a rate.
+/// with an angle and without a rate needs no more steps than a motion that starts with a rate.
 #[test]
 fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     for slosh in SloshModel::ALL {
@@ -122,7 +122,7 @@ fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     }
 }
 
-/// At eight times the Stribeck speed the excess friction of Stribeck's law is below 1e-30, invisible at any tolerance. A
+/// At eight times the Stribeck speed the excess friction of Stribeck's law is below 1e-30 and invisible at any tolerance. A
 /// long step from this rate to rest must still take it into account.
 #[test]
 fn a_long_step_from_a_fast_hub_to_rest_equals_short_steps() {

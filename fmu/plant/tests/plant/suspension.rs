@@ -12,7 +12,7 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &Inputs::default(), 0.0, TOLERANCE).unwrap()
 }
 
-/// Returns a bench with rigid liquid on a line of 0.5 N m/rad that is twisted by 0.1 rad at the start.
+/// Returns a bench with rigid liquid on a suspension line of 0.5 N m/rad that is twisted by 0.1 rad at the start.
 fn frozen(friction: FrictionModel) -> Parameters {
     let mut p = bench(SloshModel::Frozen, friction);
     (p.hub.k, p.hub.theta_0, p.init.theta) = (0.5, -0.2, -0.1);
@@ -24,7 +24,6 @@ fn inertia(p: &Parameters) -> f64 {
     p.hub.inertia + m_liq * p.tank.r * p.tank.r
 }
 
-/// If `hub.k` and `hub.c` are 0, the rest angle `hub.theta_0` has no effect.
 #[test]
 fn a_suspension_line_without_stiffness_and_damping_changes_no_bit_of_the_motion() {
     for slosh in SLOSH {
@@ -43,8 +42,8 @@ fn a_suspension_line_without_stiffness_and_damping_changes_no_bit_of_the_motion(
     }
 }
 
-/// The expected energy is k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J of the line plus I w^2/2, and the expected torque is -k
-/// (theta - theta_0) - c w = -0.05 - 0.02 N m.
+/// The expected energy is the spring's, 0.25 (0.1)^2 J, plus the kinetic energy; the expected torque is -0.05 N m of the
+/// spring and -0.02 N m of the damping.
 #[test]
 fn torque_and_energy_of_the_suspension_line_follow_from_its_twist() {
     let mut p = frozen(FrictionModel::None);
@@ -55,7 +54,7 @@ fn torque_and_energy_of_the_suspension_line_follow_from_its_twist() {
     assert!((outputs.energy - kinetic - 0.0025).abs() < 1e-15, "{} {kinetic}", outputs.energy);
 }
 
-/// The motion of a hub with rigid liquid fulfils I theta'' = -k (theta - theta_0) - c theta'.
+/// The expected motion is the solution of I theta'' = -k (theta - theta_0) - c theta'.
 #[test]
 fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
     for c in [0.0, 0.05] {
@@ -75,8 +74,8 @@ fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
     }
 }
 
-/// The frequencies follow from (K - omega^2 M)(theta, alpha) = 0, with M and K of the linear slosh model and the stiffness
-/// k of the line about the bearing.
+/// The expected frequencies are the eigenvalues of the coupled equations of hub and linear pendulum with the stiffness of the
+/// line.
 #[test]
 fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -111,8 +110,8 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
     }
 }
 
-/// Coulomb friction c_f reduces the amplitude by 2 c_f/k in each half swing of pi sqrt(I/k), until the line can no
-/// longer overcome the friction.
+/// Coulomb friction c_f reduces the amplitude by 2 c_f/k in each half swing of pi sqrt(I/k), until the line can no longer
+/// overcome the friction.
 #[test]
 fn dry_friction_stops_a_hub_on_a_suspension_line_at_the_predicted_angle_and_time() {
     let mut p = frozen(FrictionModel::Stribeck);

@@ -30,8 +30,8 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The table is tested with and without a wave height; its default is the wave height of a cylinder
-/// with the diameter tank.d.
+/// The table is tested with wave heights and without; by default the wave height is that of a cylinder with the diameter
+/// `tank.d`.
 #[test]
 fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {
@@ -125,8 +125,7 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
     );
 }
 
-/// Liquid that rotates with the walls of the tank (`tank.I_own`) adds to the inertia of the hub, independent
-/// of the tank's position.
+/// Liquid that rotates with the walls of the tank (`tank.I_own`) adds to the inertia of the hub, wherever the tank is.
 #[test]
 fn the_tanks_own_inertia_is_turned_with_the_hub() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -145,7 +144,7 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
 }
 
 /// If the table contains only the modes along one axis of a box, slosh models in which the liquid also moves along the other
-/// axis are refused, because the modes along this axis are different.
+/// axis are refused, because the modes along that axis are different.
 #[test]
 fn modes_along_one_axis_are_refused_where_the_liquid_moves_along_both() {
     for model in SloshModel::ALL {

@@ -68,9 +68,9 @@ impl Fill {
         p
     }
 
-    /// Returns the communication step, s, and the torque at the communication points. A pulse and a release are exact. A
-    /// sine that is replaced by straight lines would lose (w H)^2/12 of its amplitude; therefore the values are multiplied
-    /// by 1/sinc^2(f H), so that the fundamental of the lines is the sine.
+    /// Returns the communication step, s, and a function for the torque at the communication points. A pulse and a release
+    /// are exact. A sine that is replaced by straight lines would lose (w h)^2/12 of its amplitude; therefore the values are
+    /// multiplied by 1/sinc^2(f h), so that the fundamental of the lines is the sine.
     fn input<'a>(&'a self, run: &'a Run) -> (f64, impl Fn(f64) -> f64 + 'a) {
         let step = match run.input.as_str() {
             // Stick and slip begin when the torque itself, and not its fundamental, passes a level. For an error of 1e-7 s
@@ -190,19 +190,19 @@ fn check(model: &str, tolerance: f64) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Trajectories of the linear slosh model, with stick and slip, equal reference trajectories that two other
-/// integrators computed; the tolerance of the solver is 1e-10.
+/// The reference trajectories, with stick and slip, were computed by two other integrators. The tolerance of the solver is
+/// 1e-10.
 #[test]
-fn linear_model_equals_the_reference_at_tolerance_1e_10() {
+fn trajectories_of_the_linear_model_equal_the_reference_at_tolerance_1e_10() {
     check("linear", 1e-10);
 }
 
 #[test]
-fn planar_model_equals_the_reference() {
+fn trajectories_of_the_planar_model_equal_the_reference() {
     check("planar", 1e-11);
 }
 
 #[test]
-fn spherical_model_equals_the_reference() {
+fn trajectories_of_the_spherical_model_equal_the_reference() {
     check("spherical", 1e-11);
 }
