@@ -121,7 +121,7 @@ mod tests {
     /// The expected values, with six digits, are those of the tank in `fmu/craft/tests/six.json`, which has a radius of 0.45
     /// m and is filled 0.6 m deep with a liquid of 1000 kg/m3.
     #[test]
-    fn the_cylinder_equals_the_reference_records() {
+    fn the_pendulum_of_a_cylinder_equals_the_reference_values() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
         let kept = [pendulum(0, 0.9, 0.6, m_liq)];
         let [m_0, h_0, i_0] = rest(0.9, 0.6, m_liq, &kept);
@@ -224,7 +224,7 @@ mod tests {
 
     /// At the tenth zero, the last one of the table, the expansion has an error of 1e-8, the size of its first omitted term.
     #[test]
-    fn mcmahon_s_zeros_continue_the_table() {
+    fn mcmahon_s_expansion_continues_the_table_of_zeros() {
         let tenth = mcmahon(10);
         assert!((tenth - XI[9]).abs() < 1e-7, "{tenth} {}", XI[9]);
         assert_eq!((zero(1), zero(10)), (XI[0], XI[9]));

@@ -359,7 +359,7 @@ mod tests {
 
     /// The expected values, with four digits, were computed by hand for water in the bench's tank of 81.5 mm radius.
     #[test]
-    fn correlations_have_their_published_coefficients() {
+    fn damping_correlations_have_their_published_coefficients() {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
         near(inverse_reynolds(r, nu, g), 1.2530e-5);
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn correlations_beyond_their_range_keep_the_value_at_its_end() {
+    fn damping_correlations_keep_the_value_at_the_end_of_their_range_beyond_it() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
         assert_eq!((sphere(0.01), sphere(1.99)), (sphere(0.1), sphere(1.9)));
         assert!(sphere(0.11) < sphere(0.1) && sphere(1.89) != sphere(1.9));

@@ -194,7 +194,7 @@ mod tests {
     /// Tests data that jump by factors of up to 1e4, that rise and fall smoothly, and that turn. The tolerance of 1e-11 is
     /// the last digit of the largest value divided by the smallest distance between points.
     #[test]
-    fn the_curve_rises_where_the_data_rise() {
+    fn the_interpolating_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;
         let mut random = || {
             seed = seed
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn steep_slopes_are_limited() {
+    fn slopes_of_the_interpolating_curve_are_limited_where_they_are_too_steep() {
         // The secants are 1 and 10 alternately. Each slope is at most 2.4 times the smaller secant.
         let (x, y) = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 10.0, 11.0, 21.0, 22.0]);
         let (slope, _) = found(x, y, true);

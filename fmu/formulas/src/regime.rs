@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn regimes_end_at_0_15_and_0_25_of_the_radius() {
+    fn the_slosh_regime_changes_at_wave_heights_of_0_15_and_0_25_radii() {
         assert_eq!([0.1499, 0.15].map(Regime::from_ratio), [Regime::Linear, Regime::Transitional]);
         assert_eq!(
             [0.25, 0.2501].map(Regime::from_ratio),

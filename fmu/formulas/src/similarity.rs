@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn froude_s_factors_equal_those_of_the_table() {
+    fn froude_scale_factors_equal_the_table_of_the_thesis() {
         let factors = froude(4.0, 2.0, 0.25).map(|(name, _, factor)| (name, factor));
         let expected = [
             ("length", 4.0),
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn froude_keeps_the_ratio_of_inertia_to_gravity() {
+    fn froude_scaling_keeps_the_ratio_of_inertia_to_gravity() {
         let factor = |name: &str, all: [(&str, &str, f64); 10]| {
             all.iter().find(|(other, ..)| *other == name).map_or(f64::NAN, |one| one.2)
         };

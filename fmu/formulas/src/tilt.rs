@@ -148,7 +148,7 @@ mod tests {
     /// At small tilts the tolerance is the difference between the results of two meshes. At larger tilts it is the error that
     /// [`largest_slope`] states.
     #[test]
-    fn frequencies_equal_those_of_finite_elements_within_the_stated_errors() {
+    fn frequencies_in_a_tilted_cylinder_equal_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {
             let part = slope / largest_slope(fill);
             let allowed = match part {
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_equal_those_of_the_derivative_of_the_bessel_function() {
+    fn the_constants_of_tilted_cylinders_are_the_zeros_of_derivatives_of_bessel_functions() {
         for (b, b_2) in XI_0.into_iter().zip(XI_2) {
             assert!(libm::j1(b * (1.0 - 1e-15)) * libm::j1(b * (1.0 + 1e-15)) < 0.0, "{b}");
             // The derivative is J2' = J1 - 2 J2/x.
