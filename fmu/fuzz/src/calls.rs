@@ -19,13 +19,13 @@ struct HostFmu {
 }
 
 unsafe extern "C" {
-    /// Runs the hostile host in `host.c`. The strings of GUID and token in `fmu` must end with NUL, and `data`
-    /// must have `size` bytes.
+    /// Runs the host in `host.c`, which makes wrong calls. The strings of GUID and token in `fmu` must end with NUL, and
+    /// `data` must have `size` bytes.
     fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
 }
 
-/// Runs the hostile host of `host.c` against the FMU with which this program is linked. `data` determines the calls. The FMU
-/// must be that of the model `M`.
+/// Runs the host in `host.c`, which makes wrong calls, with the FMU that is linked into this program. `data` determines the
+/// calls, and `M` must be the model of this FMU.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
     // The first byte of an input for FMI 3.0 is odd; every fourth of these inputs is for the FMU with arrays.

@@ -16,7 +16,6 @@ use crate::states::settings;
 use crate::{Values, place, set, survives_being_saved, to_steps};
 
 const CALLS: usize = 40;
-/// Allowed relative difference between the outputs of two hosts; see [`allowed`].
 const TOLERANCE: f64 = 1e-9;
 const LONGEST: u32 = 8;
 
@@ -95,8 +94,12 @@ impl Clock {
 
 type Rows = Vec<Vec<f64>>;
 
-/// Runs one input. The first byte determines the FMI version, the interface, and who handles events; the other bytes
-/// determine parameters and calls. Panics if two hosts get different outputs.
+/// Simulates one motion with several hosts whose clocks have different rounding errors, and compares their outputs. The first
+/// byte of `data` determines the FMI version, the interface, and who handles events; the other bytes determine parameters and
+/// calls.
+///
+/// # Panics
+/// If two hosts get different outputs.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((how, data)) = data.split_first() else { return };
     let data = &mut Unstructured::new(data);
@@ -176,9 +179,10 @@ fn compare<M: Model, V: Values>(
     Ok(())
 }
 
-/// Returns the difference of output number `n` that two hosts may have: 1e-9 of its magnitude. If the host's clock
-/// determines the ends of steps (`is_placed`: Model Exchange, samples), the rounding error of its times multiplied by the
-/// output's fastest change is added, because a unit in the last place is 1.2e-7 s at 1e9 s.
+/// Returns the difference that two hosts may have in output number `n` of the `rows`: 1e-9 of its magnitude. If the host's
+/// clock determines the ends of steps (`is_placed`: Model Exchange, gyro samples), its rounding errors are allowed, too,
+/// because they shift the motion in time: a unit in the last place is 1.2e-7 s at 1e9 s. The allowed difference then includes
+/// the rounding error times the fastest change of the output.
 fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64 {
     let size = rows.iter().fold(1.0f64, |most, row| most.max(row[n].abs()));
     let pairs = rows.windows(2).map(|pair| (pair[1][n] - pair[0][n]).abs());
@@ -190,8 +194,8 @@ fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
 
-/// Iterates over outputs and local variables, except for derivatives of states, which are slow to read one by one and
-/// follow from the states.
+/// Iterates over outputs and local variables without derivatives of states. These follow from the states and are slow to read
+/// one by one.
 fn outputs<M: Model>() -> impl Iterator<Item = &'static Scalar<M>> {
     let is_shown = |s: &&Scalar<M>| {
         matches!(s.variable.causality, Causality::Output | Causality::Local)
@@ -247,8 +251,8 @@ fn begin<M: Model, V: Values>(
     Some(instance)
 }
 
-/// Makes a call that exists in both interfaces. Returns the instance with which the simulation continues, which
-/// may have been deserialised.
+/// Makes a call that exists in both interfaces. Returns the instance with which the simulation continues, because a call may
+/// replace it by a deserialised one.
 fn common<M: Model, V: Values>(mut instance: Instance<M, V>, call: Call) -> Instance<M, V> {
     let table = M::table();
     match call {

@@ -18,10 +18,10 @@ use runtime::v3::{self, Fmi3};
 use runtime::variable::{Access, Causality, Kind, Value};
 use runtime::version::Version;
 
-/// Runs the fuzz target whose name is in the environment variable `HUBSLOSH_FUZZ_TARGET`.
+/// Runs the fuzz target that the environment variable `HUBSLOSH_FUZZ_TARGET` names.
 ///
 /// # Panics
-/// If the variable does not contain the name of a target, or the FMU violates its contract.
+/// If the variable does not contain the name of a target, or if the FMU breaks a rule of the target.
 #[cfg(feature = "libfuzzer")]
 pub fn run<M: Model>(data: &[u8]) {
     static TARGET: std::sync::OnceLock<fn(&[u8])> = std::sync::OnceLock::new();
@@ -35,8 +35,8 @@ pub fn run<M: Model>(data: &[u8]) {
     target(data);
 }
 
-/// Returns the numbers that the hostile host needs in addition to GUID and token (`host.h`): the numbers of scalar
-/// variables, outputs, continuous states and event indicators, and the value reference of the first input in FMI 3.0.
+/// Returns the numbers that the host in `host.c` needs to know about the FMU in addition to GUID and token: the numbers of
+/// scalar variables, outputs, continuous states and event indicators, and the value reference of the first input in FMI 3.0.
 pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     let table = M::table();
     if layout == Layout::Arrays {
@@ -52,8 +52,7 @@ pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     [table.scalars.len(), outputs, states, table.about.event_indicators, input as usize]
 }
 
-/// The functions of one version of FMI that get and set values, for reals, integers, enumerations and
-/// Booleans in this order.
+/// The functions of one version of FMI that get and set values, for reals, integers, enumerations and Booleans in this order.
 pub trait Values: Version {
     const GET: [&'static Call; 4];
     const SET: [&'static Call; 4];
@@ -103,7 +102,10 @@ fn step<M: Model, V: Version>(
     Ok(info)
 }
 
-/// Leaves event mode, so that steps can follow. Panics if the next event is not in the future.
+/// Leaves event mode, so that steps can follow.
+///
+/// # Panics
+/// If the next event is not in the future.
 fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
     if instance.state() == InstanceState::Event {
         let next = instance.new_discrete_states().expect("in event mode").next_time;
@@ -119,7 +121,6 @@ fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
 /// Checks that every output and local variable of an initialised model can be read and is finite.
 ///
 /// # Panics
-///
 /// If a variable cannot be read, or is NaN or infinite.
 fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let shown = |scalar: &&Scalar<M>| {
@@ -137,11 +138,10 @@ fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     }
 }
 
-/// Serialises an instance, deserialises it, and checks that it is serialised to the same bytes again.
-/// Returns the new instance.
+/// Serialises an instance and restores it from the bytes. Returns the restored instance.
 ///
 /// # Panics
-/// If the bytes are refused or differ.
+/// If the bytes are refused, or if the restored instance is serialised to other bytes.
 fn survives_being_saved<M: Model, V: Version>(instance: &Instance<M, V>) -> Instance<M, V> {
     let bytes = to_bytes(instance);
     let again = from_bytes(&bytes).unwrap_or_else(|why| panic!("own bytes are refused: {why}"));

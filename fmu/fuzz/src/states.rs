@@ -18,9 +18,9 @@ use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_
 
 const CHECKSUM: usize = 16;
 
-/// Runs one input. The first byte determines the FMI version and the saved state. Modifications follow, each with a
-/// position (two bytes), a length (one byte) and this number of bytes of new content. If the first byte is 255, the other
-/// bytes are the saved state.
+/// Restores a damaged saved state and continues the simulation. The first byte of `data` selects the FMI version and a valid
+/// saved state. The other bytes are changes of this state: each has a position (two bytes), a length (one byte) and as many
+/// bytes of new content. If the first byte is 255, the other bytes are the saved state itself.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((which, patches)) = data.split_first() else { return };
     if *which == u8::MAX {
@@ -67,8 +67,8 @@ fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
     all.filter(|(interface, events)| V::allows(*interface, *events))
 }
 
-/// Continues the simulation as a host could. The FMU may refuse calls, but after a successful step all
-/// values must be finite.
+/// Continues a simulation as a host could. The FMU may refuse calls, but after a step without error all values must be
+/// finite.
 fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let table = M::table();
     for input in table.inputs() {
@@ -116,8 +116,8 @@ fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     survives_being_saved(instance);
 }
 
-/// Returns saved states of an FMU for Co-Simulation and Model Exchange, with each of the model's [`settings`], in every
-/// instance state that can be reached without an error.
+/// Returns saved states for Co-Simulation and Model Exchange, with each of the model's [`settings`], in every instance state
+/// that can be reached without an error.
 fn bases<M: Model, V: Values>() -> &'static [Vec<u8>] {
     static BASES: Mutex<BTreeMap<[&str; 2], &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
     let mut bases = BASES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -168,11 +168,11 @@ fn life_of<M: Model, V: Values>(
     all.push(to_bytes(&instance));
 }
 
-/// Returns sets of parameters with which the FMU runs before its saved states are modified. Together they use every part of
-/// the model, in motion.
+/// Returns the sets of parameters with which the FMU runs before its saved states are changed. Together they use every part
+/// of the model, in motion.
 ///
 /// # Panics
-/// If the model has no settings here.
+/// If there are no settings for the model.
 pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
     match model {
         // Each slosh model occurs with one friction law; the linear model also with a baffle.

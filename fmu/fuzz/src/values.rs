@@ -16,14 +16,14 @@ use runtime::variable::{Causality, Kind, Quantity, Value};
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
 const STEPS: usize = 12;
-/// Longest step, s. The model limits the work of a step; this limit makes the fuzzer faster.
+/// Longest step, s. It only makes the fuzzer faster, because a model limits the work of a step by itself.
 const LONGEST: f64 = 2.0;
-/// A simulation that takes more CPU time than this ends, because stiff models may use all allowed solver
-/// steps in every step.
+/// CPU time after which a simulation ends. Stiff models may use all allowed internal steps in every step, and would take too
+/// long.
 const SLOW: Duration = Duration::from_secs(1);
 
-/// Runs one input: creates an instance, sets some values, and simulates. The first byte determines the FMI version
-/// and who handles events.
+/// Creates an instance, sets some values, and simulates. The first byte of `data` determines the FMI version and who handles
+/// events, the other bytes the values and steps.
 pub fn run<M: Model>(data: &[u8]) {
     let Some((how, data)) = data.split_first() else { return };
     let data = &mut Unstructured::new(data);
@@ -88,8 +88,10 @@ fn co_simulation<M: Model, V: Values>(events: Events, data: &mut Unstructured) -
     Ok(())
 }
 
-/// Sets a parameter or an input of the FMU, usually to an allowed value. Panics if a call that the
-/// FMU refuses has changed a value.
+/// Sets a parameter or an input of the FMU, usually to an allowed value.
+///
+/// # Panics
+/// If a call that the FMU refuses has changed a value.
 fn set_something<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     data: &mut Unstructured,
@@ -114,8 +116,8 @@ fn set_something<M: Model, V: Values>(
     Ok(())
 }
 
-/// Limits an input to magnitudes that occur in simulations. At 1e12 N.m, for example, every step would use
-/// all allowed solver steps.
+/// Limits the range of an input to magnitudes that occur in simulations. With a torque of 1e12 N·m, for example, every step
+/// would use all allowed internal steps.
 fn everyday(quantity: Quantity) -> Quantity {
     let near = |limit: Option<f64>| limit.filter(|limit| limit.abs() <= 1e6);
     Quantity { min: near(quantity.min), max: near(quantity.max), ..quantity }

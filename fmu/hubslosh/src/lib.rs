@@ -16,7 +16,7 @@ pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
-/// Creates an instance as an importer of FMI 2.0 does, for tests and other callers in Rust.
+/// Creates an instance as a host of FMI 2.0 does, for tests and other callers in Rust.
 pub fn instance(interface: Interface) -> Instance {
     Instance::new(interface)
 }
@@ -24,7 +24,7 @@ pub fn instance(interface: Interface) -> Instance {
 /// Restores an instance from the bytes of a saved state.
 ///
 /// # Errors
-/// If the bytes are not a saved state; the text is the reason.
+/// The reason if the bytes are not a saved state.
 pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     runtime::snapshot::from_bytes(bytes)
 }

@@ -11,7 +11,8 @@ use runtime::model::{StepEnd, StepFailure};
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// True between [`Dynamics::apply_present_inputs`] and its reversal, so that outputs belong to the present inputs.
+    /// True between [`Dynamics::apply_present_inputs`] and its reversal. The outputs then belong to the present inputs;
+    /// otherwise to the contact at the last event.
     present: bool,
 }
 
@@ -25,9 +26,9 @@ impl HubSlosh {
     }
 }
 
-/// The plant's parameters and integer twins, whose names end in `_kind`. An importer that cannot set enumerations sets the twin
-/// to the number of the item instead, and an importer that misreads Booleans sets it to 1 for false or 2 for true; if the twin is
-/// 0, it has no effect. By default the liquid is released at [`START_ANGLE`].
+/// The parameters of the plant, and integer twins of its enumerations and Booleans, whose names end in `_kind`. A host that
+/// cannot set an enumeration sets its twin to the number of the item. A host that misreads Booleans sets a twin to 1 for
+/// false and to 2 for true. A twin that is 0 has no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     plant: plant::Parameters,
@@ -42,8 +43,8 @@ pub struct Parameters {
     pub imu_enabled_kind: i32,
 }
 
-/// Start value of `init.slosh_angle`, rad. It is 2 degrees, so that a first plot with default settings shows the moving
-/// liquid, the response of the hub and the sticking bearing.
+/// Start value of `init.slosh_angle`, rad, 2 degrees. With it a first plot with default settings shows liquid that moves, the
+/// response of the hub, and a bearing that sticks.
 pub const START_ANGLE: f64 = 0.035;
 
 impl Default for Parameters {
@@ -80,11 +81,11 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the plant's parameters with the values of the integer twins applied.
+    /// Returns the parameters of the plant after the integer twins have replaced their enumerations and Booleans.
     ///
     /// # Errors
-    /// If an enumeration contradicts its twin. A Boolean may contradict its twin, because hosts that need the twin set the
-    /// Boolean to any value.
+    /// If an enumeration and its twin have different values. A Boolean may differ from its twin, because hosts that need the
+    /// twin set the Boolean to any value.
     fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
         let mut p = self.plant;
         let start = plant::Parameters::default();

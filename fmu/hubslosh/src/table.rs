@@ -90,7 +90,7 @@ const TABLE_OF_MODES: &[Dimension] = &[Fixed(MODES)];
 
 type V = Variable<HubSlosh>;
 
-/// The variables. The outputs come first and in a useful order, because importing tools plot all of them.
+/// The variables of the FMU. The outputs come first and in a useful order, because importing tools plot all of them.
 #[rustfmt::skip]
 static VARIABLES: &[Variable<HubSlosh>] = &[
     // Outputs

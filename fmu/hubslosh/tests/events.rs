@@ -95,8 +95,6 @@ fn torque(step: usize) -> f64 {
     0.06 * (0.7 * step as f64).sin()
 }
 
-/// Variables that are compared at communication points: the continuous variables, the gyro's reading and the number of changes of
-/// the contact (stick or slip).
 const LOOKED_AT: [&str; 12] = [
     "theta",
     "omega",
@@ -181,8 +179,7 @@ fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
     assert!(early > 80, "{early} early returns");
 }
 
-/// In FMI 3.0 with event mode but without early return, the motion is bit-identical to that of FMI 2.0, and the events
-/// within a step are reported at its end.
+/// The events within a step are reported at its end, because the host does not allow an early return.
 #[test]
 fn a_host_that_forbids_early_return_gets_the_same_motion_and_learns_of_events_at_the_end() {
     let expected = trajectory();
@@ -222,8 +219,8 @@ fn a_host_that_does_not_enter_event_mode_after_events_gets_the_motion_of_fmi_2()
     }
 }
 
-/// Without gyro and wheel the hub's stick and slip are the only events, so that FMI 3.0 returns early at exactly the
-/// event times that FMI 2.0 reports.
+/// Without gyro and wheel the stick and slip of the hub are the only events, so that the times of early returns can be
+/// compared with the event times that FMI 2.0 reports.
 #[test]
 fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
     let values = &LIVELY[..5];
@@ -316,7 +313,7 @@ fn a_state_saved_at_an_event_continues_the_same_motion() {
     assert!(three.restore(&plain).is_err(), "the saved state's host handles events in another way");
 }
 
-/// With `solver.max_steps` = 10 a long step of HubSlosh returns fmi3Discard; a shorter step from the same time succeeds.
+/// With `solver.max_steps` = 10 a long step returns fmi3Discard, and a shorter step from the same time succeeds.
 #[test]
 fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
     let mut three: Three = initialised(Events::InStep, &[("solver.max_steps", Value::Integer(10))]);
@@ -353,7 +350,8 @@ fn continuous_states_cannot_be_set_in_co_simulation() {
     assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
 }
 
-/// Returns work_axial and omega_imu after 1 s in steps of 20 ms. g_axial jumps between steps and is constant within them.
+/// Returns the outputs work_axial and omega_imu after 1 s in steps of 20 ms. g_axial jumps between steps and is constant
+/// within them; `at` returns the time that the host passes for a step, and `start` is the start time, s.
 fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     let mut instance = Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);
     set(&mut instance, "imu.enabled", Value::Boolean(true));
@@ -370,8 +368,8 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     ["work_axial", "omega_imu"].map(|name| real(&mut instance, name))
 }
 
-/// The reference adds up its step sizes as the FMU does. In earlier versions, rounding errors of the simulation times caused
-/// errors of the work of up to 1.5e-4 J, and at 1e9 s gyro samples were one step late.
+/// The reference adds up its step sizes as the FMU does. Earlier versions had errors of the work of up to 1.5e-4 J because of
+/// rounding errors of the host's times, and at 1e9 s gyro samples were one step late.
 #[test]
 fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock() {
     fn compare<V: Version>() {

@@ -9,12 +9,10 @@ use runtime::model::StepFailure;
 pub struct Model {
     craft: Spacecraft,
     /// True while the present inputs are applied, so that outputs belong to the present inputs. In Co-Simulation a jump of
-    /// the wheels' momentum or of a mass flow acts when it is applied, and not only at the next step.
+    /// the wheels' momentum or of a mass flow acts when it is applied, and not only in the next step.
     present: bool,
     wheels: Wheels,
-    /// True after a tank without a model of detached liquid has left its range of validity.
     has_left_range: bool,
-    /// True after the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
@@ -26,10 +24,10 @@ const LUMP: &str = "the liquid of a tank leaves the bottom and moves on as detac
                     and momenta of crossings are valid. Impact forces, and the motion after an impact, are right only \
                     to an order of magnitude";
 
-/// Detects a wrong use in Model Exchange: h_wheels changes, but the importer has left the reaction −h_w' of the wheels out of
-/// the torque. `torque` is true for each axis on which the torque has been different from 0, and `moved` counts the steps in
-/// which h_wheels changed along an axis without torque. One such step is accepted, because it may be the end of a ramp whose
-/// torque has already ended.
+/// Detects a wrong use in Model Exchange: the host changes `h_wheels`, the angular momentum of the wheels, but leaves the
+/// reaction −h_wheels' out of the torque on the craft. `torque` is true for each axis on which a torque has acted, and
+/// `moved` counts, for each axis without torque, the steps in which h_wheels changed. One of these steps is accepted, because
+/// it may be the end of a ramp whose torque has already ended.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
     torque: [bool; 3],
@@ -57,9 +55,9 @@ impl Wheels {
     }
 }
 
-/// The craft's parameters, with counts as integers for FMI. An importer that cannot set enumerations sets `mount_kind` and
-/// `damping_law_kind`, the integer twins of the enumerations `mount` and `tank[].damping_law`, to the number of the item; a twin
-/// that is 0 has no effect.
+/// The parameters of the craft, with counts as integers for FMI. A host that cannot set enumerations sets `mount_kind` and
+/// `damping_law_kind`, the integer twins of `mount` and `tank[].damping_law`, to the number of the item. A twin that is 0 has
+/// no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,
@@ -97,10 +95,10 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the craft's parameters with the values of the integer twins applied.
+    /// Returns the parameters of the craft after the integer twins have replaced their enumerations.
     ///
     /// # Errors
-    /// If an enumeration contradicts its twin.
+    /// If an enumeration and its twin have different values.
     fn resolved(&self) -> Result<craft::Parameters, Vec<String>> {
         let mut p = self.craft;
         let (mount, kind) = (p.mount as i32, self.mount_kind);

@@ -156,7 +156,6 @@ impl Tanks for Model {
     }
 }
 
-/// The variables. The outputs come first, in a useful order.
 static VARIABLES: &[V] = &join::<
     _,
     { OUTPUTS.len() + TANK_LOCALS.len() + MOTIONS.len() + TANK_PARAMETERS.len() + OTHERS.len() },

@@ -8,8 +8,7 @@ pub use runtime::variable::Dimension::{self, Fixed};
 use runtime::variable::Item;
 pub use runtime::variable::{Enumeration, Variable};
 
-/// A model with tanks; the indices of its tanks count from 0. Integer parameters are stored with the values that the importer has
-/// set.
+/// A model with tanks, whose indices count from 0. Integer parameters are stored with the values that the host has set.
 #[allow(missing_docs)]
 pub trait Tanks: runtime::Dynamics {
     fn tank(p: &Self::Parameters, i: usize) -> &Tank;
@@ -53,7 +52,7 @@ pub static LIMITED_BY: Enumeration = Enumeration {
     items: &LIMITED_BY_ITEMS,
 };
 
-/// Items of `ball.state`, whose numbers [`ball_state`] returns.
+/// Items of `ball.state`, the state of detached liquid. [`ball_state`] returns their numbers.
 pub static BALL_STATE: Enumeration = Enumeration {
     name: "BallState",
     description: "State of a tank's liquid",
@@ -81,22 +80,22 @@ pub fn set_damping_law<M: Tanks>(p: &mut M::Parameters, tank: usize, number: i32
     }
 }
 
-/// Returns the indices of the tank, the mode and the point of the fill table that belong to element `n` of an array over
-/// tanks, modes and points. All count from 0.
+/// Converts the number of an element of an array over tanks, modes and points of the fill table to the indices of tank, mode
+/// and point, which count from 0.
 pub const fn point(n: usize) -> (usize, usize, usize) {
     (n / (POINTS * MODES), n / POINTS % MODES, n % POINTS)
 }
 
-/// Returns the indices of the tank, the mode and the axis that belong to element `n` of an array over tanks, modes and axes.
-/// All count from 0.
+/// Converts the number of an element of an array over tanks, modes and axes to the indices of tank, mode and axis, which
+/// count from 0.
 pub const fn place(n: usize) -> (usize, usize, usize) {
     (n / (3 * MODES), n / 3 % MODES, n % 3)
 }
 
-/// Declares a tank's local variables from `wave_height` to `spin_number`.
+/// Declares the local variables of a tank from `wave_height` to `spin_number`.
 ///
-/// `$tank` is the name of a tank, and `$tanks` the dimension over the tanks if there are several. `$angles` are the
-/// variables on which the slosh angles depend, and `$motion` those on which the ranges of validity depend.
+/// `$tank` is the name of a tank, and `$tanks` the dimension over the tanks if there are several. `$angles` are the variables
+/// on which the slosh angles depend, and `$motion` those on which the ranges of validity depend.
 #[macro_export]
 #[rustfmt::skip]
 macro_rules! tank_locals {
@@ -134,10 +133,11 @@ macro_rules! tank_locals {
     }};
 }
 
-/// Declares a tank's parameters.
+/// Declares the parameters of a tank.
 ///
 /// `$tank` is the name of a tank, `$tanks` the dimension over the tanks if there are several, and `$mode` the dimension over
-/// the modes. `$axes` are the axes in which the tank is mounted, and `$detached` is a text on when the liquid may detach.
+/// the modes. `$axes` is a text that names the axes in which the tank is mounted, and `$detached` a text that says when the
+/// liquid may detach.
 #[macro_export]
 #[rustfmt::skip]
 macro_rules! tank_parameters {
