@@ -8,8 +8,9 @@ use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
 
-/// Largest `coupling_ratio` without a warning: the added mass of the liquid divided by the mass of the craft that carries the
-/// tank. If craft and tank exchange forces once a step and both extrapolate, the exchange is stable up to 2/sqrt(3) - 1 = 0.155.
+/// Largest `coupling_ratio` without a warning: added mass of the liquid divided by the mass of the craft that carries the
+/// tank. If the simulations of craft and tank exchange forces once a step and both extrapolate, they are stable up to
+/// 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
 const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
@@ -24,25 +25,23 @@ const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True while the present inputs are applied. The outputs on the ranges of validity are then computed from the present
-    /// inputs; otherwise they keep the values of the last event.
+    /// True while the present inputs are applied. The outputs on the ranges of validity then belong to the present inputs;
+    /// otherwise they keep the values of the last event.
     present: bool,
-    /// True after a tank without a model of detached liquid has left its range of validity.
     has_left_range: bool,
-    /// True after the liquid of a tank with a model of detached liquid has detached.
     has_had_lump: bool,
 }
 
 impl Model {
-    /// Returns the coupling ratio: the largest eigenvalue of M_host^-1 M_a, where M_host is the mass matrix of the craft that
-    /// carries the tank and M_a the added mass. Returns 0 if the mass of the craft (`host.mass`) is unknown.
+    /// Returns the largest eigenvalue of M_host^-1 M_a, where M_host is the mass matrix of the craft that carries the tank,
+    /// and M_a the added mass of the tank. Returns 0 if the mass of the craft (`host.mass`) is unknown.
     pub fn coupling_ratio(&self) -> f64 {
         self.coupling_ratio
     }
 }
 
-/// The tank's parameters, with counts as integers for FMI. An importer that cannot set enumerations sets `coupling_kind`, the
-/// integer twin of the enumeration `coupling`, to the number of the item; if it is 0, it has no effect.
+/// The parameters of the tank, with counts as integers for FMI. A host that cannot set enumerations sets `coupling_kind`, the
+/// integer twin of `coupling`, to the number of the item; if it is 0, it has no effect.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     tank: TankParameters,
@@ -77,10 +76,10 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// Returns the tank's parameters with the values of the integer twins applied.
+    /// Returns the parameters of the tank after the integer twins have replaced their enumerations.
     ///
     /// # Errors
-    /// If an enumeration contradicts its twin.
+    /// If an enumeration and its twin have different values.
     fn resolved(&self) -> Result<TankParameters, Vec<String>> {
         let mut p = self.tank;
         let (coupling, kind) = (p.coupling as i32, self.coupling_kind);
@@ -112,8 +111,8 @@ impl Parameters {
     }
 }
 
-/// Inputs of the tank: the motion of the craft that carries it, by default rest without specific force. The slope of the angular
-/// velocity omega within a step is always omega_dot, whatever slope the importer sets.
+/// Inputs of the tank: the motion of the craft that carries it, by default rest without specific force. The slope of the
+/// angular velocity omega within a step is always omega_dot, whatever slope the host sets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     pub tank: TankInputs,

@@ -103,7 +103,6 @@ impl Tanks for Model {
     }
 }
 
-/// The variables. The outputs come first, in a useful order.
 static VARIABLES: &[V] = &join::<
     _,
     { OUTPUTS.len() + TANK_LOCALS.len() + MOTIONS.len() + TANK_PARAMETERS.len() + OTHERS.len() },
@@ -116,41 +115,41 @@ const TANK_PARAMETERS: &[V] = &tank_parameters!(
     "tank",
     [],
     MODE,
-    "host axes",
-    "Requires coupling = split, host.mass and the host's inertia, a tank with modes that does not drain, and a host that applies impulse"
+    "craft axes",
+    "Requires coupling = split, host.mass and host.Jxx to host.Jyz, a tank with modes that does not drain, and a host that applies impulse"
 );
 
 #[rustfmt::skip]
 const OUTPUTS: &[V] = &[
     // Outputs
     V::output("force", |o, n| o.tank.force[n], "N",
-        "Force of the whole liquid (sloshing and rigid) on the host, host axes")
+        "Force of the whole liquid (sloshing and rigid) on the host's craft, craft axes")
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("torque", |o, n| o.tank.torque[n], "N.m",
-        "Torque of the whole liquid (sloshing and rigid) on the host about O, host axes")
+        "Torque of the whole liquid (sloshing and rigid) on the host's craft about O, craft axes")
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("bias", |o, n| o.bias[n], "",
-        "Bias wrench for the right-hand side of the host's equations, host axes: force (1 to 3, N) and torque about O (4 to 6, N.m). The wrench on the host is bias - added_mass [a; omega_dot]. With coupling = split, bias depends on a and omega_dot only through the drag, by about 1e-4 of the bobs' mass times a change of a, so one evaluation is enough. With tank.damping_law = constant it depends on neither. With coupling = rigid_body it suits a host with the constant added_mass in its mass, centre of mass and inertia, also in centrifugal and gyroscopic terms")
+        "Bias wrench for the right-hand side of the host's equations, craft axes: force (1 to 3, N) and torque about O (4 to 6, N.m). The wrench on the craft is bias - added_mass [a; omega_dot]. With coupling = split, bias depends on a and omega_dot only through the drag, by about 1e-4 of the bobs' mass times a change of a, so one evaluation is enough. With tank.damping_law = constant it depends on neither. With coupling = rigid_body it suits a host with the constant added_mass in its mass, centre of mass and inertia, also in centrifugal and gyroscopic terms")
         .shape(&[Fixed(6)]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
-        "Symmetric 6 x 6 added-mass matrix about O for the left-hand side of the host's equations, host axes, upper triangle by rows (kg, kg.m, kg.m2). With coupling = split it depends only on tank.p, tank.liquid and, for detached liquid, tank.ball.position. With coupling = lumped or rigid_body it is constant: the matrix of the rigid liquid and of each bob at its hinge, at the start. In this matrix the bob of a planar mode counts twice, with 2 m l^2 about the axes in its plane. A bob with nonlinear_inertia or nonlinear_stiffness counts twice, with 2 m r^2 about every axis (r: distance from the hinge)")
+        "Symmetric 6 x 6 added-mass matrix about O for the left-hand side of the host's equations, craft axes, upper triangle by rows (kg, kg.m, kg.m2). With coupling = split it depends only on tank.p, tank.liquid and, for detached liquid, tank.ball.position. With coupling = lumped or rigid_body it is constant: the matrix of the rigid liquid and of each bob at its hinge, at the start. In this matrix the bob of a planar mode counts twice, with 2 m l^2 about the axes in its plane. A bob with nonlinear_inertia or nonlinear_stiffness counts twice, with 2 m r^2 about every axis (r: distance from the hinge)")
         .shape(&[Fixed(TRIANGLE)]).depends_on(PLACES).initial_depends_on(EVERYTHING),
     V::output("impulse", |o, n| o.impulse[n], "",
-        "Sum of the impulses of detached liquid on the host since the start, host axes at the time of each: force (1 to 3, N.s) and torque about O (4 to 6, N.m.s). After each step or event the host adds M^-1 times the increase to its velocity and angular velocity, where M is its 6 x 6 mass matrix about O (host.mass to host.Jyz). Always 0 if tank.ball.travel is 0")
+        "Sum of the impulses of detached liquid on the host's craft since the start, craft axes at the time of each: force (1 to 3, N.s) and torque about O (4 to 6, N.m.s). After each step or event the host adds M^-1 times the increase to the velocity and angular velocity of its craft, where M is the craft's 6 x 6 mass matrix about O (host.mass to host.Jyz). Always 0 if tank.ball.travel is 0")
         .shape(&[Fixed(6)]).depends_on(&[]),
 
     // Inputs
     V::input("a", |i, n| [&mut i.tank.a.value[n], &mut i.tank.a.slope[n]], "m/s2",
-        "Specific force at O, as an accelerometer there measures it, host axes. Held over a communication step unless an input derivative is set, which applies to one step")
+        "Specific force at O, as an accelerometer there measures it, craft axes. Held over a communication step unless an input derivative is set, which applies to one step")
         .shape(VECTOR).range(-1e9, 1e9),
     V::input("omega", |i, n| [&mut i.tank.omega[n], &mut i.omega_slope[n]], "rad/s",
-        "Angular velocity of the host relative to the inertial frame, host axes, at the start of the step. Within the step it follows from omega_dot; unless it is set again, it continues from there")
+        "Angular velocity of the host's craft relative to the inertial frame, craft axes, at the start of the step. Within the step it follows from omega_dot; unless it is set again, it continues from there")
         .display_unit("deg/s").shape(VECTOR).range(-1e9, 1e9).follows_inputs(),
     V::input("omega_dot", |i, n| [&mut i.tank.omega_dot.value[n], &mut i.tank.omega_dot.slope[n]], "rad/s2",
-        "Angular acceleration of the host relative to the inertial frame, host axes. Held over a communication step unless an input derivative is set, which applies to one step")
+        "Angular acceleration of the host's craft relative to the inertial frame, craft axes. Held over a communication step unless an input derivative is set, which applies to one step")
         .display_unit("deg/s2").shape(VECTOR).range(-1e9, 1e9),
     V::input("mass_flow", |i, _| [&mut i.tank.mass_flow.value, &mut i.tank.mass_flow.slope], "kg/s",
-        "Mass flow out of the tank, negative for inflow; it leaves with the tank's velocity at the outlet, and its thrust belongs to the host. The impulse of a jump on the host is not modelled: ramp the flow. Without effect with tank.fill.points = 0")
+        "Mass flow out of the tank, negative for inflow; it leaves with the tank's velocity at the outlet, and the host applies its thrust to the craft. The impulse of a jump of the flow is not modelled: ramp the flow. Without effect with tank.fill.points = 0")
         .range(-1e9, 1e9),
 
     // Locals
@@ -164,10 +163,10 @@ const MOTIONS: &[V] = &[
     V::local("mass", |o, _| o.mass, "kg",
         "Mass of the whole liquid").depends_on(&["tank.liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
-        "Centre of mass of the whole liquid from O, host axes")
+        "Centre of mass of the whole liquid from O, craft axes")
         .shape(VECTOR).depends_on(PLACES),
     V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
-        "Inertia matrix of the whole liquid about its centre of mass, each bob a point mass at its current position, host axes")
+        "Inertia matrix of the whole liquid about its centre of mass, each bob a point mass at its current position, craft axes")
         .shape(&[Fixed(3), Fixed(3)]).depends_on(PLACES),
     V::local("tank.angle_x", |o, n| o.tank.angle_x[n], "rad",
         "Slosh angle of a mode along the tank's x axis; its sine is the bob's displacement over the pendulum's length")
@@ -227,16 +226,16 @@ const MOTIONS: &[V] = &[
 #[rustfmt::skip]
 const OTHERS: &[V] = &[
     // Mass properties of the craft that carries the tank (optional)
-    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio and its warning and for the impulses of tank.ball.travel; 0: unknown")
+    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host's craft without this tank, for coupling_ratio and its warning and for the impulses of tank.ball.travel; 0: unknown")
         .range(0.0, 1e9),
-    V::parameter("host.r", |p, n| &mut p.host.r[n], "m", "Centre of mass of the host without this tank from O, host axes")
+    V::parameter("host.r", |p, n| &mut p.host.r[n], "m", "Centre of mass of the host's craft without this tank from O, craft axes")
         .shape(VECTOR).range(-1e4, 1e4),
-    V::parameter("host.Jxx", |p, _| &mut p.host.j.xx, "kg.m2", "Moment of inertia of the host without this tank about its centre of mass, host x axis").at_least(0.0),
-    V::parameter("host.Jyy", |p, _| &mut p.host.j.yy, "kg.m2", "Moment of inertia of the host without this tank about its centre of mass, host y axis").at_least(0.0),
-    V::parameter("host.Jzz", |p, _| &mut p.host.j.zz, "kg.m2", "Moment of inertia of the host without this tank about its centre of mass, host z axis").at_least(0.0),
-    V::parameter("host.Jxy", |p, _| &mut p.host.j.xy, "kg.m2", "Product of inertia of the host without this tank about its centre of mass, host axes: minus the integral of x y dm"),
-    V::parameter("host.Jxz", |p, _| &mut p.host.j.xz, "kg.m2", "Product of inertia of the host without this tank about its centre of mass, host axes: minus the integral of x z dm"),
-    V::parameter("host.Jyz", |p, _| &mut p.host.j.yz, "kg.m2", "Product of inertia of the host without this tank about its centre of mass, host axes: minus the integral of y z dm"),
+    V::parameter("host.Jxx", |p, _| &mut p.host.j.xx, "kg.m2", "Moment of inertia of the host's craft without this tank about its centre of mass, craft x axis").at_least(0.0),
+    V::parameter("host.Jyy", |p, _| &mut p.host.j.yy, "kg.m2", "Moment of inertia of the host's craft without this tank about its centre of mass, craft y axis").at_least(0.0),
+    V::parameter("host.Jzz", |p, _| &mut p.host.j.zz, "kg.m2", "Moment of inertia of the host's craft without this tank about its centre of mass, craft z axis").at_least(0.0),
+    V::parameter("host.Jxy", |p, _| &mut p.host.j.xy, "kg.m2", "Product of inertia of the host's craft without this tank about its centre of mass, craft axes: minus the integral of x y dm"),
+    V::parameter("host.Jxz", |p, _| &mut p.host.j.xz, "kg.m2", "Product of inertia of the host's craft without this tank about its centre of mass, craft axes: minus the integral of x z dm"),
+    V::parameter("host.Jyz", |p, _| &mut p.host.j.yz, "kg.m2", "Product of inertia of the host's craft without this tank about its centre of mass, craft axes: minus the integral of y z dm"),
 
     // Solver
     V::count("solver.max_steps", |p, _| p.max_steps as i32, |p, _, n| p.max_steps = n.max(0) as usize,
@@ -245,7 +244,7 @@ const OTHERS: &[V] = &[
 
     // Calculated from the parameters
     V::calculated("coupling_ratio", |m, _| m.coupling_ratio(), "1",
-        "Largest eigenvalue of the host's inverse mass matrix times the tank's added mass; 0 if host.mass is 0. A host that applies force and torque directly diverges, at any communication step, above 1 with held values and above 0.15 with extrapolated ones. It should use bias and added_mass")
+        "Largest eigenvalue of the inverse mass matrix of the host's craft times the tank's added mass; 0 if host.mass is 0. A host that applies force and torque directly diverges, at any communication step, above 1 with held values and above 0.15 with extrapolated ones. It should use bias and added_mass")
         .initial_depends_on(&["tank.", "host."]),
 ];
 
