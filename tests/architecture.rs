@@ -44,8 +44,8 @@ fn the_models_and_their_dependencies_need_no_standard_library() {
     }
 }
 
-/// The packages of the harness, each with the packages of the workspace that it may link. Of the packages in `fmu/`
-/// only `formulas` is allowed, because it contains no model.
+/// The packages of the harness, each with the packages of the workspace that it may link. Of the packages in `fmu/` only
+/// `formulas` is allowed, because it contains no model.
 const HARNESS: [(&str, &[&str]); 15] = [
     ("files", &[]),
     ("names", &["formulas"]),
@@ -110,8 +110,8 @@ fn the_harness_never_links_a_model_and_its_packages_have_no_cyclic_dependencies(
     }
 }
 
-/// With further features, `cargo run`, a test that builds the program, and `pack::build_native` would compile packages
-/// again that `cargo test` has already compiled.
+/// With further features, `cargo run`, a test that builds the program, and `pack::build_native` would compile packages again
+/// that `cargo test` has already compiled.
 #[test]
 fn tests_and_the_python_package_enable_no_further_features_of_the_program_s_dependencies() {
     let packages = |edges: &str, selection: &[&str]| -> BTreeSet<String> {
@@ -178,10 +178,10 @@ fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
-/// `cargo test` skips ignored tests, so that a script in `.ci` has to run each of them. `.ci/long-tests` runs all
-/// ignored tests except for those whose names contain a part that is listed for the nightly script or for
-/// `.ci/fuzz-readers`; the reason of an ignored test names its script. Each listed part must belong to a test, because
-/// `cargo test` also succeeds if it finds no test.
+/// `cargo test` skips ignored tests, so that a script in `.ci` must run each of them. `.ci/long-tests` runs all ignored tests
+/// except those whose names contain a part that is listed for the nightly script or for `.ci/fuzz-readers`; the reason of an
+/// ignored test names its script. Each listed part must belong to a test, because `cargo test` also succeeds if it finds no
+/// test.
 #[test]
 fn a_script_runs_every_test_that_is_ignored() {
     let root = pack::root();
@@ -286,7 +286,7 @@ fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     }
 }
 
-/// Lists the functions in a file of the harness whose errors are plain texts, each with the file.
+/// Lists the functions in the `code` of a file of the harness whose errors are plain texts, each with the name of the `file`.
 fn textual_errors(file: &str, code: &str) -> Vec<String> {
     let tokens = tokens(code);
     let mut found = Vec::new();
@@ -329,7 +329,7 @@ fn textual_errors(file: &str, code: &str) -> Vec<String> {
 }
 
 #[test]
-fn errors_of_the_harness_have_types() {
+fn functions_of_the_harness_return_typed_errors_and_no_texts() {
     let mut found = Vec::new();
     for krate in ONE_WAY.iter().filter(|krate| krate.starts_with("harness/")) {
         let mut all = BTreeMap::new();
@@ -387,10 +387,11 @@ const ONE_WAY: [&str; 25] = [
     "harness/native",
 ];
 
-/// A module, as its path within the crate: `["methods", "page"]`. The root of the crate is `[]`.
+/// A module, as its path within the crate, for example `["methods", "page"]`. The root of the crate is `[]`.
 type Module = Vec<String>;
 
-/// Collects the modules of a crate with their code, without comments and without the tests inside the files.
+/// Collects the modules of a crate below `folder`, which belongs to `module`, with their code in `all`. Comments, and tests
+/// inside the files, are left out.
 fn sources(folder: &Path, module: &[String], all: &mut BTreeMap<Module, String>) {
     for entry in fs::read_dir(folder).expect("a folder of modules").flatten() {
         let path = entry.path();
@@ -412,7 +413,7 @@ fn sources(folder: &Path, module: &[String], all: &mut BTreeMap<Module, String>)
     }
 }
 
-/// Splits a source into words, `::` and other signs, without white space.
+/// Splits Rust code into words, `::` and other signs, without white space.
 fn tokens(code: &str) -> Vec<&str> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let (mut found, mut rest) = (Vec::new(), code.trim_start());
@@ -429,8 +430,8 @@ fn tokens(code: &str) -> Vec<&str> {
     found
 }
 
-/// Collects every path of the import tree that begins at `tokens[0]`: `a::{b, c::d as e}` has the paths `a::b` and
-/// `a::c::d`. Returns the number of tokens of the tree.
+/// Collects every path of the import tree that begins at `tokens[0]`: with the base `[]`, `a::{b, c::d as e}` has the paths
+/// `a::b` and `a::c::d`. Returns the number of tokens of the tree.
 fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     let mut taken = 1;
     match tokens.first() {
@@ -458,7 +459,7 @@ fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     }
 }
 
-/// Lists the paths that a module names with `crate::`, `self::` and `super::`, from the root of the crate.
+/// Lists the paths, from the root of the crate, that the `code` of a module names with `crate::`, `self::` and `super::`.
 fn named(module: &Module, code: &str) -> Vec<Module> {
     let (tokens, mut found) = (tokens(code), Vec::new());
     for at in 0..tokens.len() {
@@ -481,8 +482,8 @@ fn named(module: &Module, code: &str) -> Vec<Module> {
     found
 }
 
-/// Maps names that modules import to the paths for which they stand. An inner module uses such a name as `super::Name`;
-/// other modules use it if it is re-exported.
+/// Maps names that modules import to the paths for which they stand. An inner module uses such a name as `super::Name`; other
+/// modules use it if it is re-exported.
 fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
     let mut all = BTreeMap::new();
     for (module, code) in sources {
@@ -511,7 +512,7 @@ fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
     all
 }
 
-/// Resolves a path through the imports of the modules that it names.
+/// Follows a path through the imports of the modules that it names to the item that it means.
 fn resolved(mut path: Module, imported: &BTreeMap<Module, Module>) -> Module {
     let mut seen = BTreeSet::new();
     while seen.insert(path.clone()) {
@@ -523,9 +524,9 @@ fn resolved(mut path: Module, imported: &BTreeMap<Module, Module>) -> Module {
     path
 }
 
-/// Returns the modules of each folder of a crate (a subfolder counts as one module), each with the modules of the same
-/// folder that it names, directly or through an import of another module. Items that are defined in `mod.rs` or
-/// `lib.rs` belong to the folder and do not count as uses of a module.
+/// For each folder of a crate, returns its modules (a subfolder counts as one module), each with the modules of the same
+/// folder that it uses, directly or through an import of another module. Items that are defined in `mod.rs` or `lib.rs`
+/// belong to the folder and do not count.
 fn modules(
     sources: &BTreeMap<Module, String>,
 ) -> BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> {
@@ -562,8 +563,8 @@ fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTr
     left
 }
 
-/// Crates in which modules must import an item from the module that defines it, and not through a re-export of the crate's root.
-/// The root imports every module, so that a module which imports from the root would be in a cycle with it.
+/// Crates in which modules must import an item from the module that defines it, and not through a re-export of the crate's
+/// root. The root imports every module, so that a module that imports from the root would be in a cycle with it.
 const NAMED_AT_HOME: [&str; 17] = [
     "fmu/plant",
     "fmu/craft",
@@ -612,7 +613,7 @@ fn modules_of_a_crate_have_no_cyclic_dependencies() {
 }
 
 #[test]
-fn circular_imports_are_found_in_every_form() {
+fn circular_imports_are_found_in_every_form_of_an_import() {
     let crate_of = |files: &[(&str, &str)]| -> BTreeMap<Module, String> {
         let module =
             |path: &str| path.split('/').filter(|s| !s.is_empty()).map(String::from).collect();

@@ -13,10 +13,10 @@ use host::part::Limit;
 use host::xml::Element;
 use pack::{Fmi, MODELS, Model, packed_version_for_tests};
 
-/// Identifies a number of the model: the name without brackets, and all indices.
+/// Identifies a number of the model: the name of the variable without brackets, and all indices.
 type Key = (String, Vec<usize>);
 
-/// Returns array and indices for the name of a scalar: `tank[1].p[2,3]` gives tank.p and 1, 2, 3.
+/// Splits the name of a scalar into name and indices, for example `tank[1].p[2,3]` into tank.p and 1, 2, 3.
 fn key(name: &str) -> Key {
     let (mut plain, mut indices) = (String::new(), Vec::new());
     let mut rest = name;
@@ -62,7 +62,7 @@ impl Variable {
             .collect()
     }
 
-    /// Returns the elements of the variable in row-major order for these values of the structural parameters.
+    /// Returns the elements of the variable in row-major order. `sizes` are the values of the structural parameters.
     fn keys(&self, sizes: &BTreeMap<u32, usize>) -> Vec<Key> {
         let mut all = vec![Vec::new()];
         for dimension in &self.dimensions {
@@ -170,8 +170,8 @@ fn bits(value: &Value) -> u64 {
     }
 }
 
-/// Asserts that the FMU with scalars has every value of the FMU with arrays, bit-identical. Further values of the FMU
-/// with scalars must be beyond the sizes of the arrays.
+/// Asserts that the FMU with scalars has every value of the FMU with arrays, bit for bit. Further values of the FMU with
+/// scalars must be beyond the sizes of the arrays.
 fn assert_same(arrays: &BTreeMap<Key, u64>, scalars: &BTreeMap<Key, u64>, when: &str) {
     for (key, bits) in arrays {
         assert_eq!(scalars.get(key), Some(bits), "{key:?} {when}");
@@ -197,7 +197,8 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Returns a value that differs from the start value for some parameters, and differs between tanks and modes.
+/// Returns a value for a parameter that differs from its start value and between tanks and modes; `None` if the parameter
+/// keeps its start value.
 fn parameter(model: &Model, (name, indices): &Key) -> Option<Value> {
     let real = |x: f64| Some(Value::Real(x));
     let integer = |n: usize| Some(Value::Integer(n as i64));
@@ -346,7 +347,7 @@ fn refusal<T>(called: Result<T, CallError>) -> (Status, String) {
     (error.status, texts.join("\n"))
 }
 
-/// Changing the number of tanks of Spacecraft changes the number of states and sets the elements of arrays to their start
+/// A change of the number of tanks of Spacecraft changes the number of states and sets the elements of arrays to their start
 /// values.
 #[test]
 fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
@@ -438,8 +439,8 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
     );
 }
 
-/// A state of SloshTank with arrays of three modes is restored in an instance with other array sizes. SloshTank with
-/// scalar variables refuses this state.
+/// A state of SloshTank with arrays of three modes is restored in an instance with other array sizes. SloshTank with scalar
+/// variables refuses it.
 #[test]
 fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let opened =
@@ -546,8 +547,8 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
     }
 }
 
-/// Within a communication step, a host changes the torques of Spacecraft linearly by intermediate update, in the FMU
-/// with arrays and in the FMU with scalars. The outputs of both are equal.
+/// Within a communication step, a host changes the torques of Spacecraft linearly by intermediate update, in the FMU with
+/// arrays and in the FMU with scalars.
 #[test]
 fn input_arrays_changed_in_intermediate_update_act_as_scalar_inputs() {
     let model = pack::model("Spacecraft").unwrap();
@@ -685,7 +686,7 @@ const STARTS: [(&str, f64); 8] = [
     ("solver.max_steps", 5000.0),
 ];
 
-/// `pack --tanks --modes` removes variables from the description of Spacecraft. The binary and the motion stay the same.
+/// `pack --tanks --modes` removes variables from the description of Spacecraft; the binary stays the same.
 #[test]
 fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
     let text = STARTS.map(|(name, x)| (name, x.to_string()));
@@ -771,8 +772,8 @@ fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     run.instance.set_state(&again).unwrap();
 }
 
-/// A packed FMU has its own start values in its description and in the file start_values.txt, with a checksum. If the
-/// file is missing or was changed, the FMU refuses instantiation.
+/// A packed FMU has its own start values in its description and in the file start_values.txt, with a checksum. If the file is
+/// missing or was changed, the FMU refuses instantiation.
 #[test]
 fn start_values_that_differ_from_the_description_are_refused() {
     let (part, folder) = part_of_spacecraft(&[("craft.mass", "900.0")]);

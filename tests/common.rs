@@ -5,11 +5,10 @@ use std::sync::LazyLock;
 use HubSlosh::table::TABLE;
 use runtime::variable::Kind;
 
-/// Returns the numbers of the items of an enumeration.
+/// Returns the numbers of the items of the enumeration variable `name` of HubSlosh.
 ///
 /// # Panics
-///
-/// If there is no such variable, or if the variable is not an enumeration.
+/// If there is no such variable, or if it is not an enumeration.
 pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
     let variable = TABLE.variables.iter().find(|v| v.name == name);
     match variable.map(|v| v.kind) {
@@ -21,7 +20,6 @@ pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
 /// Runs a command that must succeed, and returns its output.
 ///
 /// # Panics
-///
 /// If the command fails; the message contains `sentence` and the output.
 pub fn run(command: &mut Command, sentence: &str) -> String {
     let why = match command.output() {
@@ -40,17 +38,15 @@ pub fn run(command: &mut Command, sentence: &str) -> String {
 /// Returns Cargo's target directory.
 ///
 /// # Panics
-///
 /// If the FMU from whose path it is derived cannot be packed.
 pub fn target() -> &'static Path {
     pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu")
 }
 
-/// Returns the Python interpreter of the tests' virtual environment, with the package's compiled half. The environment
-/// is created if necessary.
+/// Returns the Python interpreter of the tests' virtual environment, which contains the compiled half of the package. The
+/// environment is created if necessary.
 ///
 /// # Panics
-///
 /// If the environment cannot be created.
 pub fn python() -> &'static Path {
     static PYTHON: LazyLock<PathBuf> = LazyLock::new(|| {
@@ -69,19 +65,17 @@ pub fn python() -> &'static Path {
     &PYTHON
 }
 
-/// Returns the binary `hubslosh` of the profile with which this test was built. The path is derived, because Cargo does
-/// not state the paths of binaries of other packages.
+/// Returns the binary `hubslosh` of the profile with which this test was built.
 pub fn harness() -> &'static Path {
     static HARNESS: LazyLock<PathBuf> = LazyLock::new(|| binary("hubslosh", &[]));
     &HARNESS
 }
 
-/// Builds a binary of the workspace in the profile with which this test was built, and returns its path. `of` are
-/// further arguments for Cargo: `--workspace` if the binary is not in a default member. `-p` is not used, because with
-/// the features of only one package Cargo would compile most of it again.
+/// Builds a binary of the workspace in the profile with which this test was built, and returns its path. `of` are further
+/// arguments for Cargo: `--workspace` if the binary is not in a default member. `-p` is not used, because with the features
+/// of only one package Cargo would compile most of it again.
 ///
 /// # Panics
-///
 /// If the binary does not compile.
 pub fn binary(name: &str, of: &[&str]) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));

@@ -6,8 +6,9 @@ use std::process::Command;
 use crate::common::{python, run};
 use pack::{Fmi, MODELS, packed_model_for_tests, packed_version_for_tests};
 
-/// The motion is bit-identical to that of the FMU 2.0, with and without event mode and early return in FMPy. With CVODE
-/// it agrees to within the error of the tolerance 1e-9 over 20 s of stick and slip.
+/// With FMPy's own Co-Simulation the motion must be bit-identical to that of the FMU 2.0, with and without event mode and
+/// early return. With Model Exchange and CVODE it must agree within the error of the tolerance 1e-9 over 20 s of stick and
+/// slip.
 const FMPY: &str = r#"
 import sys
 import numpy as np
@@ -82,7 +83,7 @@ fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_in_every_event_config
     }
 }
 
-/// Tests arrays as FMPy passes them. Also tests array sizes that are set in configuration mode, which FMPy does not do by itself.
+/// Tests arrays as FMPy passes them, and array sizes that are set in configuration mode, which FMPy does not do by itself.
 const FMPY_ARRAYS: &str = r#"
 import shutil
 import sys

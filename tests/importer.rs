@@ -49,7 +49,8 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// The crate `fmi`, an importer that is independent of this project, runs HubSlosh with the inputs that the harness uses.
+/// The crate `fmi` is an importer that is independent of this project. It runs HubSlosh with the inputs that the harness
+/// uses.
 #[test]
 fn the_importer_crate_fmi_gets_bit_identical_outputs_in_co_simulation() {
     let import: Fmi2Import = fmi::import::from_path(packed_for_tests()).unwrap();
@@ -160,7 +161,7 @@ fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
     theirs.terminate().unwrap();
 }
 
-/// The crate fmi runs FMI 3.0, and our host runs FMI 2.0 for comparison.
+/// The crate `fmi` runs FMI 3.0, and our host runs FMI 2.0 for comparison.
 mod fmi3 {
     use std::io::{Read, Write};
 
@@ -175,8 +176,9 @@ mod fmi3 {
 
     use super::{SPHERICAL, bits, start_instance};
 
-    /// Imports the FMU 3.0 with the crate fmi. The crate gets a copy of the description without units and nominal values of
-    /// variables, because version 0.8 of its schema does not know these attributes, although the standard defines them (2.4.7.5).
+    /// Imports the FMU 3.0 with the crate `fmi`. The crate gets a copy of the description without units and nominal values of
+    /// variables, because version 0.8 of its schema does not know these attributes, although the standard defines them
+    /// (2.4.7.5).
     fn import(model: &Model) -> (Fmi3Import, ModelDescription) {
         let packed = packed_version_for_tests(model, Fmi::V3);
         let copy = tempfile::NamedTempFile::new().unwrap();
@@ -212,7 +214,7 @@ mod fmi3 {
         names.iter().map(|name| description.variable(name).unwrap().reference).collect()
     }
 
-    /// Enters and leaves event mode, in which no event may be due.
+    /// Enters and leaves event mode at a time at which no event is due.
     fn pass_event_mode(instance: &mut impl Common) {
         let mut flags = EventFlags::default();
         instance.update_discrete_states(&mut flags).unwrap();
@@ -227,8 +229,7 @@ mod fmi3 {
         }
     }
 
-    /// The crate `fmi`, an importer that is independent of this project, runs the FMUs 3.0 in Co-Simulation; the
-    /// harness runs the FMUs 2.0.
+    /// The crate `fmi` runs the FMUs 3.0 in Co-Simulation; the harness runs the FMUs 2.0.
     #[test]
     fn the_importer_crate_fmi_gets_bit_identical_outputs_from_both_versions_with_and_without_event_mode()
      {

@@ -8,10 +8,9 @@ use pack::{Fmi, MODELS};
 
 use crate::common::{binary, harness, python, run, target};
 
-/// Runs pytest in the tests' environment, and checks the number of tests that passed.
+/// Runs pytest in the tests' environment, and checks the number of tests that passed. `sentence` is the message of a failure.
 ///
 /// # Panics
-///
 /// If a test fails or is not run.
 fn pytest(arguments: &mut Command, sentence: &str) {
     let settings = pack::root().join("harness/python/pyproject.toml");
@@ -34,8 +33,8 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Test files of `harness/python` that need only the FMU HubSlosh. They take as long as all other files together, so
-/// that both halves run in parallel.
+/// Test files of `harness/python` that need only the FMU HubSlosh. They take as long as all other files together, so that the
+/// two groups can run in parallel.
 const BESIDE: [&str; 6] = [
     "test_liquid.py",
     "test_model_exchange.py",
@@ -75,8 +74,8 @@ fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     pytest(&mut command, "the tests in Python failed");
 }
 
-/// Runs the tests of the package that take seconds each: type checkers; the code of docstrings and notebooks with the wheel;
-/// 22 sweeps of 45 minutes with each of six slosh models.
+/// These tests take seconds each: type checkers; the code of docstrings and notebooks with the wheel; 22 sweeps of 45 minutes
+/// with each of six slosh models.
 #[test]
 #[ignore = "minutes: .ci/long-tests"]
 fn long_tests_of_the_package_pass() {
@@ -96,7 +95,7 @@ fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     pytest(package_tests().args(BESIDE.map(|file| tests.join(file))), "the tests in Python failed");
 }
 
-/// Runs those tests of the studies that take only seconds: features computed from their definitions, and the benchmark.
+/// Runs the tests of the studies that take only seconds: features computed from their definitions, and the benchmark.
 #[test]
 fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
     for model in &MODELS {
@@ -107,7 +106,7 @@ fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
     pytest(package_tests().args(quick), "a study failed");
 }
 
-/// Runs pytest on harness/studies; each study compares its results with the numbers in the book.
+/// Each study compares its results with the numbers in the book.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn the_studies_compute_the_numbers_of_the_book() {
@@ -118,7 +117,6 @@ fn the_studies_compute_the_numbers_of_the_book() {
     pytest(package_tests().arg("--long").arg(studies), "a study failed");
 }
 
-/// Runs the examples in Python and the loop in Rust with the packed FMUs.
 #[test]
 fn the_examples_give_the_results_that_their_readmes_state() {
     // The examples expect all FMUs in one folder.

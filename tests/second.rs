@@ -24,7 +24,7 @@ fn packed() -> PathBuf {
     out
 }
 
-/// Compares with the exact motion of m x'' + d x' + k x = F from x0 at rest, under a constant force.
+/// Compares a simulation by FMPy with the exact motion of m x'' + d x' + k x = F from x0 at rest, under a constant force.
 const FMPY: &str = r#"
 import sys
 import numpy as np

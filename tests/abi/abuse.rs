@@ -113,7 +113,8 @@ fn letter(variable: &Variable) -> char {
 #[derive(Clone, Copy)]
 struct Share {
     of: &'static str,
-    /// Arguments of `life.c`: the number of instances that exist at the same time, and the number of times the library is loaded.
+    /// Arguments of the C program `life.c`: the number of instances that exist at the same time, and the number of times the
+    /// library is loaded.
     lives: [&'static str; 2],
     pairs: usize,
 }
@@ -125,7 +126,7 @@ fn under_valgrind() -> bool {
     std::env::var_os("HUBSLOSH_VALGRIND").is_some()
 }
 
-/// Returns the folder with fmi2Functions.h and fmi3Functions.h. FMPy contains these official headers.
+/// Returns the folder with the official headers fmi2Functions.h and fmi3Functions.h, which FMPy contains.
 fn headers() -> &'static Path {
     static HEADERS: LazyLock<PathBuf> = LazyLock::new(|| {
         let script = "import importlib.util; print(importlib.util.find_spec('fmpy').origin)";
@@ -142,9 +143,9 @@ fn number(said: &str, word: &str) -> f64 {
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
 }
 
-/// Thousands of instances are stepped in turns, and each has the same results as when it runs alone. The library is loaded
-/// hundreds of times, and is no longer mapped after it is unloaded. States are saved and restored, events are handled in Model
-/// Exchange, and steps allocate no memory.
+/// Steps thousands of instances in turns; each must have the same results as when it runs alone. Loads the library hundreds
+/// of times; after it is unloaded it must no longer be mapped. Saves and restores states, handles events in Model Exchange,
+/// and checks that steps allocate no memory.
 fn a_whole_life(fmi: Fmi, share: Share) {
     let fmu = Unpacked::new(HUBSLOSH, fmi);
     let [instances, loads] = match std::env::var("HUBSLOSH_VALGRIND").as_deref() {
@@ -179,8 +180,8 @@ fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
     }
 }
 
-/// Tests in which mode each function is allowed (`modes.c`). `names` are an output, a variable that depends directly on an input,
-/// this input, an Integer, an enumeration and a Boolean.
+/// Tests in which mode each function is allowed, with the C program `modes.c`. `names` are an output, a variable that depends
+/// directly on an input, this input, an Integer, an enumeration and a Boolean.
 fn check_functions_in_every_mode(model: &pack::Model, names: [&str; 6], sets: bool) {
     let fmu = Unpacked::new(model, Fmi::V3);
     run(
@@ -216,8 +217,8 @@ fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
     }
 }
 
-/// Makes random calls, or the calls of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in both versions of FMI.
-/// `host.c` lists the faults, for example floating-point exceptions in calls that succeed.
+/// Makes random calls, or the calls of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in both versions of FMI. The C
+/// program `host.c` lists the faults that it finds, for example floating-point exceptions in calls that succeed.
 fn check_random_calls<M: runtime::Model>(inputs: u32) {
     let name = M::table().about.model;
     let fmu = Unpacked::new(pack::model(name).unwrap(), Fmi::V2);
@@ -265,8 +266,8 @@ fn no_calls_break_the_packed_binary_of_sloshtank() {
     check_random_calls::<SloshTank::Model>(600);
 }
 
-/// The host traps division by zero, invalid operations and overflow, as hosts do to find the first NaN. No slosh model,
-/// friction law or gyro may cause such an exception in either interface.
+/// Runs HubSlosh in a host that traps division by zero, invalid operations and overflow, as hosts do to find the first NaN.
+/// No slosh model, friction law or gyro may cause one of these exceptions in either interface.
 #[cfg(target_os = "linux")]
 fn check_that_no_model_traps(fmi: Fmi, share: Share) {
     if under_valgrind() {
@@ -311,8 +312,7 @@ fn check_that_no_model_traps(fmi: Fmi, share: Share) {
     assert!(number(&said, " refused") <= 0.03 * number(&said, " runs"), "{said}");
 }
 
-/// The host traps division by zero, invalid operations and overflow. No slosh model, friction law or gyro of HubSlosh
-/// causes one.
+/// The host traps division by zero, invalid operations and overflow, as hosts do to find the first NaN.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_model_raises_a_floating_point_exception() {
@@ -321,7 +321,8 @@ fn no_model_raises_a_floating_point_exception() {
     }
 }
 
-/// Writes the file for `ranges.c`: each variable with its allowed values, and the scenes.
+/// Returns the input file for the C program `ranges.c`: each variable with its allowed values, and the scenes, which are sets
+/// of start values.
 fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> String {
     let number = |text: &str| match text {
         "true" => "1".to_string(),
@@ -359,9 +360,9 @@ fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> Strin
     lines.join("\n") + "\n"
 }
 
-/// Sets every parameter and input to min and to max in every scene, and random pairs of values, with floating-point
-/// traps and in both interfaces; also sets each Real to NaN and to infinity. Scenes limit the integrator's steps,
-/// because the test is about numbers and not about run time.
+/// In every scene, sets every parameter and input to its smallest and largest value, and random pairs of values, in a host
+/// that traps floating-point exceptions, in both interfaces. Also sets each Real to NaN and to infinity. The scenes limit the
+/// internal steps of the integrator, because the test is about numbers and not about run time.
 #[cfg(target_os = "linux")]
 fn check_that_no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     if under_valgrind() {
@@ -583,7 +584,7 @@ fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
     }
 }
 
-/// `cargo test` already runs the equations of six axes with traps in SloshTank.
+/// The long form of the test for SloshTank, which has the same equations and runs in `cargo test`.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
@@ -601,7 +602,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// Runs all tests of this file in both versions of FMI, whereas `cargo test` runs each test in one version only. This takes
+/// Runs all tests of this file in both versions of FMI, whereas `cargo test` runs each of them in one version. This takes
 /// minutes, so that the test is ignored by default.
 #[cfg(target_os = "linux")]
 #[test]
@@ -620,7 +621,7 @@ fn abuse_tests_run_in_both_versions_of_fmi() {
     });
 }
 
-/// Passes a handle of HubSlosh, and other wrong handles (`handles.c`), to the functions of all other FMUs.
+/// Passes a handle of HubSlosh, and other wrong handles, to the functions of all other FMUs (C program `handles.c`).
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
@@ -649,14 +650,14 @@ fn handles_of_other_libraries_or_versions_and_freed_or_random_handles_are_errors
     }
 }
 
-/// Largest stack that an FMU needs, kB: first to instantiate and initialise, then for steps. The book's page on real time states
-/// these numbers. They depend on the compiler, so that they are a quarter above the measured values.
+/// Largest stack that an FMU may need, kB: first to instantiate and initialise it, then for steps. The page on real time of
+/// the book states these numbers. They are a quarter above the measured values, because these depend on the compiler.
 #[cfg(target_os = "linux")]
 const STACK: [(&str, [u32; 2]); 3] =
     [("HubSlosh", [64, 23]), ("Spacecraft", [156, 112]), ("SloshTank", [122, 66])];
 
-/// The page book/real_time.md states the largest stack of each FMU. The stack is measured in several runs and in
-/// both versions of FMI.
+/// The page book/real_time.md states the largest stack of each FMU. The stack is measured in several runs and in both
+/// versions of FMI.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
@@ -707,8 +708,9 @@ const STEPS: usize = 250;
 
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
-/// Returns the bits of all Reals, at ten instants within 5 s of a motion, in a host with another floating-point environment.
-/// Asserts that the motion is bit-identical in both versions of FMI, and in FMI 3.0 whether the FMU or the host handles events.
+/// Simulates a motion in a host with another floating-point environment, and returns the bits of all Reals at ten instants
+/// within 5 s. Asserts that the motion is bit-identical in both versions of FMI, and in FMI 3.0 whether the FMU or the host
+/// handles events.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn check_that_rounding_changes_only_last_digits(model: &str, settings: Settings) {
     if under_valgrind() {
@@ -822,7 +824,7 @@ fn values<M: runtime::Model>(runs: usize) {
     }
 }
 
-/// Random bytes determine the variables that are set, their values, and the lengths of the steps.
+/// Random bytes determine which variables are set to which values, and the lengths of the steps.
 #[test]
 fn random_values_of_variables_give_finite_results_or_an_error() {
     values::<HubSlosh::HubSlosh>(200);
@@ -831,7 +833,8 @@ fn random_values_of_variables_give_finite_results_or_an_error() {
     values::<SloshTank::Model>(8);
 }
 
-/// Runs sequences of calls by hosts whose simulation times have different rounding errors (`fmu/fuzz/src/clocks.rs`).
+/// Runs sequences of calls by hosts whose times have different rounding errors (`fmu/fuzz/src/clocks.rs`). `sequences` are
+/// the numbers of sequences for the three FMUs.
 fn clocks(sequences: [usize; 3]) {
     fn play<M: runtime::Model>(sequences: usize) {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -846,8 +849,8 @@ fn clocks(sequences: [usize; 3]) {
     });
 }
 
-/// Hosts add up their communication steps or multiply them, so that their times have other rounding errors than the
-/// FMU's time.
+/// Hosts add up their communication steps or multiply them, so that their times have other rounding errors than the FMU's
+/// time.
 #[test]
 fn hosts_whose_times_have_rounding_errors_get_the_same_outputs() {
     clocks([20, 2, 4]);

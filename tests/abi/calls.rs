@@ -112,7 +112,7 @@ fn archive() -> zip::ZipArchive<File> {
     zip::ZipArchive::new(File::open(packed_for_tests()).unwrap()).unwrap()
 }
 
-/// All files of HubSlosh.fmu are stored or deflated, the two zip methods that every importer can unpack.
+/// Every importer can unpack these two methods of zip.
 #[test]
 fn the_archive_begins_with_the_model_description_and_uses_only_stored_and_deflated_files() {
     let mut archive = archive();
@@ -229,7 +229,7 @@ fn the_binary_can_be_loaded_and_unloaded_many_times() {
     }
 }
 
-/// 20 instances of two loaded copies of HubSlosh are stepped in turns. Each has the results of an instance that runs by
+/// 20 instances of two loaded copies of HubSlosh are stepped in turns. Each must have the results of an instance that runs by
 /// itself.
 #[test]
 fn several_copies_and_instances_do_not_disturb_each_other() {
@@ -338,8 +338,8 @@ fn every_callback_and_the_resource_location_may_be_null() {
     assert!(fmu.instantiate_with(&with).is_err());
 }
 
-/// The host frees the callback structure, the instance name and the GUID after fmi2Instantiate; later calls do not read
-/// them.
+/// The host frees the callback structure, the instance name and the GUID after fmi2Instantiate, so that later calls must not
+/// read them.
 #[test]
 fn callbacks_name_and_guid_need_not_outlive_fmi2_instantiate() {
     let fmu = open();
@@ -350,7 +350,7 @@ fn callbacks_name_and_guid_need_not_outlive_fmi2_instantiate() {
 }
 
 #[test]
-fn unusual_instance_names_are_accepted() {
+fn an_instance_name_may_contain_any_characters() {
     let fmu = open();
     for name in ["%s%n", "Ünwucht 液", &"x".repeat(10_000)] {
         fmu.instantiate(name).unwrap();
@@ -402,7 +402,7 @@ fn a_percent_sign_in_a_message_is_not_a_printf_format() {
     assert_refused(instance.set_debug_logging(true, &[text]), &[text, "logStatusError"]);
 }
 
-/// A wrong step and a wrong query are called with each choice of log categories in fmi2SetDebugLogging.
+/// For each choice of log categories the host makes a wrong step and a wrong query.
 #[test]
 fn only_messages_of_the_enabled_log_categories_are_logged() {
     let fmu = open();
@@ -441,8 +441,8 @@ fn stick_and_slip_are_logged_on_request() {
     assert!(texts[1].contains("broke away backwards at t = 20.0 s"), "{texts:?}");
 }
 
-/// A host enables logging and sets a tolerance. It receives no message and no warning, because some hosts treat
-/// everything except fmi2OK as a failure.
+/// The host enables logging and sets a tolerance. It must receive no warning, because some hosts treat everything except
+/// fmi2OK as a failure.
 #[test]
 fn a_correct_run_logs_no_message() {
     let fmu = open();
@@ -463,8 +463,8 @@ fn a_correct_run_logs_no_message() {
 
 // ---- The order of calls ----
 
-/// For example fmi2DoStep before initialisation; the message names the instance state and the states in which the call is
-/// allowed.
+/// The message of fmi2DoStep before initialisation, for example, names the state of the instance and the states in which the
+/// call is allowed.
 #[test]
 fn calls_in_the_wrong_state_are_refused_with_call_and_state() {
     let fmu = open();
@@ -579,8 +579,8 @@ fn every_boolean_that_is_not_0_is_true_and_reads_1() {
 
 // ---- Parameters and inputs ----
 
-/// HubSlosh gets five wrong parameters: fmi2ExitInitializationMode returns one error that names all five, and succeeds
-/// after the values are corrected.
+/// HubSlosh gets five wrong parameters. fmi2ExitInitializationMode returns one error that names all five, and succeeds after
+/// the values are corrected.
 #[test]
 fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     let fmu = open();
@@ -609,7 +609,7 @@ fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     instance.exit_initialization_mode().unwrap();
 }
 
-/// A minimum wheel speed above the initial wheel speed is refused at the end of initialisation; the message contains both names.
+/// The smallest wheel speed is set above the initial wheel speed. The message contains the names of both.
 #[test]
 fn parameters_that_contradict_each_other_are_reported() {
     let fmu = open();
@@ -619,8 +619,8 @@ fn parameters_that_contradict_each_other_are_reported() {
     assert_refused(instance.exit_initialization_mode(), &["wheel.speed_0", "wheel.speed_min"]);
 }
 
-/// The call that sets tau_cmd, tau_ext or g_axial to NaN, to an infinite or to a too large value returns an error with the
-/// allowed range, and the state of HubSlosh stays as before.
+/// The inputs are set to NaN, to infinity and to a too large value. The message contains the allowed range, and the state of
+/// HubSlosh stays as it was.
 #[test]
 fn inputs_that_are_nan_or_out_of_range_are_refused_by_the_call_that_sets_them() {
     let fmu = open();
@@ -657,7 +657,7 @@ fn inputs_that_are_nan_or_out_of_range_are_refused_by_the_call_that_sets_them() 
 // ---- Steps ----
 
 /// HubSlosh refuses a communication step that is not positive or not finite, and a communication point that is not the
-/// present time. Its state does not change.
+/// present time.
 #[test]
 fn steps_whose_length_is_not_positive_are_refused_and_change_nothing() {
     let fmu = open();
@@ -674,7 +674,7 @@ fn steps_whose_length_is_not_positive_are_refused_and_change_nothing() {
     instance.do_step(0.5, 0.1).unwrap();
 }
 
-/// Hosts compute n h, or add up h. Both differ from the exact time by a few ulps.
+/// Hosts compute n h, or add up h. Both differ from the exact time by a few units in the last place.
 #[test]
 fn communication_points_off_by_rounding_are_reached_exactly() {
     let fmu = open();
@@ -703,7 +703,7 @@ fn a_step_past_the_stop_time_is_refused() {
     assert_refused(instance.do_step(1.0, 1e-3), &["stop time"]);
 }
 
-/// All times are exact, because they are multiples of powers of two.
+/// All times are multiples of powers of two, so that they are exact.
 #[test]
 fn the_motion_does_not_depend_on_the_start_time() {
     let fmu = open();
@@ -730,10 +730,10 @@ fn an_experiment_with_invalid_times_is_refused() {
     instance.setup_experiment(Some(1e-6), 0.0, Some(1.0)).unwrap();
 }
 
-/// A torque of 1e12 N·m for 1e200 s needs more integration steps than `solver.max_steps` allows: fmi2DoStep returns fmi2Error,
+/// A torque of 1e12 N·m for 1e200 s needs more internal steps than `solver.max_steps` allows. fmi2DoStep returns fmi2Error,
 /// the instance keeps the state that it had before the step, and it can only be terminated or reset.
 #[test]
-fn a_diverging_run_is_an_error() {
+fn a_step_that_needs_too_many_internal_steps_is_an_error() {
     let fmu = open();
     // The hub rotates so fast, and the step is so long, that no allowed number of integration steps is enough.
     let mut instance = stepping(&fmu, &[("slosh.model", "frozen"), ("tau_cmd", "1e12")]);
@@ -771,7 +771,7 @@ fn the_status_of_the_last_step_can_be_queried() {
 // ---- Reset, end, saved states ----
 
 #[test]
-fn reset_from_every_state_is_a_fresh_instance_bit_for_bit() {
+fn a_reset_in_any_instance_state_gives_the_bits_of_a_new_instance() {
     let fmu = open();
     let mut fresh = fmu.instantiate("one").unwrap();
     let expected = state_bytes(&mut fresh);
@@ -863,7 +863,7 @@ fn a_handle_of_a_saved_state_can_be_reused_and_a_null_handle_can_be_freed() {
     assert_refused(instance.set_state_null(), &["FMUstate is NULL"]);
 }
 
-/// fmusim 0.0.39 passes the state itself. Refusing it would end its run with an error.
+/// fmusim 0.0.39 passes the handle itself. If the FMU refused it, this program would end its run with an error.
 #[test]
 fn a_saved_state_can_be_freed_by_its_handle_or_by_the_address_of_the_handle() {
     let fmu = open();

@@ -8,11 +8,11 @@ use host::description::{ModelDescription, Type, Value, Variable};
 use host::fmi3::{Fmu, Instance, Interface};
 use pack::{Fmi, model, packed_version_for_tests};
 
-/// Rounding error of a sum of up to 100 products, relative to the sum of the magnitudes of the products. The numbers of the
-/// Jacobian in these products have rounding errors as well.
+/// Rounding error of a sum of up to 100 products, relative to the sum of their magnitudes. The derivatives in these products
+/// have rounding errors as well.
 const ROUNDING: f64 = 1e-13;
-/// Error of central differences of order 4 with a step of 1e-3 of a known's size. The truncation error is (1e-3)^4 of
-/// the fifth derivative; the rounding error is 1e-16/1e-3, or more if large terms cancel in a value.
+/// Error of central differences of order 4 with a step of 1e-3 of a known's size. The truncation error is (1e-3)^4 of the
+/// fifth derivative; the rounding error is 1e-16/1e-3, or more if large terms cancel in a value.
 const DIFFERENCES: f64 = 1e-6;
 
 fn open(name: &str) -> Fmu {
@@ -24,7 +24,7 @@ fn open(name: &str) -> Fmu {
 struct Sides {
     unknowns: Vec<u32>,
     knowns: Vec<u32>,
-    /// Number of knowns that are inputs. In the list of knowns the inputs come first, then the states.
+    /// Number of knowns that are inputs. They come first in the list of knowns; the states follow.
     inputs: usize,
     names: Vec<String>,
 }
@@ -58,7 +58,7 @@ impl Sides {
     }
 }
 
-/// An operating point of an instance. `x` has the values of its inputs and states, `sizes` their typical magnitudes.
+/// An operating point of an instance: the values `x` of its inputs and states, and their typical magnitudes `sizes`.
 struct Point<'a, 'fmu> {
     sides: &'a Sides,
     instance: Instance<'fmu>,
@@ -74,7 +74,7 @@ impl Point<'_, '_> {
         values
     }
 
-    /// Returns the unknowns after the knowns have been moved by `s` times `direction` from the point.
+    /// Returns the values of the unknowns after the knowns were moved by `s` times `direction` from the operating point.
     fn unknowns_at(&mut self, s: f64, direction: &[f64]) -> Vec<f64> {
         let there: Vec<f64> = self.x.iter().zip(direction).map(|(x, d)| x + s * d).collect();
         self.go(&there, direction);
@@ -106,7 +106,7 @@ impl Point<'_, '_> {
             .unwrap_or_else(|error| panic!("{}: {error}", self.what))
     }
 
-    /// Compares both kinds of derivatives with each other, and with finite differences with respect to the knowns
+    /// Compares adjoint and directional derivatives with each other, and with finite differences with respect to the knowns
     /// at the positions `moved`.
     fn check(&mut self, rng: &mut Rng, moved: &[usize]) {
         let sides = self.sides;
@@ -206,7 +206,7 @@ impl Point<'_, '_> {
 /// Start time, s. It is not 0, so that outputs that are times differ from their derivatives.
 const START: f64 = 1.0;
 
-/// Returns an instance for Model Exchange in continuous-time mode, with its inputs set and with the states of the start.
+/// Returns an instance for Model Exchange in continuous-time mode, with its inputs set, and its initial states.
 fn exchange<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> (Instance<'fmu>, Vec<f64>) {
     let mut with = fmu.instantiation("one");
     with.interface = Interface::ModelExchange;
@@ -247,9 +247,10 @@ fn setting(name: impl Into<String>, value: impl ToString) -> (String, String) {
     (name.into(), value.to_string())
 }
 
-/// Checks the derivatives at three points: at the start of Model Exchange with `settings`; at this point with states that
-/// are moved by random numbers in the ranges of `scatter`; and at the point that Co-Simulation reaches after 0.3 s, where
-/// a host can change only inputs. Inputs whose jumps are impulses are not moved there, because they would change states.
+/// Checks the derivatives at three operating points: at the start of Model Exchange with `settings`; after the states were
+/// moved by random numbers in the ranges of `scatter`; and after 0.3 s of Co-Simulation, where a host can change only inputs.
+/// Inputs whose jumps are impulses are not moved there, because they would change states. `sizes` returns the typical
+/// magnitude of a variable, and `expect` checks the instance at each point.
 fn check(
     fmu: &Fmu,
     rng: &mut Rng,
@@ -290,7 +291,7 @@ fn check(
     Point { sides: &sides, instance, x, sizes, what }.check(rng, &moved);
 }
 
-/// Tests every slosh model with every friction law while the hub slips, a stuck hub, and the wheel at the limits of its
+/// Covers every slosh model with every friction law while the hub slips, a stuck hub, and the wheel at the limits of its
 /// torque and of its speed.
 #[test]
 fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_stick_and_at_wheel_limits()
@@ -376,7 +377,7 @@ fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_sti
     }
 }
 
-/// Tests a free craft and one on a pivot, with one to three tanks of one to three modes.
+/// Covers a free craft and one on a pivot, with one to three tanks of one to three modes.
 #[test]
 fn adjoint_and_directional_derivatives_of_spacecraft_equal_differences() {
     let fmu = open("Spacecraft");
@@ -420,7 +421,7 @@ fn of_craft(name: &str) -> f64 {
     }
 }
 
-/// Adds the tank's wrench to the equations of the host, and the tank's masses to the masses of the host.
+/// Covers each form in which the tank can be coupled to the craft that carries it.
 #[test]
 fn adjoint_and_directional_derivatives_of_sloshtank_equal_differences() {
     let fmu = open("SloshTank");

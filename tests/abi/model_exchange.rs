@@ -29,7 +29,7 @@ fn set_up<'fmu>(fmu: &'fmu Fmu, kind: i32, settings: &[(&str, &str)]) -> Instanc
     instance
 }
 
-/// A host with a fixed step: Runge-Kutta of order 4, and bisection for events.
+/// A host with a fixed step: Runge–Kutta of order 4, and bisection for events.
 struct Host<'fmu> {
     instance: Instance<'fmu>,
     time: f64,
@@ -147,8 +147,9 @@ fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()
 }
 
-/// Runs the host and Co-Simulation to `end`, and compares all values once a second. Returns the numbers of events that
-/// the host has handled.
+/// Simulates HubSlosh with `settings` in this host (to the time `end`, with the step `h`, both in s) and in Co-Simulation,
+/// sets the inputs in `changes` at their times, and compares all values once a second; they may differ by `allowed`. Returns
+/// how many events of each kind the host has handled, and how often the contact has changed.
 fn compare(
     settings: &[(&str, &str)],
     changes: Changes,
@@ -191,8 +192,8 @@ fn compare(
     (host.events, count as i32)
 }
 
-/// The Runge-Kutta method of order 4 with steps of 0.5 ms has, at 15 rad/s, a phase lag of omega (omega h)^4/120 = 4e-10 rad per
-/// second, that is 1e-8 after 20 s. Forces are some newtons, slosh rates some rad/s.
+/// The Runge–Kutta method of order 4 with steps of 0.5 ms has, at 15 rad/s, a phase lag of omega (omega h)^4/120 = 4e-10 rad
+/// per second, that is 1e-8 after 20 s. Forces are some newtons, slosh rates some rad/s.
 #[test]
 fn a_model_exchange_host_equals_co_simulation_with_stick_and_slip() {
     for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
@@ -226,10 +227,10 @@ fn a_model_exchange_host_equals_co_simulation_with_every_friction_law() {
     }
 }
 
-/// The wheel saturates in torque and in speed, and the gyro's samples are time events. The noise is bit-identical, and
-/// the rate agrees to 1e-7.
+/// The wheel saturates in torque and in speed, and the samples of the gyro are time events. The noise must be bit-identical,
+/// and the rate must agree to 1e-7.
 #[test]
-fn wheel_and_gyro_are_events_of_model_exchange() {
+fn limits_of_the_wheel_and_samples_of_the_gyro_are_events_of_model_exchange() {
     let settings = [
         ("wheel.enabled", "true"),
         ("wheel.tau_max", "0.05"),
@@ -249,7 +250,7 @@ fn wheel_and_gyro_are_events_of_model_exchange() {
 
 /// Large waves end the linear regime. This is a step event, which the FMU notices at the end of a step.
 #[test]
-fn the_regime_changes_only_at_events() {
+fn the_slosh_regime_changes_only_at_events() {
     let fmu = open();
     let settings = [("slosh.model", "planar"), ("init.slosh_angle", "0.5"), ("tau_cmd", "0.02")];
     let mut host = Host::new(&fmu, &settings);
@@ -380,17 +381,17 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     refused!(instance.enter_event_mode(), "\"instantiated\"");
 }
 
-/// Returns Booleans as OpenModelica up to 1.27 passes them: it passes an array of bytes, which the FMU reads as an
-/// array of fmi2Boolean with four bytes each, followed by zeros (fmi2SetBoolean_OMC in its FMI2Common.c).
+/// Returns Booleans as OpenModelica up to 1.27 passes them: as an array of bytes, which the FMU reads as an array of
+/// fmi2Boolean with four bytes each, followed by zeros (fmi2SetBoolean_OMC in its FMI2Common.c).
 fn misread(booleans: &[i32]) -> Vec<i32> {
     let mut bytes: Vec<u8> = booleans.iter().map(|b| *b as u8).collect();
     bytes.resize(4 * booleans.len(), 0);
     bytes.chunks_exact(4).map(|four| i32::from_le_bytes(four.try_into().unwrap())).collect()
 }
 
-/// OpenModelica 1.21 to 1.27 ends the initialization first and then sets all parameters except enumerations. It does
-/// this, and enters event mode, when the instance already is in event mode (issue 12893 of its tracker; the template
-/// importFMU2ModelExchange of its CodegenFMU.tpl). Booleans arrive as random numbers, so that their integer twins
+/// OpenModelica 1.21 to 1.27 ends the initialization first and sets all parameters except enumerations afterwards, and it
+/// enters event mode when the instance already is in event mode (issue 12893 of its tracker; the template
+/// importFMU2ModelExchange of its CodegenFMU.tpl). Its Booleans arrive as random numbers, so that their integer twins
 /// determine the values, as for enumerations.
 #[test]
 fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
@@ -477,7 +478,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     }
 }
 
-/// A host that omits the start value of an input sets 0. OpenModelica does so after the initialization.
+/// A host that omits the start value of an input sets 0, as OpenModelica does after the initialization.
 #[test]
 fn a_warning_names_a_weightless_tank_without_restoring_force() {
     let fmu = open();
@@ -569,7 +570,7 @@ fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_va
     }
 }
 
-/// Reading a value makes the FMU compute the initial state; if a parameter is set afterwards, the FMU computes it again.
+/// When a value is read, the FMU computes the initial state; if a parameter is set afterwards, the FMU computes it again.
 #[test]
 fn after_initialization_the_order_of_setting_and_reading_does_not_matter() {
     let fmu = open();
@@ -631,8 +632,8 @@ fn in_model_exchange_a_completed_step_after_the_stop_time_is_refused_and_a_trial
     instance.completed_integrator_step().unwrap();
 }
 
-/// In Model Exchange a host moves a slosh mass of the model `liquid` outside the model's range.
-/// fmi2CompletedIntegratorStep returns an error that names the mode, and the instance refuses further calls.
+/// A host moves a slosh mass of the model `liquid` outside the range of the model. fmi2CompletedIntegratorStep returns an
+/// error that names the mode, and the instance refuses further calls.
 #[test]
 fn states_out_of_the_models_range_end_the_run() {
     let fmu = open();
@@ -647,7 +648,7 @@ fn states_out_of_the_models_range_end_the_run() {
     host.instance.terminate().unwrap();
 }
 
-/// The state is saved in continuous-time mode and restored in a new instance, which continues bit-identically.
+/// The state is saved in continuous-time mode and restored in a new instance.
 #[test]
 fn a_saved_state_of_model_exchange_continues_bit_for_bit() {
     let fmu = open();

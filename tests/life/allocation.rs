@@ -29,7 +29,7 @@ fn initialised(interface: Interface, slosh_model: i32, friction_model: i32) -> I
 }
 
 #[test]
-fn stepping_setting_and_getting_allocate_nothing() {
+fn making_steps_and_setting_and_getting_values_allocate_no_memory() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
             let mut instance = initialised(Interface::CoSimulation, slosh_model, friction_model);
@@ -51,7 +51,7 @@ fn stepping_setting_and_getting_allocate_nothing() {
 }
 
 #[test]
-fn calls_of_model_exchange_allocate_nothing() {
+fn calls_of_model_exchange_allocate_no_memory() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
             let mut instance = initialised(Interface::ModelExchange, slosh_model, friction_model);

@@ -17,8 +17,8 @@ fn value_of<M: Model>(scalar: &Scalar<M>, x: f64) -> Value {
     }
 }
 
-/// Returns the bits of the outputs at the start and after each of four steps, and the warnings. `None` if the
-/// FMU refuses the values.
+/// Returns the bits of the outputs at the start and after each of four steps, and the warnings; `None` if the FMU refuses the
+/// `values`.
 fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Vec<String>)> {
     let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
     for (scalar, value) in values {
@@ -55,7 +55,7 @@ fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Ve
     Some((bits, warnings))
 }
 
-/// Lists other values for a parameter. The test uses the first one that the FMU accepts.
+/// Lists other values for a parameter whose present value is `value`. The test uses the first one that the FMU accepts.
 fn other_values<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
     match (value, scalar.variable.kind) {
         (Value::Boolean(b), _) => vec![Value::Boolean(!b)],
@@ -109,7 +109,7 @@ fn check<M: Model>(base: Values) {
     assert!(faults.is_empty(), "{base:?}:\n{}", faults.join("\n"));
 }
 
-/// HubSlosh warns of parameters that are set but have no effect. A change of each named parameter leaves all outputs
+/// HubSlosh warns of parameters that are set but have no effect. A change of each of them must leave all outputs
 /// bit-identical.
 #[test]
 fn no_warning_names_a_parameter_of_hubslosh_that_changes_an_output() {
@@ -137,9 +137,9 @@ fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);
 }
 
-/// If another parameter replaces a parameter, which therefore has no effect, the warning must say so.
+/// If another parameter replaces a parameter, so that it has no effect, the warning must say so.
 #[test]
-fn a_warning_names_parameters_that_others_replace() {
+fn a_warning_names_parameters_that_have_no_effect_because_others_replace_them() {
     fn said<M: Model>(values: Values) -> Vec<String> {
         let scalar = |name: &str| &M::table().scalars[M::table().find(name).unwrap() as usize];
         let values: Vec<_> =

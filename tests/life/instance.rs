@@ -138,7 +138,7 @@ fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization
     assert_eq!(real(&mut instance, "tank.h"), 0.08);
 }
 
-/// The natural frequency is computed with the specific force at the end of the initialization.
+/// The natural frequency, an output, depends on the specific force, an input.
 #[test]
 fn inputs_set_in_initialization_mode_count_from_the_start() {
     let mut instance = new_instance();
@@ -248,7 +248,7 @@ fn an_experiment_with_wrong_times_is_refused() {
 }
 
 #[test]
-fn invalid_steps_are_refused_and_change_nothing() {
+fn a_step_with_an_invalid_size_or_start_is_refused_and_changes_nothing() {
     let mut instance = stepping_from(0.0, Some(1.0), &[("init.omega", Value::Real(0.1))]);
     instance.do_step(0.0, 0.25).unwrap();
     let before = to_bytes(&instance);
@@ -264,10 +264,10 @@ fn invalid_steps_are_refused_and_change_nothing() {
     instance.do_step(0.25, 0.75).unwrap();
 }
 
-/// Hosts compute the time as n h, or add up h. Both times, and the stop time, differ from the exact value by some units
-/// in the last place.
+/// Hosts compute the time as n h, or add up h. Both times, and the stop time, differ from the exact value by some units in
+/// the last place.
 #[test]
-fn communication_points_may_be_off_by_rounding() {
+fn communication_points_may_differ_from_the_exact_time_by_rounding_errors() {
     let h = 0.1;
     for start in [0.0, 1e6] {
         let mut added = start;
@@ -282,8 +282,7 @@ fn communication_points_may_be_off_by_rounding() {
     }
 }
 
-/// An input with a slope changes in one long step as it changes in many short steps. The results of both agree within the
-/// tolerance 1e-8.
+/// The results of one long step and of many short steps must agree within the tolerance 1e-8.
 #[test]
 fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     let run = |cuts: u32| {
@@ -305,7 +304,7 @@ fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     assert!((whole - cut).abs() < 1e-7 * whole.abs(), "{whole} {cut}");
 }
 
-/// g_axial falls because of its input derivative. A step in which g_axial would become negative is refused and changes
+/// The specific force falls because of its input derivative. A step in which it would become negative is refused and changes
 /// nothing.
 #[test]
 fn the_axial_specific_force_may_fall_to_zero_but_not_below() {
@@ -330,7 +329,7 @@ fn the_axial_specific_force_may_fall_to_zero_but_not_below() {
 }
 
 #[test]
-fn a_reset_instance_equals_a_new_one() {
+fn a_reset_instance_equals_a_new_instance() {
     let expected = to_bytes(&new_instance());
     let mut instance = moving_instance(4, 4);
     instance.do_step(0.0, 0.5).unwrap();
@@ -360,7 +359,7 @@ fn after_a_step_that_failed_values_can_be_read_and_a_saved_state_restored() {
 }
 
 #[test]
-fn after_a_panic_every_call_is_fatal() {
+fn after_a_panic_every_call_of_the_instance_returns_fatal() {
     let mut instance = stepping(&[]);
     instance.poison();
     assert_eq!(instance.do_step(0.0, 1.0).unwrap_err().severity, Severity::Fatal);
@@ -516,8 +515,8 @@ fn random_calls_never_panic() {
     }
 }
 
-/// Instances of HubSlosh that are new, initialising, stepping, failed or terminated are saved to bytes and restored.
-/// Their instance state and their bytes are then equal.
+/// Instances of HubSlosh that are new, initialising, stepping, failed or terminated are saved to bytes and restored. Instance
+/// state and bytes must then be equal.
 #[test]
 fn a_state_can_be_saved_in_every_instance_state() {
     let mut initializing = new_instance();
@@ -554,9 +553,9 @@ fn bytes_that_are_not_a_saved_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
-/// A gyro sample is due at the end of each of these steps. It must not come one step late because of the difference between the
-/// sum of the steps and the host's times, 1e-11 s after 52 s. The rate changes by 1e-3 rad/s per step. The gyro may take a sample
-/// a millionth of a period early, which changes the reading by a millionth of this.
+/// A gyro sample is due at the end of each step. It must not come one step late because the sum of the steps and the times of
+/// the host differ, by 1e-11 s after 52 s. The tolerance: the rate changes by 1e-3 rad/s per step, and a sample may be taken
+/// a millionth of a period early.
 #[test]
 fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies() {
     let h = 0.01;
@@ -602,7 +601,7 @@ fn an_input_out_of_range_in_saved_bytes_is_refused() {
     assert!(why.contains("g_axial = -9.123456"), "{why}");
 }
 
-/// A ring wider than the tank's radius is within the range of its variable, but contradicts the tank.
+/// A ring baffle wider than the radius of the tank is within the range of its variable, but contradicts the tank.
 #[test]
 fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     let width = 0.0123456;
@@ -615,8 +614,8 @@ fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     assert!(from_bytes(&with_number(bytes, width, 1.9)).is_err());
 }
 
-/// A finite difference over 1 us has an error of (1 us)^2 times the third derivative, which is at most 1e3/s^3 of the
-/// signal's size here, plus the rounding error 1e-16 / 1e-6.
+/// The difference quotient over 1 µs has an error of (1 µs)^2 times the third derivative, which is at most 1e3/s^3 of the
+/// signal's size here, plus the rounding error 1e-16/1e-6.
 #[test]
 fn output_derivatives_equal_differences_of_the_outputs() {
     for slosh_model in items("slosh.model") {
@@ -765,9 +764,9 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
 }
 
-/// The derivatives are known in closed form: of sqrt(g/l)/2 pi with respect to g, of theta with respect to its start value,
-/// and of the hub's acceleration with respect to the torque. The last one is the inverse of the inertia of hub and liquid
-/// if nothing else moves.
+/// Three derivatives are known in closed form: of the natural frequency with respect to g_axial, of the hub's angle with
+/// respect to its start value, and of the hub's acceleration with respect to the torque. The last one is the inverse of the
+/// inertia of hub and liquid if nothing else moves.
 #[test]
 fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and_parameters() {
     let mut instance = new_instance();
@@ -985,7 +984,7 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
     }
 }
 
-/// Changes each continuous state separately. If a variable then changes, the model description must list the state as a
+/// Each continuous state is changed separately. If a variable then changes, the model description must list the state as a
 /// dependency, because a host's solver may set entries of the Jacobian that are not listed to 0.
 #[test]
 fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
@@ -1038,8 +1037,8 @@ fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
     }
 }
 
-/// OpenModelica's import, ecos and libcosim do not set enumerations; OMSimulator does not set enumerations with the
-/// name `model`.
+/// OpenModelica's import, ecos and libcosim do not set enumerations; OMSimulator does not set enumerations with the name
+/// `model`.
 #[test]
 fn integer_twins_have_the_same_effect_as_their_enumerations() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
@@ -1067,7 +1066,7 @@ fn integer_twins_have_the_same_effect_as_their_enumerations() {
 
 /// OpenModelica up to 1.27 sets Booleans to random numbers.
 #[test]
-fn integer_twins_override_the_booleans() {
+fn an_integer_twin_that_is_not_0_replaces_its_boolean() {
     for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]
     {
         let kind = format!("{name}_kind");
@@ -1092,7 +1091,7 @@ fn integer_twins_override_the_booleans() {
 /// `slosh.kind` and `friction.kind` repeat `slosh.model` and `friction.model` as integers, for hosts that cannot set
 /// enumerations. Two different values are refused at the end of initialisation.
 #[test]
-fn kinds_that_contradict_the_enumerations_are_all_reported() {
+fn integer_twins_that_contradict_their_enumerations_are_all_reported() {
     let mut instance = new_instance();
     set(&mut instance, &[("slosh.model", number(3)), ("slosh.kind", number(4))]);
     set(&mut instance, &[("friction.model", number(1)), ("friction.kind", number(2))]);

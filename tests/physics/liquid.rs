@@ -7,8 +7,8 @@ use plant::SloshModel;
 
 use super::free_oscillation::shifts;
 
-/// The plant's coefficients s and kappa include eight excited modes of each azimuthal number. Ten times as many modes would
-/// change s and kappa by less than 1e-4 of their values. Near a secondary resonance both coefficients, and therefore this
+/// The coefficients s and kappa of the plant include eight excited modes of each azimuthal number. Ten times as many modes
+/// would change them by less than 1e-4 of their values. Near a secondary resonance both coefficients, and therefore this
 /// difference, grow without bound.
 #[test]
 fn coefficients_of_the_model_equal_those_of_potential_flow() {
@@ -26,8 +26,8 @@ fn coefficients_of_the_model_equal_those_of_potential_flow() {
     }
 }
 
-/// The frequency shifts of planar and of rotary free oscillations in the bench's tank are within 1 % of third-order
-/// potential flow, at fills of 10 and 5 cm.
+/// In the bench's tank, filled 10 and 5 cm deep, the frequency changes of planar and of rotary free oscillations must be
+/// within 1 % of potential flow.
 #[test]
 fn the_slosh_model_liquid_has_the_frequency_shifts_of_third_order_potential_flow() {
     let all = Overlaps::new(40);

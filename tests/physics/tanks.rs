@@ -36,9 +36,9 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The bench's cylinder is described in three ways: by its dimensions, by the closed form of `hubslosh tank`, and by its contour,
-/// for which a boundary integral equation is solved. Masses and lengths agree to 1e-11. The motions over 10 s agree to the
-/// integrator's tolerance times the growth of a small change in rotary motion.
+/// The bench's cylinder is described in three ways: by its dimensions, by the closed form of `hubslosh tank`, and by its
+/// contour, for which a boundary integral equation is solved. Masses and lengths agree to 1e-11. The motions over 10 s agree
+/// to the integrator's tolerance times the growth of a small change in rotary motion.
 #[test]
 fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
     for model in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
@@ -62,8 +62,8 @@ fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
     }
 }
 
-/// A box that rotates about its vertical axis takes liquid along (`tank.I_own`), which increases its inertia. For a
-/// square box of 0.1 m the effective inertia is 0.1565 of that of rigid liquid.
+/// The liquid that a box takes along when it rotates about its vertical axis increases its inertia (`tank.I_own`). For a
+/// square box of 0.1 m this inertia is 0.1565 of that of rigid liquid.
 #[test]
 fn a_box_takes_liquid_along_about_its_vertical_axis() {
     let tank = Tank::parse("density = 1000\nbox = [0.1, 0.1]", std::path::Path::new("")).unwrap();

@@ -15,10 +15,10 @@ use super::records::{
 
 const TOLERANCE: f64 = 1e-10;
 
-/// Number of communication steps of a random run of 2 s, whose inputs jump every half second.
+/// Number of communication steps in a random run of 2 s, whose inputs jump every half second.
 const COUNT: usize = 100;
 
-/// Returns the outputs of a tank, in which outputs that `component` does not read are set to 0.
+/// Returns the outputs of a tank after setting outputs that `component.rs` does not read to 0.
 fn read(out: TankOutputs) -> TankOutputs {
     TankOutputs {
         axial: 0.0,
@@ -31,7 +31,8 @@ fn read(out: TankOutputs) -> TankOutputs {
     }
 }
 
-/// Compares the outputs after every step, then the derivatives and their directional derivative in Model Exchange.
+/// Compares craft in the FMU and in the crate: the outputs after each of `count` steps, then the derivatives and their
+/// directional derivative in Model Exchange. `input` returns the inputs of a step, and `what` describes the run for messages.
 fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: usize) {
     let start = input(0);
     let mut own = craft::Spacecraft::new(p, &start, 0.0, TOLERANCE).unwrap();
@@ -66,7 +67,7 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
     assert_eq!(packed.directional_derivative(&u, &dx, &du), expected, "{what}");
 }
 
-/// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every damping law,
+/// The random craft are free or on a pivot, with round and planar modes, surfaces other than spheres, every damping law,
 /// draining, appendages, and liquid that spins.
 #[test]
 fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
@@ -113,8 +114,8 @@ fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     }
 }
 
-/// For each reference record the FMU and the crate reach bit-identical states with the inputs of the record. The crate's test
-/// `reference` compares this state with the record.
+/// The FMU and the crate get the inputs of each reference record. The crate's test `reference` compares their final state
+/// with the record.
 #[test]
 fn spacecraft_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("craft") {

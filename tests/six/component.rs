@@ -25,8 +25,8 @@ pub fn load(name: &str) -> Fmu {
     Fmu::load(directory.path(), packed).unwrap()
 }
 
-/// A loaded FMU with the value references of its variables. Searching the description for each of the hundreds of
-/// parameters would take most of the time of an instantiation.
+/// A loaded FMU with the value references of its variables. Searching the description for each of the hundreds of parameters
+/// would take most of the time of an instantiation.
 struct Loaded {
     fmu: Fmu,
     references: HashMap<String, u32>,
@@ -385,7 +385,7 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
     }
 }
 
-/// Returns the values and the slopes of three vectors, each as nine numbers.
+/// Returns the values of three vectors as nine numbers, and their slopes in the same way.
 fn flat(ramps: [&Ramp; 3]) -> [[f64; 9]; 2] {
     [|ramp: &Ramp| ramp.value, |ramp: &Ramp| ramp.slope].map(|part| {
         let vectors = ramps.map(part);

@@ -27,27 +27,30 @@ use super::component::{SloshTank, Spacecraft};
 
 const THRUST: f64 = 2400.0;
 
-/// The form in which the body receives the tank's force: the total wrench, bias and added mass, or one of the following.
+/// The form in which the craft (here a rigid body) receives the force of the tank: as the total force and torque, as bias and
+/// added mass (`Split`), or in one of the forms below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Exchange {
     Total,
     Split,
     /// The constant lumped matrix is added to the matrix of the equations that the body solves.
     Lumped,
-    /// The lumped mass is part of the mass, centre of mass and inertia of the body.
+    /// The lumped mass is a part of the mass, centre of mass and inertia of the body.
     RigidBody,
-    /// The added mass at rest is used as a constant matrix, and the force that belongs to it is taken out of the total wrench.
+    /// The added mass at rest is used as a constant matrix, and the force that belongs to it is taken out of the total force
+    /// and torque.
     Constant,
 }
 
-/// The course of exchanged values within a step, and the order in which the two FMUs are stepped.
+/// How the exchanged values change within a step (held or linear), and in which order the two FMUs are stepped: one after the
+/// other (Gauss–Seidel) or both with the values of the last step (Jacobi).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     GaussSeidelHeld,
     GaussSeidelLinear,
     JacobiHeld,
     JacobiLinear,
-    /// The steps of `GaussSeidelLinear` are made and then repeated with the tank's values at the end of the step.
+    /// The step of `GaussSeidelLinear` is made and then repeated with the values of the tank at its end.
     Repeated,
 }
 use Order::*;
@@ -55,7 +58,7 @@ use Order::*;
 /// Matrix and right-hand side of the tank's terms in the equations of the body.
 type Given = (Matrix6<f64>, Vector6<f64>);
 
-/// A rigid body under thrust along z with a tank. Only its rates and accelerations matter to the tank.
+/// A rigid body under thrust along z with a tank. Only the rates and accelerations of the body matter to the tank.
 struct Pair {
     mass_matrix: Matrix6<f64>,
     moment: Vector3<f64>,
@@ -143,8 +146,8 @@ impl Pair {
         TankInputs { a: ramp(0), omega: self.w.into(), omega_dot: ramp(3), ..TankInputs::default() }
     }
 
-    /// Returns the matrix and the right-hand side of the tank in the equation that the body solves: (M_body + matrix) x
-    /// = rest + right-hand side.
+    /// Returns the tank's matrix and right-hand side in the equation that the body solves, (M_body + matrix) x = rest +
+    /// right-hand side, where x are its accelerations. `u` are the inputs of the tank.
     fn equation_terms(&mut self, u: &TankInputs) -> Given {
         let SloshTankOutputs { tank, bias, added_mass, .. } = self.tank.outputs(u);
         let wrench = Vector6::from_column_slice(&[tank.force, tank.torque].concat());
@@ -182,8 +185,8 @@ impl Pair {
         (self.mass_matrix + matrix).lu().solve(&rest).unwrap()
     }
 
-    /// Makes the body's step by Runge-Kutta for its rate, while matrix and right-hand side change linearly to `end`.
-    /// Returns [a; w'] at both ends, and the rate.
+    /// Makes a step of `h` seconds of the body by Runge–Kutta for its angular rate, while matrix and right-hand side of the
+    /// tank change linearly to `end`. Returns the accelerations at both ends of the step, and the rate at its end.
     fn move_body(&self, end: &Given, h: f64) -> ([Vector6<f64>; 2], Vector3<f64>) {
         let now = &self.given[1];
         let rate = |share: f64, w: Vector3<f64>| {
@@ -201,7 +204,8 @@ impl Pair {
         ([from, to], w)
     }
 
-    /// Makes the tank's step with the rates of the body at both ends, and returns the tank's terms at the end.
+    /// Makes a step of `h` seconds of the tank, with the accelerations of the body at both `ends` of the step, and returns
+    /// the tank's terms at its end.
     fn move_tank(&mut self, ends: [Vector6<f64>; 2], h: f64) -> Given {
         self.tank.step(&self.input(ends, h), h).unwrap();
         self.equation_terms(&self.input([ends[1], ends[1]], h))
@@ -240,7 +244,8 @@ impl Pair {
     }
 }
 
-/// Returns true if a disturbance of 1e-6 of the wrench grows to about ten thousand times its size within 1500 steps.
+/// Returns true if a disturbance of 1e-6 of the force grows to about ten thousand times its size within 1500 steps. `lambda`
+/// is the added mass of the tank divided by the mass of the body.
 fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
     let tank = Tank::default();
     let p = parameters(ratio(tank) / lambda, tank);
@@ -274,8 +279,6 @@ fn coupling_by_total_force_and_torque_diverges_above_the_limit_of_the_inertia_ra
     }
 }
 
-/// SloshTank warns if its tank is coupled to a craft so light that the exchange of force and acceleration between their
-/// FMUs diverges.
 #[test]
 fn a_warning_names_a_coupling_that_would_diverge() {
     let tank = Tank::default();
@@ -336,11 +339,12 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     (f64::ln(means[1] / means[0]) / 50.0, formula)
 }
 
-/// Mass of a body of 300 kg divided by the mass of the default craft. With the default tank lambda is 1.3.
+/// Mass of a body of 300 kg divided by the mass of the default craft. With the default tank, the added mass is 1.3 times the
+/// mass of this body.
 const LIGHT: f64 = 300.0 / 1180.0;
 
-/// Tank and craft are two FMUs that exchange force and acceleration once in a communication step, in Jacobi or
-/// Gauss-Seidel order. The growth rate of the slosh mode equals the rate that follows from the delay.
+/// Tank and craft are two FMUs that exchange force and acceleration once in a communication step, in Jacobi or Gauss–Seidel
+/// order. The growth rate of the slosh mode must equal the rate that follows from the delay.
 #[test]
 fn coupling_two_fmus_with_a_delay_makes_the_slosh_mode_grow_as_predicted() {
     for (share, order, h) in [
@@ -386,8 +390,9 @@ fn error(share: f64, exchange: Exchange, order: Order, h: f64) -> f64 {
     error_of(share, tank, exchange, order, h)
 }
 
-/// Returns the largest difference, within 20 s, between the rate of the coupled craft and the rate of the craft as one
-/// FMU, relative to the latter.
+/// Returns the error of a coupling over 20 s: the largest difference between the rates of the coupled craft and of the craft
+/// as one FMU, relative to the latter. `share` is the mass of the body divided by the mass of the default craft, and `h` the
+/// communication step, s.
 fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) -> f64 {
     let p = parameters(share, tank);
     let mut pair = Pair::new(&p, exchange, order);
@@ -405,11 +410,11 @@ fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) ->
     worst / largest
 }
 
-/// Held values converge with first order, linearly extrapolated values with second order. The total wrench converges only for the
-/// heavier body, and with first order. With the constant matrix a part of the wrench, m sin(angle) [a; w'], is still delayed; its
+/// Held values converge with first order, and linearly extrapolated values with second order. The total force converges only
+/// for the heavier body, and with first order. With the constant matrix a part of the force is still delayed, so that an
 /// error of first order becomes visible when the error of second order is small.
 #[test]
-fn coupling_converges_with_its_order() {
+fn each_coupling_of_tank_and_craft_converges_with_its_order() {
     use Exchange::*;
     for (share, exchange, order, expected) in [
         (1.0, Split, GaussSeidelHeld, 1.0),
@@ -436,9 +441,9 @@ fn coupling_converges_with_its_order() {
     }
 }
 
-/// The liquid in the box moves along both horizontal axes, and m_0 is below 0. In lumped coupling the modes of a box count twice,
-/// so that a larger share of the force is one step late. Held values then remove more damping: at lambda = 8 and 20 ms the
-/// simulation diverges. Extrapolated values do not diverge.
+/// The liquid in the box moves along both horizontal axes, and its fixed mass is below 0. In lumped coupling the modes of a
+/// box count twice, so that a larger share of the force is one step late. Held values then remove more damping: with an added
+/// mass of 8 times the body's mass and steps of 20 ms the simulation diverges. Extrapolated values do not diverge.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     let lambda = ratio(box_tank());
@@ -460,8 +465,8 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     }
 }
 
-/// With a lumped matrix, which is either added to the equations of the body or part of the body itself, and the bias^ of the
-/// tank, the coupling is stable at any mass ratio, and converges at least with first order.
+/// The lumped matrix is added to the equations of the body, or it is a part of the body itself; the body also receives the
+/// bias of the tank. The tests cover added masses up to 6 times the mass of the body.
 #[test]
 fn lumped_coupling_is_stable_and_converges_up_to_lambda_6() {
     let lambda = ratio(Tank::default());

@@ -13,8 +13,8 @@ use formulas::energy_terms::energy_terms;
 use super::component::{SloshTank, Spacecraft};
 use super::waves::{G, Moved, TOLERANCE, bench, circular, linear_frequency, planar, sideways};
 
-/// Mass (kg) and moments of inertia (kg.m2) of the craft. The force that accelerates it is near the largest one
-/// that the FMU accepts.
+/// Mass (kg) and moments of inertia (kg m2) of the craft. The force that accelerates this craft is near the largest one that
+/// the FMU accepts.
 const HEAVY: f64 = 1e11;
 
 /// A tank at the centre of mass of a craft in free flight. A force at this point accelerates the craft.
@@ -91,8 +91,8 @@ fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
     }
 }
 
-/// A slosh mass starts on a circle with the frequency that the coefficients s and kappa predict. After one period it
-/// returns to its start, in Spacecraft and in SloshTank.
+/// A slosh mass starts on a circle with the frequency that the coefficients s and kappa predict. After one period it must be
+/// back at its start, in Spacecraft and in SloshTank.
 #[test]
 fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
     fn end<T: Moved>(tank: &Tank, a: f64, w: f64) -> f64 {
@@ -109,9 +109,10 @@ fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
     assert!(off.iter().all(|off| *off < 1e-9), "{off:?}");
 }
 
-/// Simulates a tank that moves sideways by -stroke cos(w t), from rest, with 0.01 rad across, for 150 periods. Returns,
-/// over the last tenth, the largest angles along and across in degrees and the largest force along x in N; and the
-/// largest difference between SloshTank and Spacecraft with a craft of mass `heavy` over all periods.
+/// Simulates a tank that moves sideways by -`stroke` cos(w t) for 150 periods; w is `ratio` times the frequency of small
+/// waves. The liquid starts at rest, displaced by 0.01 rad across the motion. Returns, over the last tenth, the largest
+/// angles along and across in degrees and the largest force along x in N. Also returns the largest difference, over all
+/// periods, between SloshTank and a Spacecraft of the mass `heavy`, kg.
 fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     let mut tank = Tank { p_0: [[0.0, 0.01, -1.0]; MODES], ..bench(1.227) };
     tank.zeta[0] = 0.005;
@@ -136,9 +137,8 @@ fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     (largest, off)
 }
 
-/// Forced waves near resonance, in SloshTank and in Spacecraft with large-wave coefficients, equal waves of
-/// potential flow; a pendulum without these coefficients is wrong by up to a factor of two. In the last case the
-/// motion across the forcing decays.
+/// Near resonance SloshTank, and Spacecraft with large-wave coefficients, must have the waves of potential flow; a pendulum
+/// without these coefficients is wrong by up to a factor of two. In the last case the motion across the forcing decays.
 #[test]
 fn forced_waves_near_resonance_equal_those_of_potential_flow_in_both_fmus() {
     for (ratio, stroke, along, across, force) in [
@@ -164,9 +164,9 @@ fn bench_with_energy(fill: f64) -> Tank {
     tank
 }
 
-/// Simulates a tank that moves sideways by -stroke cos(w t), from rest, in a plane, and evaluates the last of 120 periods.
-/// Returns the largest slosh angle in degrees, its phase in degrees (of the first harmonic of the angle's sine), and the
-/// largest force divided by the weight of the liquid.
+/// Simulates a tank that moves sideways by -`stroke` cos(w t) for 120 periods, with liquid that starts at rest and stays in a
+/// plane; w is `ratio` times the frequency of small waves. Returns, over the last period, the largest slosh angle in degrees,
+/// the phase of its first harmonic in degrees, and the largest force divided by the weight of the liquid.
 fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
     let mut tank = bench_with_energy(fill);
     tank.zeta[0] = 0.01;
@@ -191,9 +191,9 @@ fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
 }
 
 /// Compares planar motion near resonance, with a damping ratio of 0.01 on every mode, with fully nonlinear potential flow,
-/// which was computed for this project by a spectral method that marches in time (29 to 40 modes, which agree within 0.3
-/// %). Each row has h/R, the frequency divided by the frequency of small waves, stroke over R, and angle, phase and force
-/// of the flow. The third-order model is wrong by up to 14 %, 17 degrees and 21 %.
+/// which was computed for this project by a spectral method that marches in time (29 to 40 modes, which agree within 0.3 %).
+/// Each row has h/R, the frequency divided by the frequency of small waves, the stroke divided by R, and angle, phase and
+/// force of the flow. The third-order model is wrong by up to 14 %, 17 degrees and 21 %.
 #[test]
 fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     for (fill, ratio, stroke, angle, phase, force) in [
@@ -246,7 +246,7 @@ fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     }
 }
 
-/// The two FMUs differ by the recoil, which falls as 1/M.
+/// The recoil is the difference between Spacecraft and SloshTank, whose craft moves as prescribed.
 #[test]
 fn the_recoil_of_a_craft_is_inversely_proportional_to_its_mass() {
     let (tank, heavy) = (bench(1.227), 1e6);

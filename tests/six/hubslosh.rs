@@ -8,8 +8,8 @@ use super::component::{SloshTank, Spacecraft, load};
 const KNOT: f64 = 0.01;
 const G: f64 = 9.81;
 
-/// Returns the torque on the hub between time knot k and the next, N m, and its slope. The torque makes the liquid swing
-/// to about 30 degrees.
+/// Returns the torque on the hub between the instants `k` and `k` + 1 of the table, N m, and its slope. The torque makes the
+/// liquid swing to about 30 degrees.
 fn torque(k: usize) -> (f64, f64) {
     let at = |k: usize| 1.5 * f64::sin(13.0 * k as f64 * KNOT);
     (at(k), (at(k + 1) - at(k)) / KNOT)
@@ -48,7 +48,8 @@ fn step(bench: &mut Instance, k: usize) {
     bench.do_step(k as f64 * KNOT, KNOT).unwrap();
 }
 
-/// Returns the tank of the bench: upright, on the x axis. For motion about one axis its heights and I_0 have no effect.
+/// Returns the tank of the bench: upright, on the x axis. For motion about one axis its heights and its inertia I_0 have no
+/// effect.
 fn tank(bench: &mut Instance) -> Tank {
     let mut get = |name: &str| bench.real(name).unwrap();
     let mut tank = Tank {
@@ -79,10 +80,10 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// A craft with a mass of 1e11 kg, and with moments of inertia of this size about all axes but one, moves only about this axis.
-/// Its motion in the other directions is inversely proportional to the mass.
+/// A craft with a mass of 1e11 kg, and with large moments of inertia about all axes but one, moves almost only about this
+/// axis. Its other motion is inversely proportional to the mass.
 #[test]
-fn spacecraft_on_one_axis_equals_hubslosh() {
+fn spacecraft_that_can_turn_about_one_axis_only_moves_like_hubslosh() {
     let fmu = load("HubSlosh");
     for (mass, allowed) in [(1e9, 1e-7), (1e11, 1e-9)] {
         let mut bench = bench(&fmu);
@@ -122,10 +123,11 @@ fn spacecraft_on_one_axis_equals_hubslosh() {
     }
 }
 
-/// The hub that carries the tank is simulated here and solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage
-/// of the integrator. The error of Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
+/// The hub that carries the tank is simulated here. In every stage of the integrator it solves I_hub w' = tau + bias_6 -
+/// M_a,6 [0, 0, g, 0, 0, w'], with row 6 of the tank's bias and added mass. The error of Runge–Kutta at 0.25 ms, (15 h)^4/120
+/// of the motion per radian, is 1e-11 after five seconds.
 #[test]
-fn slosh_tank_on_a_hub_equals_hubslosh() {
+fn sloshtank_on_a_simulated_hub_moves_like_hubslosh() {
     const STEPS: usize = 40;
     let fmu = load("HubSlosh");
     let mut bench = bench(&fmu);

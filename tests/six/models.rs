@@ -10,8 +10,8 @@ use spacecraft::Model as CraftModel;
 
 const STEP: f64 = 0.01;
 
-/// Simulates one second of Model Exchange by Euler steps; h_wheels[2] and the torque about y are functions of time. Returns true
-/// if the FMU warns.
+/// Simulates one second of Spacecraft in Model Exchange by Euler steps, while the wheels' angular momentum `h_wheels[2]` and
+/// the `torque` about y are functions of time. Returns true if the FMU warns.
 fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool) -> bool {
     let inputs = |t: f64| {
         let mut inputs = Inputs::default();
@@ -40,8 +40,7 @@ fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool
     model.step_warning().is_some()
 }
 
-/// The inputs are a history of the wheels' angular momentum and a torque. Spacecraft warns unless the torque is the
-/// reaction to the change of the momentum.
+/// Spacecraft must warn unless the torque is the reaction to the change of the wheels' angular momentum.
 #[test]
 fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_torque() {
     let sine = |t: f64| f64::sin(3.0 * t);
@@ -57,9 +56,9 @@ fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_to
     assert!(is_warned(ramp, |_| 0.0, false));
 }
 
-/// The thrust is reversed, so that the liquid detaches. The host, which integrates the FMU, then sets the position of the liquid
-/// to half a metre above its tank. Only if the liquid moves further outwards does the FMU request an event at the end of the
-/// step; the event reverses the liquid's velocity.
+/// The thrust is reversed, so that the liquid detaches. The host, which integrates the FMU, then sets the position of the
+/// liquid to half a metre above its tank. Only if the liquid moves further outwards does the FMU request an event at the end
+/// of the step; the event reverses the velocity of the liquid.
 #[test]
 fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     let mut parameters = spacecraft::Parameters::default();
@@ -86,8 +85,8 @@ fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     assert!(!model.accept_step(&inputs).unwrap());
 }
 
-/// The craft that carries the tank accelerates backwards while the liquid is half a metre above its tank. In Model Exchange a
-/// host can set such a position.
+/// The craft that carries the tank accelerates backwards while the liquid is half a metre above its tank. A host of Model
+/// Exchange can set such a position.
 #[test]
 fn a_step_of_slosh_tank_that_ends_with_the_liquid_outside_asks_for_an_event() {
     let mut parameters = sloshtank::Parameters::default();

@@ -41,7 +41,7 @@ fn outputs_after_a_step_belong_to_its_end() {
     }
 }
 
-/// Makes steps of random craft and tanks with random inputs, one in twenty of extreme magnitude. Each step must give
+/// Makes `count` steps of random craft and tanks with random inputs, one in twenty of extreme magnitude. Each step must give
 /// finite numbers, or fmi2Error with a message. Returns the number of refused steps.
 fn random_steps(count: usize, seed: u64) -> usize {
     let mut random = Random::new(seed);
@@ -119,7 +119,7 @@ fn a_million_random_steps_give_finite_results_or_a_clear_error() {
     random_steps(1_000_000, 8);
 }
 
-/// The FMU computes the course of omega within a step from omega_dot; omega must not leave its range.
+/// The FMU computes how omega changes within a step from omega_dot; omega must not leave its range.
 #[test]
 fn a_step_in_which_an_input_would_leave_its_range_is_refused_and_changes_nothing() {
     let mut tank = Instance::<::SloshTank::Model, Fmi2>::new(Interface::CoSimulation);
@@ -134,8 +134,7 @@ fn a_step_in_which_an_input_would_leave_its_range_is_refused_and_changes_nothing
     assert!(to_bytes(&tank) == before);
 }
 
-/// Returns an output of an instance in which an enumeration and its integer twin were set, or the reason why
-/// the FMU refused them.
+/// Sets an enumeration and its integer twin, and returns the output `shown`, or the reason why the FMU refused the settings.
 fn with_kind<M: runtime::Model>(
     settings: &[(&str, i32)],
     shown: &str,
@@ -157,7 +156,7 @@ fn with_kind<M: runtime::Model>(
     instance.get(&GET_REAL, M::table().find(shown).unwrap())
 }
 
-/// For example `mount_kind` = 2 acts as `mount` = pivot; two different values are refused.
+/// For example `mount_kind` = 2 has the effect of `mount` = pivot; two different values are refused.
 #[test]
 fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_enumerations() {
     type Craft = ::Spacecraft::Model;
@@ -180,8 +179,8 @@ fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_
     assert!(why.contains("coupling_kind = 3 contradicts coupling = 2"), "{why}");
 }
 
-/// In Model Exchange the momentum of the wheels changes and no torque is applied. There is one warning, however many steps
-/// follow.
+/// In Model Exchange the angular momentum of the wheels changes and no torque is applied. There must be one warning, however
+/// many steps follow.
 #[test]
 fn a_warning_names_wheels_that_move_without_a_torque_once_in_model_exchange() {
     let fmu = load("Spacecraft");
@@ -230,8 +229,8 @@ fn detached_liquid_moves_in_the_packed_fmu_as_in_the_crate() {
     assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }
 
-/// SloshTank with detached liquid is attached to a craft that another program simulates. It gives this craft the impulses that
-/// the Rust crate computes.
+/// SloshTank with detached liquid is attached to a craft that another program simulates. The impulses on this craft must be
+/// those of the Rust crate.
 #[test]
 fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
     let mut p = TankParameters { host: Some(Parameters::default().craft), ..Default::default() };
@@ -267,8 +266,8 @@ fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
     assert!(impulses >= 4, "{impulses}");
 }
 
-/// `canInterpolateInputs` refers to all Real inputs, so that hosts set the derivatives of all. The derivative of omega
-/// is accepted without effect, because omega changes by omega_dot within the step.
+/// `canInterpolateInputs` refers to all Real inputs, so that hosts set the derivatives of all. The derivative of omega has no
+/// effect, because omega changes by omega_dot within the step.
 #[test]
 fn an_input_derivative_set_for_omega_is_accepted_and_ignored() {
     let table = &::SloshTank::table::TABLE;

@@ -151,8 +151,8 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
     assert_eq!(order, sorted);
 }
 
-/// Outputs, states and initial unknowns with their dependencies are equal in the ModelStructure of FMI 3.0 and FMI 2.0; FMI
-/// 3.0 also lists the event indicators.
+/// The ModelStructure of FMI 3.0 must have the outputs, states and initial unknowns of FMI 2.0 with their dependencies, and
+/// also the event indicators.
 #[test]
 fn the_structure_of_fmi_3_equals_that_of_fmi_2_with_event_indicators() {
     the_structure_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
@@ -185,7 +185,7 @@ fn every_unit_of_fmi_3_is_defined_including_the_unit_of_time() {
 }
 
 #[test]
-fn the_root_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
+fn the_root_element_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
     let text = model_description::fmi3::xml::<HubSlosh::HubSlosh>(Layout::Scalars).unwrap();
     assert!(text.starts_with(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"3.0\""

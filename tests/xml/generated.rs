@@ -56,10 +56,9 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
     assert_eq!(row(&page, "a[1..3]"), "0");
 }
 
-/// Returns two numbers of scalar parameters: of the whole table, and of the part that a craft with one tank of one mode
-/// and without appendages needs.
+/// Returns two numbers of scalar parameters: of the whole table, and of the part that a craft with one tank of one mode and
+/// without appendages needs.
 fn parameters<M: Model>() -> [usize; 2] {
-    /// arrays of a tank whose first index is the number of the mode
     const OF_MODES: [&str; 32] = [
         "mass",
         "length",
@@ -136,7 +135,7 @@ fn numbers_of_variables_in_the_documentation_equal_those_of_the_tables() {
 }
 
 #[test]
-fn icon_is_a_png_of_the_drawing() {
+fn the_icon_is_a_png_of_its_drawing() {
     let png = committed(format!("{}/icon.png", icon::FOLDER));
     assert_eq!(&png[..16], b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
     assert_eq!(

@@ -95,10 +95,10 @@ fn start_values_are_within_min_and_max() {
     }
 }
 
-/// For example, an input is continuous if it is Real, and has a start value; a parameter has a start value and is
-/// fixed, except for friction parameters, which are tunable.
+/// For example, a Real input is continuous and has a start value. A parameter has a start value and is fixed, except for
+/// friction parameters, which are tunable.
 #[test]
-fn causality_determines_variability_initial_and_start() {
+fn the_causality_of_a_variable_determines_its_variability_initial_and_start() {
     for (variable, kind) in variables() {
         let name = variable.get("name").unwrap();
         let moving = if kind.name == "Real" { "continuous" } else { "discrete" };
@@ -119,7 +119,7 @@ fn causality_determines_variability_initial_and_start() {
 }
 
 #[test]
-fn names_and_value_references_are_unique() {
+fn names_and_value_references_of_variables_are_unique() {
     let all = variables();
     for attribute in ["name", "valueReference"] {
         let unique: BTreeSet<_> = all.iter().map(|(v, _)| v.get(attribute).unwrap()).collect();
@@ -170,7 +170,7 @@ fn every_unit_and_display_unit_is_defined() {
 }
 
 #[test]
-fn enumerations_are_declared() {
+fn every_enumeration_is_declared_with_its_items() {
     let root = root();
     let types: BTreeSet<_> =
         root.list("TypeDefinitions").map(|of| of.get("name").unwrap()).collect();
@@ -182,7 +182,7 @@ fn enumerations_are_declared() {
     }
 }
 
-/// The items must have the numbers of the physics crate's enumerations, because they are set by these numbers.
+/// Hosts set these enumerations by number, so that the numbers must be those of the physics crate.
 #[test]
 fn enumerations_have_the_items_of_the_physics_crate_in_their_order() {
     fn compare<T: std::fmt::Debug>(variable: &str, all: &[T]) {
@@ -222,8 +222,8 @@ fn every_slosh_model_and_friction_law_is_in_the_documentation() {
     }
 }
 
-/// ModelStructure lists each output and each state derivative once. Its initial unknowns are all variables that
-/// are computed during initialisation.
+/// ModelStructure lists each output and each state derivative once. Its initial unknowns are all variables that are computed
+/// during initialisation.
 #[test]
 fn the_structure_lists_every_output_and_every_variable_computed_at_the_start_once() {
     let with = |causalities: &[&str]| -> Vec<usize> {

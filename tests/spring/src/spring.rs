@@ -4,7 +4,7 @@ use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
-/// Parameters: mass (kg), damping (N s/m), stiffness (N/m), initial displacement (m).
+/// Parameters: mass, kg; damping, N s/m; stiffness, N/m; initial displacement, m.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
     m: f64,
