@@ -10,7 +10,7 @@ use zip::{CompressionMethod, ZipWriter};
 use crate::common::{XML, binary, breaks, broken_rules, check_bytes, our_files, with, xml, zipped};
 
 #[test]
-fn archives_that_break_hosts_are_reported() {
+fn the_check_reports_archives_that_hosts_cannot_read() {
     const DEFLATED: CompressionMethod = CompressionMethod::Deflated;
     let whole = zipped(our_files(), DEFLATED);
     let renamed = |from: &str, to: &str| {

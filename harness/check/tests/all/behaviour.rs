@@ -12,7 +12,7 @@ use crate::common::{
     our_fmu_with_description, with, xml, zipped,
 };
 
-/// Returns our FMU with one misbehaviour of the shim around its binary; `word` names the misbehaviour in shim.c.
+/// Returns our FMU with one fault, which a shim around its binary makes. `word` is the name of the fault in shim.c.
 fn misbehaving(word: &str) -> Vec<u8> {
     let name = binary();
     let folder = format!("binaries/{PLATFORM}");
@@ -28,8 +28,8 @@ fn misbehaving(word: &str) -> Vec<u8> {
     zipped(&files, CompressionMethod::Stored)
 }
 
-/// The library passes the address of one of its own variables to the logger. A host that used this pointer would follow
-/// it into the variable.
+/// The library passes the address of one of its own variables to the logger. A host that used this pointer would follow it
+/// into the variable.
 #[test]
 fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -51,7 +51,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     assert!(format!("{refused:#}").contains("friction.b = -1"), "{refused:#}");
 }
 
-/// Misbehaviours of the shim around our binary, each with the rule that must find it.
+/// Faults of the shim around our binary, each with the rule that must find it.
 const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("crashes_when_loaded", "load.opens"),
     ("types_platform", "load.types_platform"),
@@ -137,7 +137,7 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("other_order", "exchange.variables"),
 ];
 
-/// The library around the binary of HubSlosh makes one fault at a time, for example a wrong status.
+/// The library around the binary of HubSlosh makes one fault at a time, for example it returns a wrong status.
 #[cfg(target_os = "linux")]
 #[test]
 fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
@@ -226,7 +226,7 @@ derivatives of outputs to an order that is not there | <CoSimulation | maxOutput
 another GUID | <fmiModelDescription | guid="{ | guid="{x | load.instance
 "#;
 
-/// The model description of HubSlosh is changed, for example by an exchange of two value references; the binary is not
+/// The model description of HubSlosh is changed, for example two value references are exchanged, and the binary is not
 /// changed.
 #[test]
 fn descriptions_that_do_not_fit_the_binary_are_reported() {

@@ -11,7 +11,7 @@ use crate::common::{
     binary, breaks, broken_rules, changed, check_bytes, check_rules, our_files, with, zipped,
 };
 
-/// Our FMU, as it is packed for tests, has no finding except for the rule on system libraries.
+/// The FMU is a plain build for this machine, so that the rule on system libraries may find something.
 #[test]
 fn our_own_fmu_breaks_no_rule() {
     let report = check_rules(packed_for_tests(), &[], 120.0);
@@ -133,7 +133,7 @@ fn binaries_that_no_host_can_use_are_reported() {
     );
 }
 
-/// The folder of the binary has wrong capitals, so no binary for this platform is found.
+/// The folder of the binary has wrong capitals, so that no binary for this platform is found.
 #[test]
 fn a_check_that_could_not_call_the_fmu_states_this_in_its_report() {
     let mut files = our_files().clone();

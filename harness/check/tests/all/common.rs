@@ -77,8 +77,8 @@ pub fn broken_rules(report: &Report) -> BTreeSet<&'static str> {
     report.all().map(|(rule, _)| rule.id).collect()
 }
 
-/// Stores an FMU, with the rules that it breaks, in the folder HUBSLOSH_KEEP_MUTANTS, from where `.ci/other_tools.py`
-/// reads it.
+/// Stores an FMU, with the rules that it breaks, in the folder HUBSLOSH_KEEP_MUTANTS, from which `.ci/other_tools.py` reads
+/// it.
 pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     let Some(folder) = std::env::var_os("HUBSLOSH_KEEP_MUTANTS").map(PathBuf::from) else { return };
     static COUNT: Mutex<usize> = Mutex::new(0);
@@ -92,7 +92,7 @@ pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     writeln!(index.unwrap(), "{file}\t{}\t{}", name.escape_debug(), rules.join(" ")).unwrap();
 }
 
-/// Asserts that each FMU breaks exactly the rules that are listed for it, of the rules in `groups`.
+/// Asserts that each FMU breaks exactly the rules that are listed for it; only rules in `groups` count.
 pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {
@@ -119,15 +119,15 @@ pub fn our_fmu_with_description(text: String) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
 
-/// Parses a table into its cells; each line is a case, with " | " between the cells.
+/// Splits a table into its cells. Each line is a case, with " | " between the cells.
 pub fn cases<const N: usize>(table: &str) -> Vec<[&str; N]> {
     let cells = |line| str::split(line, " | ").collect::<Vec<_>>().try_into();
     let lines = table.lines().filter(|line| !line.is_empty());
     lines.map(|line| cells(line).unwrap_or_else(|_| panic!("not {N} cells: {line}"))).collect()
 }
 
-/// Asserts that each changed description breaks exactly the rules of the group `xml` that its line lists: name | the
-/// text after which | the text that | is replaced by | rules.
+/// Asserts that each changed description breaks exactly the rules of the group `xml` that its line lists. The cells of a line
+/// are: name of the case, the text after which the change is, the text that is replaced, its replacement, and the rules.
 pub fn words_break(table: &str) {
     let cases = cases::<5>(table);
     let rules: Vec<Vec<&str>> = cases.iter().map(|case| case[4].split(' ').collect()).collect();

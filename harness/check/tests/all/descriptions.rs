@@ -10,8 +10,8 @@ use crate::common::{
     xml, zipped,
 };
 
-/// Returns a DOCTYPE that defines ten entities. Each entity expands to ten times the entity before it:
-/// 10^10 characters in all.
+/// Returns a DOCTYPE that defines ten entities. Each of them expands to ten times the entity before it, which makes 10^10
+/// characters in all.
 fn entity_bomb() -> String {
     let mut entities = "<!ENTITY e0 \"xxxxxxxxxx\">".to_string();
     for n in 1..10 {
@@ -28,8 +28,8 @@ fn nested(levels: usize) -> String {
     xml().replacen("<ModelVariables>", &format!("{annotations}<ModelVariables>"), 1)
 }
 
-/// An XML file with 200,000 nested elements is refused as too deeply nested, not as ill-formed. The levels are
-/// counted before any XML parser, which might overflow its stack, reads the file.
+/// The levels are counted before any XML parser, which might overflow its stack, reads the file. The message must not call
+/// the file ill-formed.
 #[test]
 fn xml_nested_200_000_levels_deep_is_refused_as_too_deep() {
     let bytes = zipped(&with(XML, nested(200_000).into_bytes()), CompressionMethod::Deflated);
@@ -206,9 +206,8 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
     );
 }
 
-/// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is, but only the list
-/// Derivatives makes this variable a state (2.2.8). Dymola and JModelica write the attribute also for outputs,
-/// inputs and dummy derivatives.
+/// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is, but only the list Derivatives makes
+/// that variable a state (2.2.8). Dymola and JModelica write the attribute also for outputs, inputs and dummy derivatives.
 #[test]
 fn the_attribute_derivative_by_itself_makes_no_state() {
     let of = |variable: &str, index: &str| {

@@ -39,8 +39,8 @@ fn an_fmu_3_without_a_fault_breaks_no_rule() {
     assert_eq!(skipped, ["zip.licenses", "zip.terminals", "zip.layered_standards"]);
 }
 
-/// Changes of modelDescription.xml: a text | its replacement | the rule that must find it. `
-/// ` is the end of a line.
+/// Changes of modelDescription.xml, one in a line: a text, its replacement, and the rule that must find the change. A cell
+/// with one space is the end of a line.
 const STATIC: &str = r#"
 fmiVersion="3.0" | fmiVersion="3.0.2" | xml.fmi_version
 instantiationToken="{model3}" | instantiationToken="" | xml.token
@@ -88,7 +88,6 @@ dependenciesKind="fixed fixed" | dependenciesKind="fixed" | xml.dependencies
 <Output valueReference="6" dependencies="2" dependenciesKind="constant"/> | <Output valueReference="6" dependencies="8"/> | xml.dependencies_known
 "#;
 
-/// Each case changes one attribute in the model description of a small FMI 3.0 FMU; the intended rule reports the change.
 #[test]
 fn a_wrong_attribute_in_the_description_of_an_fmu_3_is_reported() {
     let mut files = files(0);
@@ -119,7 +118,7 @@ fn co_simulation_of_an_fmu_with_clocks_is_not_called() {
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
 }
 
-/// Each case moves or adds one file in the archive of a small FMI 3.0 FMU; the intended rule reports the change.
+/// Each case moves or adds one file in the archive.
 #[test]
 fn a_wrong_archive_of_an_fmu_3_is_reported() {
     let without_fault = files(0);
@@ -250,7 +249,7 @@ fn an_interface_that_cannot_be_loaded_is_reported_and_the_other_is_checked() {
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
 }
 
-/// With fault 36 the library allows only one instance in a process, which breaks rules unless the FMU declares it.
+/// The library allows only one instance in a process (fault 36), which breaks rules unless the FMU declares it.
 #[test]
 fn an_fmu_3_that_declares_one_instance_per_process_passes_the_check() {
     let undeclared = files(36);

@@ -106,7 +106,7 @@ fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Small FMUs in C with time constants down to 1e-5 s, and with only one of the two interfaces.
+/// The FMUs are small ones in C, with time constants down to 1e-5 s or with only one of the two interfaces.
 #[cfg(target_os = "linux")]
 #[test]
 fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
@@ -119,7 +119,7 @@ fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
     ]);
 }
 
-/// Small FMUs in C with step sizes of the default experiment from 1 µs to 1000 s.
+/// The FMUs are small ones in C, with step sizes of the default experiment from 1 µs to 1000 s.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
@@ -136,7 +136,7 @@ fn correct_fmus_get_no_finding_whatever_their_experiment() {
     ]);
 }
 
-/// A Model Exchange FMU whose state goes to infinity in finite time breaks only `exchange.run`.
+/// The state of this Model Exchange FMU goes to infinity in finite time, which breaks only the rule `exchange.run`.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_model_without_a_solution_is_reported_by_one_rule() {
@@ -189,7 +189,7 @@ fn outputs_that_lag_by_one_step_are_reported_and_intended_delays_are_not() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn resources_are_found_by_any_file_uri() {
+fn the_check_reports_an_fmu_that_does_not_find_its_resources_by_every_file_uri() {
     for (fault, told) in [
         (&["-DRESOURCES"][..], &[][..]),
         (&["-DRESOURCES", "-DRAW_LOCATION"], &["a%20b%2541c"]),
@@ -209,7 +209,7 @@ fn resources_are_found_by_any_file_uri() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_log_message_without_category_is_reported() {
+fn the_check_reports_a_log_message_without_category() {
     let report = check_co_simulation(&["-DNO_CATEGORY"], USUAL, &["log"]);
     assert_eq!(broken_rules(&report), BTreeSet::from(["log.categories"]), "{}", report.text());
     assert!(report.text().contains("the category of the message is NULL"), "{}", report.text());
@@ -227,8 +227,8 @@ fn an_fmu_that_crashes_in_every_step_gets_a_single_finding() {
     assert!(because.count() > 15, "{}", report.text());
 }
 
-/// Each case comes from a public FMU for which either several rules reported one fault, or the FMU could rightly refuse
-/// a value that the check sets.
+/// Each case comes from a public FMU for which either several rules had reported one fault, or the FMU could rightly refuse a
+/// value that the check sets.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_fault_is_reported_by_its_own_rule_with_its_severity() {
@@ -282,7 +282,7 @@ fn undefined_symbols_of_cpp_and_python_are_reported_in_readable_form() {
 }
 
 #[test]
-fn windows_finds_a_library_in_other_capitals() {
+fn a_windows_library_may_have_other_capitals_in_its_name_and_a_linux_library_may_not() {
     let small = Small { definitions: BOTH, rate: 1.0, experiment: USUAL };
     let with = |library: &str| {
         let files: Files =
