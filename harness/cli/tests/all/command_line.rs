@@ -28,7 +28,7 @@ fn files(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Asserts that a command fails with a line that contains all of `words`, and leaves the directory unchanged. Another
+/// Asserts that a command fails with a line that contains all of `words`, and that it leaves the directory unchanged. Another
 /// line, which lists the columns in use, may come before.
 fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     let before = files(directory);
@@ -111,7 +111,7 @@ fn a_torque_file_gives_the_same_motion_as_csv_and_as_parquet() {
 }
 
 #[test]
-fn an_unknown_name_brings_a_suggestion() {
+fn the_error_of_an_unknown_name_suggests_a_similar_name() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     refuses(
@@ -126,8 +126,8 @@ fn an_unknown_name_brings_a_suggestion() {
     );
 }
 
-/// Each case sets a value of the wrong kind, for example an unknown item of an enumeration, a text in place of a number, a value
-/// for an output, or a value for the input that the profile drives.
+/// For example, an unknown item of an enumeration, a text in place of a number, a value for an output, or a value for the
+/// input that the profile drives.
 #[test]
 fn a_value_of_the_wrong_kind_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn a_value_of_the_wrong_kind_is_refused() {
     }
 }
 
-/// The depth of the liquid is 0, negative or NaN: the command fails with the FMU's message, which names tank.h.
+/// The depth of the liquid is 0, negative or NaN. The message names tank.h.
 #[test]
 fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -160,10 +160,9 @@ fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
     }
 }
 
-/// A run of 5e13 steps, and other requests for more data than any memory holds, fail at once with the number of steps that
-/// was asked for.
+/// The message of a run of 5e13 steps, for example, states the number of steps that was asked for.
 #[test]
-fn runs_beyond_any_memory_are_refused() {
+fn runs_that_need_more_memory_than_any_computer_has_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -189,8 +188,7 @@ fn runs_beyond_any_memory_are_refused() {
     }
 }
 
-/// Numbers of runs or steps that need too much memory, for example a plan with 9e18 random runs,
-/// are refused before anything is allocated.
+/// For example, a plan with 9e18 random runs is refused before any memory is allocated for them.
 #[test]
 fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_allocation() {
     let directory = tempfile::tempdir().unwrap();
@@ -292,7 +290,8 @@ fn warnings_of_the_fmu_are_printed() {
     assert_eq!(said(&["--profile", "zero"]), "");
 }
 
-/// A CSV file with two columns tau_cmd, an output listed twice, and two options that name one output file are refused.
+/// The command refuses a CSV file with two columns tau_cmd, an output that is listed twice, and two options that name one
+/// output file.
 #[test]
 fn a_parameter_or_output_given_twice_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -368,8 +367,8 @@ fn files_that_cannot_be_read_or_written_are_named() {
     }
 }
 
-/// The GUID, and then other parts, of modelDescription.xml are edited in an FMU; `hubslosh run` fails with a message that
-/// names the difference.
+/// The GUID, and then other parts, of modelDescription.xml are changed in an FMU; the message of `hubslosh run` names the
+/// difference.
 #[test]
 fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -463,8 +462,7 @@ fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_ref
     );
 }
 
-/// With `--out -` the table is written to stdout and no file is written. If the reader closes the pipe, the program ends
-/// without an error message.
+/// With `--out -` the table is written to stdout, and no file is written.
 #[test]
 fn a_table_goes_to_stdout_and_a_closed_pipe_ends_the_program_quietly() {
     let directory = tempfile::tempdir().unwrap();
@@ -511,7 +509,7 @@ fn variables_are_listed_with_unit_range_and_meaning() {
 }
 
 #[test]
-fn shells_get_completions_with_every_command() {
+fn the_completions_for_shells_contain_every_command() {
     for shell in ["bash", "zsh", "fish", "powershell"] {
         let done = hubslosh(Path::new("."), &["completions", shell]);
         let script = String::from_utf8_lossy(&done.stdout).into_owned();
@@ -567,7 +565,7 @@ fn messages_are_coloured_on_request_and_not_by_default_in_files() {
     assert!(String::from_utf8(wrong.stderr).unwrap().contains("\u{1b}[31merror:"));
 }
 
-/// --quiet suppresses only progress and summaries. With --strict a warning of the FMU makes the command fail.
+/// The option --quiet suppresses only progress and summaries. With --strict a warning of the FMU makes the command fail.
 #[test]
 fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     let directory = tempfile::tempdir().unwrap();
@@ -676,7 +674,7 @@ fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
     assert!(files(directory.path()).is_empty());
 }
 
-/// FMUs, Parquet, JSON, SSV and CSV files are truncated or contain text; the messages contain no terms of the libraries
+/// FMUs, Parquet, JSON, SSV and CSV files are truncated or contain text. The messages must not contain terms of the libraries
 /// that read them.
 #[test]
 fn damaged_input_files_are_refused_in_words_for_users() {

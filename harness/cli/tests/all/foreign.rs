@@ -31,8 +31,8 @@ fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     pack::archive::write(&files, path).unwrap();
 }
 
-/// Runs the model with an input that follows straight lines, which the callback intermediateUpdate sets, and compares its
-/// outputs with the exact solution. Mutant 35 of the model passes its instance to the callbacks instead of the environment.
+/// The input follows straight lines, which the callback intermediateUpdate sets. Mutant 35 of the model passes its instance
+/// to the callbacks instead of the environment.
 #[test]
 fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     for mutant in [0, 35] {
@@ -43,7 +43,8 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     }
 }
 
-/// Without Co-Simulation the command integrates the FMU. A message names the clock, because the command does not activate it.
+/// Without Co-Simulation the command integrates the FMU. A message names the clock of the FMU, because the command does not
+/// activate it.
 #[test]
 fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
     let folder = tempfile::tempdir().unwrap();

@@ -137,7 +137,7 @@ fn hubslosh_run_accepts_the_friction_that_identify_friction_has_estimated() {
     hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
 }
 
-/// The requested multisine has a peak of 0.5 N·m; the plan has a peak of 0.26 N·m, the limit of the wheel's torque.
+/// The requested multisine has a peak of 0.5 N·m. The plan has a peak of 0.26 N·m, the limit of the wheel's torque.
 #[test]
 fn a_designed_multisine_is_within_the_wheels_limits() {
     let folder = tempfile::tempdir().unwrap();
@@ -212,7 +212,7 @@ fn no_kind_of_recording_has_more_than_15_options() {
 }
 
 #[test]
-fn identify_without_a_kind_means_bench() {
+fn identify_without_a_kind_of_recording_accepts_the_options_of_bench_and_fmu() {
     let folder = tempfile::tempdir().unwrap();
     let parsed = |arguments: &[&str]| {
         let all = [&["--parse-only", "identify"], arguments, &["--out", "a.json"]].concat();

@@ -36,8 +36,8 @@ const CASES: [&str; 15] = [
     "analyse IN --fmu IN --out OUT",
 ];
 
-/// The output has the path of an input, a hard link, a symbolic link or another spelling of the path. The command fails and
-/// the input keeps its content.
+/// The output has the path of an input, a hard link, a symbolic link or another spelling of the path. The command must fail,
+/// and the input must keep its content.
 #[cfg(unix)]
 #[test]
 fn no_output_option_replaces_an_input_under_any_of_its_names() {
@@ -65,7 +65,7 @@ fn no_output_option_replaces_an_input_under_any_of_its_names() {
     }
 }
 
-/// The file tank.toml names drawing.svg as its drawing; `hubslosh tank --picture drawing.svg` does not overwrite this file.
+/// The file tank.toml names drawing.svg as its drawing; `hubslosh tank --picture drawing.svg` must not overwrite this file.
 #[test]
 fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
     let directory = tempfile::tempdir().unwrap();
@@ -150,8 +150,8 @@ fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     assert!(unknown.is_empty(), "neither in INPUTS here nor in OUTPUTS of outputs.rs: {unknown:?}");
 }
 
-/// Returns the examples in a help text. Continued lines are joined; the rest of a line after a pipe or a
-/// redirection is left out.
+/// Returns the examples in a help text. Continued lines are joined, and the rest of a line after a pipe or a redirection is
+/// left out.
 fn examples(text: &str) -> Vec<String> {
     let joined = text.replace("\\\n", " ");
     let lines = joined.lines().filter(|line| line.starts_with("  hubslosh "));
@@ -163,7 +163,7 @@ fn examples(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Beginnings of those examples that take at most a second each, and run in a folder with the files that they name.
+/// Beginnings of those examples that take at most a second each and can run in a folder with the files that they name.
 const CHEAP: [&str; 7] = [
     "hubslosh scale",
     "hubslosh tank",
@@ -263,8 +263,8 @@ fn a_draining_tank_gets_the_damping_of_every_fill() {
     );
 }
 
-/// A named pipe without a writer is given as recording, parameters, plan or tank of each command; the command fails instead
-/// of waiting.
+/// A named pipe without a writer is given as recording, parameters, plan or tank of each command. The command must fail
+/// instead of waiting.
 #[cfg(unix)]
 #[test]
 fn a_named_pipe_is_refused_as_any_input() {
@@ -443,8 +443,8 @@ fn units_of_a_parameter_set_are_converted_or_refused() {
     }
 }
 
-/// Returns a recording of a torque sweep from 1 to 3 Hz in 100 s and of a response to it. `times`
-/// and `values` are factors by which its times and values are multiplied.
+/// Returns a recording of a torque sweep from 1 to 3 Hz in 100 s and of a response to it. Its times and values are multiplied
+/// by the factors `times` and `values`.
 fn sweep(times: f64, values: f64) -> String {
     let mut text = String::from("time,tau_cmd,omega\n");
     for k in 0..=5000 {

@@ -29,8 +29,7 @@ fn rows(path: &Path) -> Vec<HashMap<String, String>> {
     reader.deserialize().map(|row| row.unwrap()).collect()
 }
 
-/// Columns of the table of features that must be the same for a recording and for the run from which it was
-/// made.
+/// Columns of the table of features that must be the same for a recording and for the run from which it was made.
 const SAME: [&str; 22] = [
     "fill_m",
     "amplitude_nm",
@@ -202,7 +201,7 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
 }
 
 #[test]
-fn a_recorded_gyro_at_rest_is_characterised() {
+fn noise_and_bias_of_a_gyro_are_estimated_from_a_recording_at_rest() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let mut random = Random::new(1, 0);

@@ -12,8 +12,8 @@ fn tank(arguments: &[&str]) -> (bool, String, String) {
     (done.status.success(), text(done.stdout), text(done.stderr))
 }
 
-/// The sphere is half full. lambda_1 R and m_1/m_liq are compared with Budiansky (1960); all hinges are at the
-/// centre of the sphere.
+/// The sphere is half full. The dimensionless frequency lambda_1 R and the mass ratio m_1/m_liq are compared with Budiansky
+/// (1960); all hinges are at the centre of the sphere.
 #[test]
 fn a_half_full_sphere_has_its_published_first_mode() {
     let folder = tempfile::tempdir().unwrap();
@@ -43,8 +43,8 @@ fn an_invalid_tank_is_refused_in_a_sentence_without_a_file() {
     assert!(!out.exists());
 }
 
-/// The bench's cylinder moves in the same way if its parameters come from a drawing (through a TOML and an SSV file) or
-/// from its dimensions. Masses and lengths agree to 1e-11; 1e-9 rad/s is about 1e-8 of the rates.
+/// The bench's cylinder gets its parameters from a drawing, through a TOML and an SSV file, or from its dimensions. Masses
+/// and lengths agree to 1e-11; the tolerance of 1e-9 rad/s is about 1e-8 of the rates.
 #[test]
 fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
     let folder = tempfile::tempdir().unwrap();
@@ -91,8 +91,8 @@ fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
     assert_ne!(other.column("omega").unwrap(), toml.column("omega").unwrap());
 }
 
-/// The parameter files for SloshTank and for a tank of Spacecraft contain m_0, H_0, I_0 and the modes of the JSON result
-/// under the names of the FMUs.
+/// The parameter files for SloshTank and for a tank of Spacecraft contain fixed mass, its height and inertia, and the modes
+/// of the JSON result, under the names of the FMUs.
 #[test]
 fn parameters_of_the_six_axis_fmus_have_their_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,9 +138,9 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
     }
 }
 
-/// The FMU, with the file, computes the frequency that belongs to Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (a
-/// value of the meniscus table). On the bench this wetting liquid has a negative stiffness, which the FMU does not
-/// accept, and the command says so.
+/// The FMU, with the parameter file, must compute the frequency Omega_1^2 = 21.4397 of the meniscus table at Bo = 10 and a
+/// contact angle of 30 degrees. On the bench this wetting liquid has a negative stiffness, which the FMU does not accept, and
+/// the command says so.
 #[test]
 fn the_fmu_has_the_frequency_of_a_curved_meniscus_and_negative_stiffnesses_are_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -225,8 +225,8 @@ fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     }
 }
 
-/// Without gravity the frequencies in the table are 0. A parameter file has the stiffness by capillarity, but no
-/// damping ratios, because there is no specific force at which they would hold.
+/// Without gravity the frequencies in the table are 0. A parameter file has the stiffness by capillarity, but no damping
+/// ratios, because there is no specific force at which they would hold.
 #[test]
 fn without_gravity_only_surface_tension_restores_the_liquid() {
     let folder = tempfile::tempdir().unwrap();
@@ -256,8 +256,8 @@ fn without_gravity_only_surface_tension_restores_the_liquid() {
     }
 }
 
-/// In a sphere of 1 m at 1e-6 m/s² the first-order correction by capillarity is larger than the value that it corrects,
-/// so that the file is written only with --force.
+/// In a sphere of 1 m at 1e-6 m/s² the first-order correction by capillarity is larger than the value that it corrects, so
+/// that the file is written only with --force.
 #[test]
 fn a_stiffness_far_outside_its_formula_is_written_only_with_the_option_force() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,9 +318,9 @@ fn invalid_parameter_files_are_refused_in_a_sentence() {
     }
 }
 
-/// Omega_1^2 rho R^3/sigma at Bo = 3.6 and 30 degrees is between 9.1 and 21.4 (rows Bo = 3 and 10 of the
-/// meniscus table) in table, picture and JSON; gravity alone gives 6.6. For a sphere there is no formula: the
-/// frequency is stated as unknown, and is null in JSON.
+/// At Bo = 3.6 and 30 degrees the frequency Omega_1^2 rho R^3/sigma must lie between 9.1 and 21.4, the rows Bo = 3 and 10 of
+/// the meniscus table; gravity alone would give 6.6. Table, picture and JSON contain it. For a sphere there is no formula, so
+/// that the frequency is unknown there, and null in JSON.
 #[test]
 fn frequencies_include_the_surface_tension_if_it_is_given() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,7 @@ use zip::write::SimpleFileOptions;
 const MEMORY: i64 = 500 << 20;
 const DISK: u64 = 100 << 20;
 
-/// Runs the program in a separate folder, with another folder for temporary files.
+/// Runs the program in a folder of its own, with another folder for temporary files.
 struct Sandbox {
     directory: tempfile::TempDir,
 }
@@ -360,8 +360,7 @@ fn ends_its_own_process(when: &str) {
     memory_was_enough();
 }
 
-/// FMU binaries that crash, exit, loop or fill the memory while they are loaded end only the process that hubslosh started
-/// for them; each command then prints an error.
+/// The binaries crash, exit, loop or fill the memory while they are loaded. Each command must then print an error.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_says_so() {
@@ -373,10 +372,9 @@ fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says
     ends_its_own_process("AT_STEP");
 }
 
-/// A malicious FMU writes into the pipe through which its guarded process reports to hubslosh; the command fails and says
-/// so.
+/// A malicious FMU writes into the pipe through which its guarded process reports to hubslosh.
 #[test]
-fn forged_messages_of_an_fmu_are_refused() {
+fn messages_that_an_fmu_forges_in_the_pipe_of_its_process_are_refused() {
     const FORGE: u32 = 19;
     let sandbox = Sandbox::new();
     for when in ["AT_LOAD", "AT_STEP"] {
