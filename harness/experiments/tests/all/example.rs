@@ -38,7 +38,7 @@ fn reference(example: &Example) -> Table {
 }
 
 #[test]
-fn replayed_input_gives_the_reference_result() {
+fn the_recorded_input_of_an_example_gives_its_reference_result() {
     for example in &EXAMPLES {
         let fmu = packed(example);
         let input = folder(example).join(example.input());

@@ -17,8 +17,8 @@ const BEYOND: [&str; 7] = [
     "bench_damping",
 ];
 
-/// Selects the runs of a plan that the test simulates: those with the largest torque if there are many runs, and
-/// every twentieth random draw.
+/// Selects the runs of a plan that the test simulates: of many runs those with the largest torque, and of random draws every
+/// twentieth.
 fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
     let largest = cases.iter().filter_map(|case| case.amplitude).fold(0.0, f64::max);
     match cases.len() {
@@ -40,8 +40,8 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()
 }
 
-/// Slosh models in the test of the plan that seeks the onset of rotary slosh. They replace the plan's
-/// search, which takes seconds.
+/// Slosh models in the test of the plan that seeks the onset of rotary slosh. They replace the plan's search, which takes
+/// seconds.
 const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 
 /// The search for the onset of rotary slosh is tested only with the linear model, which leaves its range.

@@ -41,7 +41,8 @@ fn column<'t>(table: &'t Table, name: &str) -> &'t [f64] {
     table.column(name).unwrap()
 }
 
-/// The two gauges are the components of the wave: the root of the sum of their squares equals the FMU's output `wave_height`.
+/// The two gauges measure the components of the wave, so that the root of the sum of their squares equals the FMU's output
+/// `wave_height`.
 #[test]
 fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     for model in ["linear", "planar", "spherical", "liquid"] {
@@ -60,9 +61,8 @@ fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     }
 }
 
-/// The pressure on the wall, integrated over the surface with the cosine of the angle as weight, equals `F_tangential`, the
-/// force of the undamped pendulums and of the rigid liquid. With ten modes and with one mode, all other modes move with the
-/// tank in both results.
+/// The pressure on the wall, integrated with the cosine of the angle as weight, must equal `F_tangential`, the force of the
+/// undamped pendulums and of the rigid liquid. All modes that are not simulated move with the tank in both results.
 #[test]
 fn pressures_on_the_wall_add_up_to_the_force_on_the_tank() {
     // Gauss–Legendre quadrature with five points in each of 8 parts of the height
@@ -202,10 +202,10 @@ fn noise_does_not_depend_on_other_sensors_and_differs_between_sensors_seeds_and_
     assert_ne!(column(&two, "c"), column(&two, "b"));
 }
 
-/// The sensor takes 10 samples a second in a run with 50 rows a second. Rows without a reading are empty in CSV
-/// and null in Parquet.
+/// The sensor takes 10 samples a second in a run with 50 rows a second. Rows without a reading are empty in CSV and null in
+/// Parquet.
 #[test]
-fn missing_readings_are_missing_in_files() {
+fn missing_readings_of_a_sensor_are_empty_in_csv_and_null_in_parquet() {
     let table = record(&[], &["s=encoder:rate=10,noise=1e-3"], &["omega"], 1.0);
     let folder = tempfile::tempdir().unwrap();
     let csv = folder.path().join("t.csv");
@@ -230,7 +230,7 @@ fn missing_readings_are_missing_in_files() {
 }
 
 #[test]
-fn errors_of_sensors_say_what_is_allowed() {
+fn the_error_of_a_wrong_sensor_option_says_what_is_allowed() {
     let said = |text: &str| format!("{:#}", text.parse::<Sensor>().unwrap_err());
     let cases = [
         ("gauge", "(allowed: NAME=KIND:key=value,…)"),

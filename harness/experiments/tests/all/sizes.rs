@@ -57,8 +57,8 @@ fn spacecraft(fmi: Fmi, settings: &[(String, String)]) -> anyhow::Result<Fmu> {
     Fmu::open_with(packed_version_for_tests(model, fmi), settings)
 }
 
-/// The same parameters are set as array elements of a Spacecraft with arrays, and as scalars of a Spacecraft with
-/// scalars. `tanks` sets the size.
+/// The same parameters are set as array elements of a Spacecraft with arrays, and as scalars of a Spacecraft with scalars.
+/// `tanks` sets the size.
 #[test]
 fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last_bit() {
     let set = settings(&SCALARS);

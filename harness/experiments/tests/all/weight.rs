@@ -34,8 +34,8 @@ fn said(
     tanks.without_weight(&run.drive(&mut instance, &columns, |_| {}).unwrap())
 }
 
-/// The default craft at rest has 1180 kg, of which 381.704 kg are water in a tank of R = 0.376618 (1.841184² − 1)/2 =
-/// 0.45005 m. At 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A thrust of 6 N gives a tenth of this,
+/// The default craft at rest has 1180 kg, of which 381.704 kg are water in a tank of R = 0.376618 (1.841184² − 1)/2 = 0.45005
+/// m. At 60 N, 0.03842 m/s², the Bond number is 1000 0.03842 0.45005²/0.07213 = 107.9. A thrust of 6 N gives a tenth of it,
 /// no thrust gives 0.
 #[test]
 fn a_thrust_cut_off_is_reported_with_the_numbers_of_a_hand_calculation() {
@@ -57,8 +57,8 @@ fn a_thrust_cut_off_is_reported_with_the_numbers_of_a_hand_calculation() {
     assert_eq!(said("Spacecraft", &held, ("force[3]", &times, &[60.0, 0.0, 0.0]), water), [""; 0]);
 }
 
-/// The tank has a diameter of 0.9 m. At 0.1 m/s² along its axis Bo = 280.7, then at 0.002 m/s² Bo = 5.61. Its slosh
-/// mass starts with 0.2 1/s: V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
+/// The tank has a diameter of 0.9 m. At 0.1 m/s² along its axis the Bond number is 280.7, then at 0.002 m/s² it is 5.61. Its
+/// slosh mass starts with 0.2 1/s: V = 0.37657 m 0.2 1/s, so that the Weber number is 1000 V² 0.45/0.07213 = 35.39.
 #[test]
 fn a_thrust_cut_off_of_slosh_tank_is_recognised_from_its_acceleration_input() {
     let settings = [("tank.diameter", "0.9"), ("a[1]", "0"), ("tank.p_dot_0[1,1]", "0.2")];
