@@ -9,8 +9,8 @@ use host::binary::Binary;
 use pack::platforms::{PLATFORMS, Platform};
 use pack::{Fmi, MODELS, Model, release};
 
-/// Returns the committed FMUs of this version. After the version in Cargo.toml has changed and before the release is
-/// made, there are none; then the files of an older version must exist.
+/// Returns the committed FMUs of this version. After the version in Cargo.toml has changed and before the release is made,
+/// there are none; then the files of an older version must exist.
 fn committed_fmus() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
     let of = |model| Fmi::ALL.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
@@ -135,7 +135,7 @@ fn gather_release_files(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<Stri
 
 #[cfg(unix)]
 #[test]
-fn release_files_match_the_manifest() {
+fn the_committed_release_files_have_the_hashes_of_the_manifest() {
     let whole = tempfile::tempdir().unwrap();
     tree_with_a_release(whole.path());
     let found = gather_release_files(whole.path(), &["v1.2.3", "files"]).unwrap();
@@ -195,7 +195,7 @@ fn the_committed_release_has_a_check_report_without_errors() {
 }
 
 #[test]
-fn release_is_small_and_for_all_platforms() {
+fn the_release_is_small_and_has_binaries_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in committed_fmus() {
         let mut processors = 0;
         for Platform { folder, ending, .. } in &PLATFORMS {
