@@ -113,7 +113,7 @@ fn quantities(data: &ModalData) -> Vec<Quantity> {
     all
 }
 
-/// A tank four times as large, with four times the density: masses, lengths and frequencies scale exactly.
+/// In a tank four times as large, with four times the density, masses, lengths and frequencies must scale exactly.
 #[test]
 fn every_modal_parameter_scales_by_its_physical_dimension() {
     let one = solved(1.0, 512.0);
@@ -129,8 +129,8 @@ fn every_modal_parameter_scales_by_its_physical_dimension() {
     }
 }
 
-/// The second tank is 4 times as large, and its times are 2 times as long: the dimensionless numbers are then equal with
-/// the same gravity, 16/2 times the viscosity and 64/4 times the surface tension.
+/// The second tank is 4 times as large, and its times are 2 times as long. With the same gravity, 16/2 times the viscosity
+/// and 64/4 times the surface tension, all dimensionless numbers are then equal.
 #[test]
 fn similar_tanks_have_the_same_damping_and_the_same_description() {
     let [one, large] = [1.0, 4.0].map(|c| solved(c, 512.0));

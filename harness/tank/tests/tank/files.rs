@@ -113,7 +113,7 @@ fn every_defect_of_a_contour_has_a_clear_message() {
 }
 
 #[test]
-fn all_problems_are_reported_at_once() {
+fn all_problems_of_a_tank_file_are_reported_at_once() {
     let text = "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0.1, -2, 900] }]";
     let said = Tank::parse(text, Path::new("")).unwrap_err().0;
     assert_eq!(said.len(), 4, "{said:?}");
@@ -126,7 +126,7 @@ fn all_problems_are_reported_at_once() {
 }
 
 #[test]
-fn every_impossible_fill_has_a_clear_message() {
+fn every_impossible_fill_of_a_tank_is_refused_with_a_clear_message() {
     let cases = [
         (
             "shape = { cylinder = { radius = 1.0, height = 1.0 } }",
@@ -202,8 +202,8 @@ fn every_impossible_fill_has_a_clear_message() {
     }
 }
 
-/// A contour counts as closed if the gap is at most 1e-6 of the tank's size, and a free surface is refused within 1e-6 of
-/// the tank's size from a shoulder. Both limits hold for small and large tanks, up to the largest size of 100 m.
+/// A contour counts as closed if the gap is at most 1e-6 of the tank's size, and a free surface is refused within 1e-6 of the
+/// tank's size from a shoulder. Both limits hold for small and large tanks, up to the largest size of 100 m.
 #[test]
 fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     for c in [0.01, 1.0, 50.0] {
@@ -254,8 +254,8 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     }
 }
 
-/// The full tank is given as a height, in per cent and as a mass. A full tank has no free surface and no modes, and the
-/// message states mass, centre of mass and inertia of the liquid as a rigid body.
+/// The full tank is given as a height, in per cent and as a mass. The message states mass, centre of mass and inertia of the
+/// liquid as a rigid body.
 #[test]
 fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -274,9 +274,9 @@ fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     }
 }
 
-/// Compares volume and mass of the solved tank with the requested volume and mass, and heights with closed forms. The
-/// volume is integrated by two rules, with 20 points per piece and with 5 points on smaller pieces, so that only the
-/// rounding errors of the sums and the error of 60 bisections remain.
+/// Compares volume and mass of the solved tank with the requested volume and mass, and heights with closed forms. The volume
+/// is integrated by two rules, with 20 points per piece and with 5 points on smaller pieces, so that only the rounding errors
+/// of the sums and the error of 60 bisections remain.
 #[test]
 fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     let tanks = [
@@ -320,10 +320,10 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     assert!("1.2 m".parse::<Fill>().unwrap_err().to_string().contains("neither a height in m"));
 }
 
-/// Heights of a shape count from its lowest point, heights of a contour from the zero of its drawing. The test compares
-/// one tank in both forms, in the table, the JSON and the parameter file.
+/// Heights of a shape count from its lowest point, heights of a contour from the zero of its drawing. The test compares one
+/// tank in both forms, in the table, the JSON and the parameter file.
 #[test]
-fn table_and_file_state_the_zero_of_heights() {
+fn the_table_and_the_parameter_file_state_where_heights_are_zero() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
     let drawn = tank("density = 1.0\nprofile = [{ arc = [0, -0.5, 1, -90, 90] }]");
     for (tank, lowest, words) in [
@@ -343,9 +343,9 @@ fn table_and_file_state_the_zero_of_heights() {
     }
 }
 
-/// A tank that is drawn completely and cut at a fill equals the contour drawn up to that fill.
+/// A tank that is drawn completely and filled in part must have the results of the contour that is drawn only up to the fill.
 #[test]
-fn the_wetted_contour_ends_at_the_fill() {
+fn a_tank_filled_in_part_equals_the_contour_up_to_the_fill() {
     let whole = solve("shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }", 0.5, 3);
     // asin(0.25) = 14.4775 degrees above the equator on both sides
     let angle = 0.25f64.asin().to_degrees();
@@ -404,10 +404,10 @@ fn built_in_shapes_have_the_volumes_of_textbooks() {
     assert!(bottom.solve(1.5, 2).is_ok());
 }
 
-/// Points are joined by straight lines. With `spline` a curve through the points is far closer to the original: for 25
-/// points of a half circle the error of the lines is 2e-3, the error of the spline 1e-6.
+/// For 25 points of a half circle the error of straight lines is 2e-3; with `spline` a curve through the points has an error
+/// of 1e-6.
 #[test]
-fn points_are_straight_lines_or_a_spline() {
+fn points_of_a_contour_are_joined_by_straight_lines_or_by_a_spline() {
     let folder = tempfile::tempdir().unwrap();
     let mut text = "r, z\n# half a circle\n".to_string();
     for i in 0..=25 {
@@ -456,7 +456,7 @@ fn points_are_straight_lines_or_a_spline() {
     assert!(said.contains("1 point(s); a contour needs at least two"), "{said}");
 }
 
-/// A drawing in millimetres with y downwards: a hemispherical bottom as an arc, a wall, a top dome as two curves (a
+/// The drawing is in millimetres with y downwards: a hemispherical bottom as an arc, a wall, a top dome as two curves (a
 /// quarter circle as a cubic is accurate to 3e-4), closed along the axis. The path has absolute and relative commands.
 #[test]
 fn a_contour_is_read_from_an_svg_drawing() {
@@ -534,7 +534,7 @@ fn every_example_file_of_a_tank_is_read_and_solved() {
 }
 
 #[test]
-fn a_contour_has_at_most_200_segments() {
+fn a_contour_of_a_tank_with_more_than_200_segments_is_refused() {
     let parsed = |count: usize| {
         let z = |i: usize| i as f64 / (count - 1) as f64;
         let line = |i: usize| format!("{{ line = [1, {}, 1, {}] }}", z(i), z(i + 1));
@@ -563,7 +563,7 @@ fn a_result_states_if_the_tank_is_a_body_of_revolution_or_a_box() {
     }
 }
 
-/// The printed table of a box of 0.8 m by 0.5 m, which has modes along both sides: each number stands below its heading.
+/// The box of 0.8 m by 0.5 m has modes along both sides. In the printed table each number must stand below its heading.
 #[test]
 fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
@@ -597,7 +597,8 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     assert_eq!(rows.matches("n along y").count(), 1, "{rows}");
 }
 
-/// Sets each dimension, one at a time, to its limit, which is refused, and to a value slightly above it, which is accepted.
+/// Sets each dimension, one at a time, to its limit, which must be refused, and to a value slightly above it, which must be
+/// accepted.
 #[test]
 fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
     let dome = |bottom: f64, top: f64| {
@@ -652,7 +653,7 @@ fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
 }
 
 #[test]
-fn modes_are_numbered_from_1() {
+fn the_first_slosh_mode_of_a_tank_has_the_number_1() {
     for text in [
         "shape = { cylinder = { radius = 1.0, height = 1.0 } }",
         "shape = { annulus = { inner_radius = 0.3, outer_radius = 1.0, height = 2.0 } }",
@@ -708,8 +709,8 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
     assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
 }
 
-/// Writes a parameter file from a result with damping and from a result without. Both files are equal, because the file
-/// computes the damping for its own liquid.
+/// A parameter file is written from a result with damping and from a result without. Both files must be equal, because the
+/// file computes the damping for its own liquid.
 #[test]
 fn parameter_files_use_the_damping_of_their_own_liquid_and_not_of_the_result() {
     let text = "density = 875.0\n\
@@ -740,7 +741,7 @@ fn parameter_files_use_the_damping_of_their_own_liquid_and_not_of_the_result() {
     }
 }
 
-/// The mass of a fill, computed without the modes, is bit-identical to the mass in the solution with modes, at every fill
+/// The function for the mass computes no modes. Its result must be bit-identical to the mass in the solution, at every fill
 /// and in a full tank.
 #[test]
 fn the_mass_without_modes_equals_the_mass_of_the_solution_with_modes() {

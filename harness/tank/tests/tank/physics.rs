@@ -3,9 +3,8 @@
 use crate::common::{reference, solve, tank, toml};
 use hubslosh_tank::closed_form;
 
-/// The hinge of every mode is at the centre of the sphere, because the wall does no work on the liquid if the sphere
-/// rotates about its centre. The required accuracy is 1e-6 R. The height of a mode is m h divided by m, so that its
-/// error is 1e-10 divided by the mass ratio.
+/// The wall does no work on the liquid if the sphere rotates about its centre, so that all hinges are there. The required
+/// accuracy is 1e-6 R. The height of a mode is m h divided by m, so that its error is 1e-10 divided by the mass ratio.
 #[test]
 fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     for i in 1..20 {
@@ -24,8 +23,8 @@ fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     }
 }
 
-/// Compares with the half-full sphere of Budiansky (1960), to more digits, and with a table over the fill whose nine digits
-/// were computed twice. The tolerance is half a unit of the last digit.
+/// The reference values are those of Budiansky (1960) for the half-full sphere, to more digits, and a table over the fill
+/// whose nine digits were computed twice. The tolerance is half a unit of the last digit.
 #[test]
 fn spheres_have_the_known_frequencies_and_masses() {
     let table = [
@@ -50,9 +49,9 @@ fn spheres_have_the_known_frequencies_and_masses() {
     }
 }
 
-/// Nearly empty, the sphere is a shallow paraboloid: lambda_n R tends to 2 n^2 - 1, with corrections of the order of h/R
-/// times n^4. Nearly full, it is the ice-fishing problem (a small circular opening in a plane lid), in which lambda_1 times
-/// the radius of the surface is 2.7547.
+/// A nearly empty sphere is a shallow paraboloid, with lambda_n R = 2 n^2 - 1 and corrections of the order of h/R times n^4.
+/// A nearly full sphere is the ice-fishing problem (a small circular opening in a plane lid), in which lambda_1 times the
+/// radius of the surface is 2.7547.
 #[test]
 fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     let data = solve("shape = { sphere = { radius = 1.0 } }", 1e-3, 3);
@@ -66,8 +65,9 @@ fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     assert!((data.modes[0].m / (1000.0 * a.powi(3)) - 1.933).abs() < 0.01);
 }
 
-/// A shallow spherical dish leaves almost no inertia after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
-/// the computed I_0 consists of its error. The fixed mass is at the sphere's centre, 7 to 220 R above the liquid.
+/// In a shallow spherical dish almost no inertia is left after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
+/// the computed inertia of the fixed mass consists of its error. The fixed mass is at the sphere's centre, 7 to 220 R above
+/// the liquid.
 #[test]
 fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     for fill in [1e-2, 1e-3, 1e-4, 1e-5] {
@@ -81,9 +81,9 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     }
 }
 
-/// Compares effective inertias in closed form with sums over 20,000 modes, whose remainder is 50^-3 of the remainder after
-/// 400 modes. In shallow liquid an earlier sum of 400 modes was wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for the
-/// annulus, although the stated error was 1e-11.
+/// Effective inertias in closed form are compared with sums over 20,000 modes, whose remainder is 50^-3 of the remainder
+/// after 400 modes. In shallow liquid an earlier sum of 400 modes was wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for
+/// the annulus, although the stated error was 1e-11.
 #[test]
 fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     let xi = closed_form::zeros_of_j1_slope(20_000);
@@ -110,8 +110,8 @@ fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     assert!(off.abs() < 1e-11, "annulus: {off}");
 }
 
-/// I_0 = I_eff - m_0 h_0^2 - sum m h^2 is a difference, so that its stated error is at least the error of I_eff and grows
-/// with the distance of the fixed mass from the centre of mass.
+/// The inertia of the fixed mass is a difference, I_eff - m_0 h_0^2 - sum m h^2. Its stated error must be at least the error
+/// of the effective inertia I_eff, and must grow with the distance of the fixed mass from the centre of mass.
 #[test]
 fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     for (shape, fill) in [
@@ -127,8 +127,8 @@ fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     }
 }
 
-/// The exact solution is phi_1 = r z, with lambda_1 = 1/h, m_1 = 3/4 of the liquid, H_1 = 0.6 h, the hinge at 1.6 h,
-/// and the wave h. All other modes have no mass, and the fixed quarter of the liquid is above the liquid's centre.
+/// The exact potential is phi_1 = r z, with lambda_1 = 1/h, m_1 = 3/4 of the liquid, H_1 = 0.6 h, the hinge at 1.6 h, and the
+/// wave h. All other modes have no mass, and the fixed quarter of the liquid is above the liquid's centre.
 #[test]
 fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     for h in [0.3, 1.2] {
@@ -148,7 +148,7 @@ fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     }
 }
 
-/// The fixed mass is positive for any number of modes, because it is an added mass with pressure 0 on the surface.
+/// The fixed mass must be positive, because it is an added mass with pressure 0 on the surface.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn the_fixed_mass_is_positive_for_any_number_of_modes() {
@@ -163,8 +163,7 @@ fn the_fixed_mass_is_positive_for_any_number_of_modes() {
     }
 }
 
-/// Compares the closed forms with the boundary integral equation, which uses only the contour and has an error of 1e-10
-/// here.
+/// The boundary integral equation uses only the contour and has an error of 1e-10 here.
 #[test]
 fn closed_forms_agree_with_the_boundary_integral_equation() {
     let upright = |r: f64, h: f64| {
@@ -236,8 +235,8 @@ fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     );
 }
 
-/// The FMU's own formulas for an upright cylinder are m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2
-/// xi h/d)) and a wave of 2 R/(xi^2 - 1) per angle.
+/// The FMU's formulas for an upright cylinder are m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2 xi
+/// h/d)) and a wave of 2 R/(xi^2 - 1) per angle.
 #[test]
 fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
     let (d, h) = (0.163, 0.1);
@@ -256,10 +255,10 @@ fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
     }
 }
 
-/// If all lengths are multiplied by c, lambda is divided by c, masses grow as c^3 and inertias as c^5. A shift of the
-/// contour along the axis shifts all heights by the same amount and changes nothing else.
+/// If all lengths are multiplied by c, wave numbers must be divided by c, masses must grow as c^3 and inertias as c^5. A
+/// shift of the contour along the axis must shift all heights by the same amount and change nothing else.
 #[test]
-fn results_scale_and_shift_with_the_contour() {
+fn slosh_modes_scale_and_shift_with_the_contour_of_the_tank() {
     let profile = |c: f64, z: f64| {
         format!(
             "profile = [{{ ellipse = [0, {}, {}, {}, -90, 0] }}, {{ line = [{c}, {}, {}, {}] }}]",
@@ -285,8 +284,7 @@ fn results_scale_and_shift_with_the_contour() {
     }
 }
 
-/// A wall that is cut into more segments than necessary, near the angle at which two segments count as a corner, gives the
-/// same result.
+/// The wall is cut near the angle at which two segments count as a corner. The result must not change.
 #[test]
 fn cutting_a_wall_into_more_segments_changes_nothing() {
     let one = solve("profile = [{ arc = [0, 1, 1, -90, 30] }]", 1.3, 5);
@@ -301,16 +299,16 @@ fn cutting_a_wall_into_more_segments_changes_nothing() {
     }
 }
 
-/// Covers nearly full and nearly empty tanks, cusps and thin gaps, where the solver is less accurate. The true error is
-/// known from the hinge of a sphere and from the closed form of an annulus.
+/// Covers nearly full and nearly empty tanks, cusps and thin gaps, where the solver is less accurate. The true error is known
+/// from the hinge of a sphere and from the closed form of an annulus.
 #[test]
-fn the_stated_error_holds_in_tanks_that_are_hard_to_solve() {
+fn the_true_error_is_below_the_stated_error_in_tanks_that_are_hard_to_solve() {
     compare_hinges_of_spheres(&[0.01, 1.99]);
 }
 
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
-fn the_stated_error_holds_in_an_almost_full_sphere_and_in_a_thin_gap() {
+fn the_true_error_is_below_the_stated_error_in_an_almost_full_sphere_and_in_a_thin_gap() {
     compare_hinges_of_spheres(&[1e-3, 1.95, 1.999, 1.9999]);
     let gap = "profile = [{ line = [0.98, 0.9, 0.98, 0] }, { line = [0.98, 0, 1, 0] }, { line = [1, 0, 1, 0.9] }]";
     let (exact, solved) = (closed_form::annulus(0.98, 1.0, 0.9, 1000.0, 5), solve(gap, 0.9, 5));
@@ -333,8 +331,8 @@ fn compare_hinges_of_spheres(fills: &[f64]) {
     }
 }
 
-/// A full tank has no free surface, so that its errors are stated relative to its radius of gyration and do not depend on
-/// the tank's size. The sizes differ by powers of two, so that all digits must agree.
+/// A full tank has no free surface, so that its errors are stated relative to its radius of gyration. The sizes differ by
+/// powers of two, so that all digits must agree.
 #[test]
 fn a_full_tank_s_error_does_not_depend_on_its_size() {
     let error = |c: f64| {
@@ -346,12 +344,12 @@ fn a_full_tank_s_error_does_not_depend_on_its_size() {
     assert_eq!([error(0.0625), error(16.0)], [error(1.0); 2]);
 }
 
-/// Thin liquids and small details are solved as accurately as other tanks. For a lens and a needle, two discretisations
-/// differ by 2e-7, so that a third, finer one is used. A knuckle of 2 % of the radius gets panels that are as short as the
-/// gap between its ends. A shelf 2 cm thick, 2 cm above the floor, needs shorter panels for an error of 1e-6.
+/// For a lens and a needle, two discretisations differ by 2e-7, so that a third, finer one is used. A knuckle of 2 % of the
+/// radius gets panels that are as short as the gap between its ends. A shelf 2 cm thick, 2 cm above the floor, needs shorter
+/// panels for an error of 1e-6.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
-fn thin_liquids_and_small_details_are_solved_as_well_as_others() {
+fn thin_liquids_and_small_details_are_solved_as_accurately_as_other_tanks() {
     let lens = "shape = { spheroid = { radius = 1.0, half_height = 0.05 } }";
     let needle = "shape = { spheroid = { radius = 0.05, half_height = 1.0 } }";
     let knuckle = "shape = { torispherical = { radius = 1.0, height = 1.0, crown_radius = 2.0, knuckle_radius = 0.02 } }";
@@ -368,10 +366,10 @@ fn thin_liquids_and_small_details_are_solved_as_well_as_others() {
     }
 }
 
-/// A dome that bulges into the tank meets the cylinder in a cusp. The result differs only slightly from the result for a
+/// A dome that bulges into the tank meets the cylinder in a cusp. The result must differ only slightly from the result for a
 /// tank in which the last 1e-3 R of the cusp is filled up.
 #[test]
-fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
+fn a_cusp_at_the_edge_of_an_inverted_dome_hardly_changes_the_result() {
     let cusp = solve(
         "shape = { domed_cylinder = { radius = 1.0, height = 1.0, bottom = -0.4, top = 0.0 } }",
         0.7,
@@ -393,8 +391,8 @@ fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
     }
 }
 
-/// Wave numbers scale as inverse lengths. In a thin annulus the first wave number is 1/R (a wave around the circle), and
-/// the next ones are n pi/(R - R_i) (standing waves between the two walls).
+/// Wave numbers must scale as inverse lengths. In a thin annulus the first wave number tends to 1/R (a wave around the
+/// circle), and the next ones to n pi/(R - R_i) (standing waves between the two walls).
 #[test]
 fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     let ones = closed_form::annular_wave_numbers(0.4, 1.0, 5);
@@ -417,7 +415,7 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     }
 }
 
-/// For each axis of the box, lambda times the length along the waves is k L tanh(k h) with k L = pi, 3 pi, ….
+/// For each axis of the box, lambda times the length L along the waves is k L tanh(k h) with k L = pi, 3 pi, ….
 #[test]
 fn each_axis_of_a_box_has_the_frequencies_of_its_length() {
     let data = closed_form::rectangular(0.8, 0.5, 0.2, 1000.0, 2);

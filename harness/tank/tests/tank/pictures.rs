@@ -5,8 +5,8 @@ use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::third_order::Overlaps;
 use hubslosh_tank::{Tank, picture, table};
 
-/// Asserts that a drawing equals the committed file. If `HUBSLOSH_DRAW` is set, the drawing is
-/// written to this file instead, so that it can be looked at.
+/// Asserts that the drawing `svg` equals the committed `file`. If `HUBSLOSH_DRAW` is set, the drawing is written to this file
+/// instead, so that it can be looked at.
 fn is_drawn(svg: &str, file: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     if std::env::var_os("HUBSLOSH_DRAW").is_some() {
@@ -41,7 +41,7 @@ fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }
 
-/// A tank four times as large is drawn with the same lines; only the numbers at the axes differ.
+/// A tank four times as large must be drawn with the same lines; only the numbers at the axes differ.
 #[test]
 fn the_picture_of_a_scaled_tank_has_identical_lines() {
     let drawn = |factor: f64| {
@@ -83,7 +83,7 @@ fn a_sweep_with_equal_values_at_all_fills_can_be_drawn() {
 }
 
 #[test]
-fn examples_can_be_drawn_and_tabulated() {
+fn the_example_tanks_can_be_drawn_and_tabulated() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -118,9 +118,9 @@ fn points(path: &str) -> Vec<[f64; 2]> {
     path.split(['M', 'L']).skip(1).map(place).collect()
 }
 
-/// Compares the area of the liquid to the right of the axis, divided by the squared distance from the axis to the
-/// tank's wall, with its exact value: for example fill over radius for a cylinder. The tolerance is a hundredth of a
-/// pixel of some hundred pixels.
+/// Compares the area of the liquid to the right of the axis, divided by the squared distance from the axis to the tank's
+/// wall, with its exact value: for example fill over radius for a cylinder. The tolerance is a hundredth of a pixel of some
+/// hundred pixels.
 #[test]
 fn the_drawn_liquid_has_the_area_of_the_wetted_section() {
     for (text, fill, area) in [

@@ -10,8 +10,8 @@ use hubslosh_tank::{Fill, Tank};
 
 const RHO: f64 = 1000.0;
 
-/// Returns the volume and the rotating liquid of a tank that is filled to the fraction `share` of its volume, with g =
-/// 1 m/s², or 0 if `weightless` is true, and Omega^2 R/g = `flatness` for R = 1 m.
+/// Returns the volume and the rotating liquid of a tank of 1 m radius that is filled to the fraction `share` of its volume.
+/// `flatness` is the spin number Omega^2 R/g with g = 1 m/s²; if `weightless` is true, g is 0.
 fn spin_tank(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Spin) {
     let tank = Tank::from_shape(shape, RHO).unwrap();
     let data = tank.solve(tank.fill_height(Fill::Share(share)).unwrap(), 1).unwrap();
@@ -23,8 +23,8 @@ fn close(found: f64, expected: f64, error: f64) {
     assert!((found - expected).abs() <= error, "{found} is not {expected} within {error}");
 }
 
-/// The free surface in an upright cylinder of radius 1 m is a paraboloid with closed forms, as long as the whole floor
-/// is wet and the surface stays below the lid.
+/// The free surface in an upright cylinder of radius 1 m is a paraboloid with closed forms, as long as the whole floor is wet
+/// and the surface stays below the lid.
 #[test]
 fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
@@ -37,9 +37,10 @@ fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     }
 }
 
-/// Without thrust the surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 - f^(2/3)) in a sphere.
+/// Without thrust the surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 - f^(2/3)) in a
+/// sphere filled to the fraction f.
 #[test]
-fn weightless_liquid_lies_at_the_wall() {
+fn weightless_liquid_in_a_spinning_tank_lies_at_the_wall() {
     let (m, found) = spin_tank(Shape::Cylinder { radius: 1.0, height: 2.0 }, 0.3, 1.0, true);
     close(found.r_dry, 0.7_f64.sqrt(), 1e-12);
     close(found.i_axis / m, 0.5 * (1.0 + 0.7), 1e-12);
@@ -53,8 +54,8 @@ fn weightless_liquid_lies_at_the_wall() {
     }
 }
 
-/// If both poles of the sphere are dry, the wall's pressure acts everywhere through the centre of the sphere. Equilibrium
-/// in the rotating frame therefore puts the centre of mass at z_cg = -g/Omega^2 from the centre, for any fill.
+/// If both poles of the sphere are dry, the wall's pressure acts everywhere through the centre of the sphere. Equilibrium in
+/// the rotating frame therefore puts the centre of mass at z_cg = -g/Omega^2 from the centre, for any fill.
 #[test]
 fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     for (share, flatness) in [(0.25, 5.0), (0.25, 10.0), (0.5, 5.0), (0.5, 30.0)] {
@@ -64,9 +65,9 @@ fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     }
 }
 
-/// An independent program computed the expected values to 8 digits by integration over the section. Each row has the
-/// fraction of the volume, Omega^2 R/g, z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), and the heights of the
-/// apex and of the contact line.
+/// The other program computed the expected values to 8 digits by integration over the section. Each row has the fraction of
+/// the volume, Omega^2 R/g, z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), and the heights of the apex and of the
+/// contact line.
 #[test]
 fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     let rows = [
@@ -85,10 +86,10 @@ fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     }
 }
 
-/// At every spin the mass equals the mass at rest. At a spin of almost 0, centre of mass and inertias also equal their
-/// values at rest.
+/// At every spin the mass must equal the mass at rest. At a spin of almost 0, centre of mass and inertias must also equal
+/// their values at rest.
 #[test]
-fn a_slow_spin_changes_nothing() {
+fn spin_keeps_the_mass_and_a_slow_spin_also_keeps_centre_and_inertia() {
     let shapes = [
         Shape::DomedCylinder { radius: 0.7, height: 1.0, bottom: -0.2, top: 0.3 },
         Shape::Annulus { inner_radius: 0.3, outer_radius: 1.0, height: 1.0 },
@@ -106,8 +107,8 @@ fn a_slow_spin_changes_nothing() {
     }
 }
 
-/// The expected frequencies come from a solution that is valid for any spin rate. They are the frequencies in the rotating frame
-/// of the tank, in units of sqrt(g/R), for waves that run against the spin and with the spin.
+/// The expected frequencies come from a solution that is valid for any spin rate. They are the frequencies in the rotating
+/// frame of the tank, in units of sqrt(g/R), for waves that run against the spin and with the spin.
 #[test]
 fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liquid() {
     let rows = [
@@ -125,10 +126,10 @@ fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liqu
     }
 }
 
-/// A spinner of radius 0.3 m, filled to 0.4 m, at 5 m/s² and 9 rad/s. The inertia about the axis is 5.09 kg·m² of the
-/// liquid at rest and 6.38 kg·m² of the rotating liquid, whose surface touches a lid at 0.6 m.
+/// The tank of radius 0.3 m is filled to 0.4 m, at 5 m/s² and 9 rad/s. The inertia about the axis is 5.09 kg·m² of the liquid
+/// at rest and 6.38 kg·m² of the rotating liquid, whose surface touches a lid at 0.6 m.
 #[test]
-fn a_spinner_beyond_the_model_is_out_of_range() {
+fn liquid_that_spins_too_fast_for_a_pendulum_is_out_of_range() {
     let tank = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
     let data = tank.solve(0.4, 1).unwrap();
     let found = spin(&tank, &data, 9.0, 5.0, None).unwrap();
@@ -152,7 +153,7 @@ fn a_spinner_beyond_the_model_is_out_of_range() {
 /// The expected mass of the spinning liquid is computed by an independent integral over the radius, 2 pi rho int r
 /// (z_surface - z_floor) dr.
 #[test]
-fn an_annulus_bares_its_floor_at_the_inner_wall() {
+fn spin_bares_the_floor_of_an_annulus_at_its_inner_wall() {
     let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };
     let (m, found) = spin_tank(shape, 0.1, 3.0, false);
     // z = (r^2 - r_dry^2) Omega^2/(2 g) above the floor, from r_dry to the wall
@@ -164,7 +165,7 @@ fn an_annulus_bares_its_floor_at_the_inner_wall() {
 
 /// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it would lie in two pools.
 #[test]
-fn liquid_in_two_pools_is_refused() {
+fn spin_that_would_divide_the_liquid_into_two_pools_is_refused() {
     let hourglass = "density = 1000\nprofile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 0.5] }, \
                      { line = [0.5, 0.5, 1.5, 0.5] }, { line = [1.5, 0.5, 1.5, 1.5] }]";
     let tank = Tank::parse(hourglass, ".".as_ref()).unwrap();
@@ -190,9 +191,10 @@ fn spin_is_refused_for_boxes_full_tanks_and_invalid_rates() {
     assert!(spin(&sphere, &full, 1.0, 5.0, None).unwrap_err().to_string().contains("full"));
 }
 
-/// spin_decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright cylinder at h/R = 1 is 0.496.
+/// In the parameter file, spin_decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright cylinder at
+/// h/R = 1 is 0.496.
 #[test]
-fn parameters_have_the_spin_of_the_liquid() {
+fn parameter_files_have_the_spin_decay_and_the_gyroscopic_coefficient() {
     let of = |shape: Shape, nu: Option<f64>, target: Target| {
         let tank = Tank::from_shape(shape, RHO).unwrap();
         let liquid = Liquid { gravity: 5.0, nu, sigma: None, contact_angle: 90.0, spin: Some(2.0) };
