@@ -468,7 +468,7 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
 /// The lumped matrix is added to the equations of the body, or it is a part of the body itself; the body also receives the
 /// bias of the tank. The tests cover added masses up to 6 times the mass of the body.
 #[test]
-fn lumped_coupling_is_stable_and_converges_up_to_lambda_6() {
+fn lumped_coupling_is_stable_and_converges_up_to_six_times_the_mass_of_the_body() {
     let lambda = ratio(Tank::default());
     for target in [0.3, 1.3, 6.0] {
         for exchange in [Exchange::Lumped, Exchange::RigidBody] {

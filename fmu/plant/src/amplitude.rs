@@ -34,8 +34,8 @@ use taylor::series::{Series, ZERO, mul_ramp, sqrt, square, time_within, values};
 
 const FLOOR: f64 = 1e-4;
 
-/// Smallest restoring stiffness W, as a multiple of 1/l times 1 m/s2. Without restoring force there is no drag, but the power
-/// series need a value above 0.
+/// Specific force, m/s2, that is added in the squared natural frequency W = g/l of a pendulum, because the power series of the
+/// drag need a W above 0 also without restoring force.
 const WEIGHTLESS: f64 = 1e-6;
 
 const ROUNDED: f64 = 0.02;
@@ -56,7 +56,7 @@ impl Breaking {
 /// The part of one mode's drag that grows with the amplitude of the wave, as power series in time. The equations are at the
 /// head of the file.
 /// - `zeta`: damping ratio per slosh angle, zeta_A, 1/rad.
-/// - `w`: restoring stiffness W and its rate; `w_floor`, 1/s2, is added to it.
+/// - `w`: squared natural frequency W and its rate; `w_floor`, 1/s2, is added to it.
 /// - `share`, `gain`, `gain_breaking`: the drag that does not grow, and the factors of the two parts that grow, each divided
 ///   by the whole drag at the start of the series.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,8 +107,8 @@ impl Growth {
         Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts the power series of the drag, and returns the whole drag coefficient at their start. `w` is the restoring
-    /// stiffness W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is the slosh mass, kg. `c`
+    /// Starts the power series of the drag, and returns the whole drag coefficient at their start. `w` is the squared natural
+    /// frequency W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is the slosh mass, kg. `c`
     /// is the drag coefficient that does not depend on the amplitude; its viscous part changes in time as the series
     /// `viscous`.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {

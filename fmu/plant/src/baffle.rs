@@ -38,14 +38,14 @@ const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 /// this smallest amplitude, A_0 increases the damping by 2e-4 of its value.
 const FLOOR: f64 = 0.03;
 
-/// Smallest restoring stiffness W, as a multiple of 1/l times 1 m/s2. Without restoring force there is no drag, but the power
-/// series need a value above 0.
+/// Specific force, m/s2, that is added in the squared natural frequency W = g/l of a pendulum, because the power series of the
+/// drag need a W above 0 also without restoring force.
 const WEIGHTLESS: f64 = 1e-6;
 
 /// A ring baffle and its drag on one mode, as power series in time. The equations are at the head of the file.
 /// - `zeta`: damping ratio Z at a slosh angle of 1 rad; 0 without a baffle.
 /// - `floor2`: square of the angle A_0.
-/// - `w`: restoring stiffness W and its rate; `w_floor`, 1/s2, is added to it.
+/// - `w`: squared natural frequency W and its rate; `w_floor`, 1/s2, is added to it.
 /// - `viscous`: viscous drag divided by its value at the start of the series.
 /// - `share`, `gain`: the viscous drag, and the factor of the baffle's drag, each divided by the whole drag at the start of
 ///   the series.
@@ -168,7 +168,7 @@ impl Baffle {
     }
 
     /// Returns the amplitude of the slosh angle, rad, and the damping ratio that the baffle adds at this amplitude. `w` is
-    /// the restoring stiffness W, 1/s2; the array contains the squares of the slosh angle and of its rate.
+    /// the squared natural frequency W, 1/s2; the array contains the squares of the slosh angle and of its rate.
     pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
         let w = w + T::constant(self.w_floor);
         let amplitude = (q2 + v2 / w).sqrt();
@@ -176,7 +176,7 @@ impl Baffle {
     }
 
     /// Starts the power series of the drag, and returns the drag coefficient of baffle and viscosity together at their start.
-    /// `w` is the restoring stiffness W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is
+    /// `w` is the squared natural frequency W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is
     /// the slosh mass, kg, and `c` the viscous drag coefficient, which changes in time as the series `viscous`.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];

@@ -23,14 +23,12 @@ use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 /// stop at the time events of the FMU.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
+#[allow(missing_docs)]
 impl Plant {
-    /// Returns the continuous states, whose indices are in the module [`x`].
     pub fn continuous_states(&self) -> &[f64; STATES] {
         &self.state.x
     }
 
-    /// Sets the continuous states, whose indices are in the module [`x`], to the values that the importing tool has
-    /// integrated.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.state.x = *x;
     }
@@ -44,7 +42,6 @@ impl Plant {
         }
     }
 
-    /// Returns the time derivatives of the continuous states.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);

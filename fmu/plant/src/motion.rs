@@ -167,7 +167,6 @@ impl Motion {
         x * e_y[n] - y * e_x[n]
     }
 
-    /// Returns the torques of gravity on the dry hub and on the rigid liquid of a tilted bench, N m.
     pub fn gravity_torques<T: Number>(&self) -> [T; 2] {
         let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
         [e_y * x - e_x * y, e_y * self.rigid_moment]

@@ -69,8 +69,8 @@ pub(crate) fn unsigned_zero(x: f64) -> f64 {
     x + 0.0
 }
 
+#[allow(missing_docs)]
 impl Plant {
-    /// Returns the outputs at the present time, for the present values of the inputs.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.apply_present_contact(inputs);
         let mut outputs = self.outputs_held(inputs);

@@ -129,6 +129,7 @@ fn rounding(h: f64) -> f64 {
     4.0 * f64::EPSILON * h
 }
 
+#[allow(missing_docs)]
 impl Plant {
     /// Returns a message for each combination of parameters that is not allowed. Problems that depend on the initial motion
     /// are not among them.
@@ -252,12 +253,10 @@ impl Plant {
         self.state.x[x::OMEGA]
     }
 
-    /// Returns the values that were calculated from the parameters.
     pub fn calculated(&self) -> &Calculated {
         &self.calculated
     }
 
-    /// Returns the state, which determines all further motion together with parameters and inputs.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -267,12 +266,10 @@ impl Plant {
         self.state = *state;
     }
 
-    /// Returns the step that has stopped at an event, if any, for saving.
     pub fn stopped(&self) -> Option<&StoppedStep> {
         self.stopped.as_ref()
     }
 
-    /// Restores a saved step that has stopped at an event.
     pub fn set_stopped(&mut self, stopped: Option<StoppedStep>) {
         self.stopped = stopped;
     }
@@ -475,7 +472,6 @@ impl Plant {
         }
     }
 
-    /// Restores the contact `before` that [`Plant::apply_present_contact`] has returned.
     pub fn revert_contact(&mut self, before: Contact) {
         self.state.contact = before;
     }

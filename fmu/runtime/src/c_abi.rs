@@ -22,7 +22,6 @@ use crate::version::Version;
 
 // ---- Status and logger ----
 
-/// Return value of an FMI function.
 pub type Status = c_int;
 pub const OK: Status = 0;
 /// Status with which warnings are sent to the host's log. No function returns it.
@@ -45,7 +44,6 @@ fn status(severity: Severity) -> Status {
 /// and message.
 pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 
-/// Sends the messages of one instance to the host's logger.
 #[allow(missing_docs)]
 pub struct Log {
     logger: Option<Logger>,

@@ -254,7 +254,6 @@ pub enum Severity {
     Fatal,
 }
 
-/// The reason why a call has failed.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Fault {

@@ -20,7 +20,6 @@ impl From<&str> for StepFailure {
     }
 }
 
-/// How a step of [`Model::step_to_event`] has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum StepEnd {
@@ -36,6 +35,7 @@ pub enum StepEnd {
 ///
 /// The runtime saves the state of a simulation as a clone of the model, so that a model must not keep data elsewhere. All
 /// times are in s. Functions that a smooth model without events does not need have a default implementation.
+#[allow(missing_docs)]
 pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// All parameters of the model; their default values are the start values.
     type Parameters: Clone + Debug + Default;
@@ -115,7 +115,6 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         let _ = inputs;
     }
 
-    /// Returns the outputs for the present states and the given inputs.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
     /// Computes only those outputs that are integers, enumerations or Booleans, and writes them to `outputs`; their values
@@ -139,13 +138,11 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// [`Variable::state`](crate::variable::Variable::state) states.
     fn continuous_states(&self) -> &[f64];
 
-    /// Sets the continuous states to the values that the integrator of the host has computed (Model Exchange).
     fn set_continuous_states(&mut self, x: &[f64]);
 
     /// Sets the simulation time to the time `now` that the host has passed (Model Exchange).
     fn set_time(&mut self, now: Instant);
 
-    /// Computes the derivatives of the continuous states by time.
     fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
 
     /// Computes the directional derivative of the model for a change of the states by `dx` and of the inputs by the slopes in
@@ -230,7 +227,6 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         0
     }
 
-    /// Returns a text about the last event for the log, which says what happened and when.
     fn last_event(&self) -> String {
         String::new()
     }

@@ -20,7 +20,6 @@ use crate::model::Model;
 use crate::table::{GUID_LENGTH, Scalar, Table};
 use crate::variable::{Access, Causality, Dimension, Value};
 
-/// Name of the file with the start values of a reduced model description, in the folder `resources` of the FMU.
 pub const START_VALUES: &str = "start_values.txt";
 
 const DIGITS: usize = SIZES + 6;
@@ -32,12 +31,9 @@ const SIZES: usize = 3;
 pub struct Extent {
     token: String,
     sizes: Vec<(&'static str, usize)>,
-    /// Indices of the continuous states that the reduced description contains, in the order in which the host reads them.
-    /// They are indices in the model's state vector, which also has the states of all other tanks and modes.
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
-    /// Start values of inputs that differ from those in the table, each with the position of the input in the table.
     inputs: Vec<(usize, f64)>,
 }
 
@@ -188,8 +184,6 @@ fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) 
     }
 }
 
-/// Returns the checksum of a file of start values, four hexadecimal digits that are part of the token of a reduced
-/// description.
 pub fn checksum(text: &str) -> String {
     // 0 means that there is no file.
     let sum = (Hash::new().bytes(text.as_bytes()).value() & 0xffff).max(1);

@@ -11,7 +11,6 @@ impl Hash {
         Hash(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
 
-    /// Returns the hash after the bytes were added.
     pub fn bytes(mut self, bytes: &[u8]) -> Hash {
         for byte in bytes {
             self.0 ^= u128::from(*byte);

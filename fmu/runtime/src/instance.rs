@@ -103,21 +103,19 @@ impl<M: Model> Iterator for Places<M> {
 
 impl<M: Model> ExactSizeIterator for Places<M> {}
 
-/// Result of a step that may stop at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct StepInfo {
-    /// True if the host must handle an event now.
     pub event: bool,
     /// True if the step has stopped at an event before its end.
     pub early: bool,
 }
 
-/// Result of handling an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct EventInfo {
-    /// True if the FMU has changed continuous states.
     pub states_changed: bool,
-    /// Time of the next time event, s, if there is one.
+    /// Time of the next time event, s; `None` if there is none.
     pub next_time: Option<f64>,
 }
 

@@ -10,7 +10,6 @@ use crate::model::Model;
 use crate::table::Table;
 use crate::version::Version;
 
-/// Topic of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Topic {
@@ -87,7 +86,6 @@ impl Filter {
     /// The reasons of failed calls, without warnings and events.
     pub const ERRORS: Filter = Filter { warning: false, ..Filter::FAILURES };
 
-    /// Returns this selection with the reasons of failed calls added.
     pub fn with_errors(self) -> Filter {
         Filter { discard: true, error: true, fatal: true, ..self }
     }

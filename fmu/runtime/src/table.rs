@@ -11,7 +11,6 @@ use crate::hash::Hash;
 use crate::unit::{self, Unit};
 use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Value, Variable};
 
-/// Properties of the FMU as a whole.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub struct About {
@@ -113,17 +112,14 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
     pub variable: &'static Variable<M>,
-    /// Access functions of the table's entry, copied to each of its scalars because every call needs them.
+    /// Access functions of the table's entry. Like C type and state, they are copied to each of its scalars because every
+    /// call needs them.
     pub access: Access<M>,
-    /// C type in which the host gets and sets the scalar, copied because every call needs it.
     pub c_type: CType,
-    /// For a continuous state, the function that returns its index in the model's state vector, copied because every call
-    /// needs it.
     pub state: Option<Place>,
     /// Position among all scalars of the table. The value reference follows from it (see
     /// [`Version`](crate::version::Version)).
     pub index: u32,
-    /// Number of the element in its array; 0 for the first element and for a scalar.
     pub element: usize,
     /// Index under which the instance stores the value. For a parameter it is the number of scalar parameters before it in
     /// the table, and for a discrete output the number of discrete outputs before it.

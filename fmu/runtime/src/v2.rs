@@ -443,7 +443,6 @@ fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedState: *const fmi2Byte, s
 fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status =
     perform_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode());
 
-/// Handles the events that are due, and writes to `eventInfo` if states have changed and when the next time event is.
 fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi2Status = {
     let call = Fmi2::NEW_DISCRETE_STATES;
     perform_start::<M, Fmi2>(c, call, |component| {
@@ -511,7 +510,6 @@ fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference,
     })
 };
 
-/// Makes one communication step. `noSetFMUStatePriorToCurrentPoint` has no effect, because the FMU stores no past states.
 fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean) -> fmi2Status = {
     let call = Fmi2::DO_STEP;
     perform::<M, Fmi2>(c, call, |component| {

@@ -242,7 +242,6 @@ fn fmi3SetShiftFraction(instance: fmi3Instance, valueReferences: *const fmi3Valu
 /// Does nothing, because fmi3UpdateDiscreteStates evaluates the discrete states.
 fn fmi3EvaluateDiscreteStates(instance: fmi3Instance) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &EVALUATE_DISCRETE_STATES, |_| Ok(()));
-/// Handles the events that are due, and writes to the arguments if states have changed and when the next time event is.
 fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, nominalsOfContinuousStatesChanged: *mut fmi3Boolean, valuesOfContinuousStatesChanged: *mut fmi3Boolean, nextEventTimeDefined: *mut fmi3Boolean, nextEventTime: *mut fmi3Float64) -> fmi3Status = {
     let call = Fmi3::NEW_DISCRETE_STATES;
     perform_if_allowed::<M, Fmi3>(instance, call, |component| {
@@ -264,8 +263,6 @@ fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *m
 };
 fn fmi3EnterContinuousTimeMode(instance: fmi3Instance) -> fmi3Status =
     perform::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
-/// Handles the host's message that its integrator has completed a step. `noSetFMUStatePriorToCurrentPoint` has no effect,
-/// because the FMU stores no past states.
 fn fmi3CompletedIntegratorStep(instance: fmi3Instance, _noSetFMUStatePriorToCurrentPoint: fmi3Boolean, enterEventMode: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean) -> fmi3Status =
     completed_step::<M, Fmi3, _>(instance, enterEventMode, terminateSimulation);
 fn fmi3SetTime(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status =

@@ -9,7 +9,6 @@ use crate::number::{is_finite, text};
 #[allow(missing_docs)]
 pub enum Value {
     Real(f64),
-    /// An integer, or the number of the item of an enumeration.
     Integer(i32),
     Boolean(bool),
 }
@@ -41,7 +40,6 @@ impl Value {
     }
 }
 
-/// The role of a variable, as FMI defines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Causality {
@@ -111,7 +109,6 @@ pub enum Kind {
 /// element if the state is an array; it is 0 for the first element and for a scalar.
 pub type Place = fn(usize) -> usize;
 
-/// Length of an array along one dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Dimension {
@@ -159,7 +156,6 @@ pub enum Access<M: Dynamics> {
     },
     /// A calculated parameter, which is constant in time. The function computes it from the model.
     Calculated(fn(&M, usize) -> f64),
-    /// A continuous state that is not an output.
     State,
     Derivative(Place),
 }
@@ -293,7 +289,6 @@ declarations! {
 
 #[allow(missing_docs)]
 impl<M: Dynamics> Variable<M> {
-    /// Declares a continuous state that is not an output.
     pub const fn state(
         name: &'static str,
         place: Place,
@@ -394,7 +389,6 @@ impl<M: Dynamics> Variable<M> {
         self.name.replace("[]", "")
     }
 
-    /// Returns false, because every variable has at least one scalar.
     pub const fn is_empty(&self) -> bool {
         false
     }

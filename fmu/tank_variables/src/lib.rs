@@ -19,7 +19,6 @@ pub trait Tanks: runtime::Dynamics {
     fn damping_law_kind(p: &mut Self::Parameters, i: usize) -> &mut i32;
 }
 
-/// Items of `damping_law`, in the order of [`DampingLaw::ALL`].
 pub static DAMPING_LAW: Enumeration = Enumeration {
     name: "DampingLaw",
     description: "Drag coefficient c of a mode as a function of its natural frequency omega",
@@ -45,7 +44,6 @@ pub static REGIME: Enumeration = Enumeration {
 
 static LIMITED_BY_ITEMS: [Item; LimitedBy::ITEMS.len()] = Item::list(LimitedBy::ITEMS);
 
-/// Items of `limited_by`, in the order of [`LimitedBy::ITEMS`].
 pub static LIMITED_BY: Enumeration = Enumeration {
     name: "LimitedBy",
     description: "Reason why no pendulum represents the liquid",

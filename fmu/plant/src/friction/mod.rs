@@ -94,7 +94,6 @@ pub trait FrictionLaw {
 /// plant uses. The compiler reports a missing law, because there must be one for every [`FrictionModel`].
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
-        /// The friction law that the plant uses.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
         pub enum Law {

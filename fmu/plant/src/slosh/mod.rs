@@ -175,7 +175,6 @@ pub trait SloshMode {
     const UNROLLED: bool = false;
     const MOVES_INERTIA: bool = true;
     fn new(pendulum: &Pendulum) -> Self;
-    /// Returns the reason why the motion cannot start as `_init` says, if any.
     fn start_problem(&self, _init: &Init) -> Option<String> {
         None
     }
@@ -218,7 +217,6 @@ pub trait SloshMode {
     fn torque<T: Number>(&self, hub: &HubMotion) -> T;
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns the reason why the slosh model is not valid at the coordinates `_q`, if any.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

@@ -186,7 +186,7 @@ fn errata_a10_a11_a_displaced_bob_swings_at_the_root_of_g_over_l() {
 }
 
 #[test]
-fn errata_b6_b7_b8_modes_have_the_exact_roots() {
+fn errata_b6_b7_b8_modes_have_the_values_of_the_exact_bessel_zeros() {
     // The expected values are those of Table 4.1 of the thesis, recomputed with the exact zeros of J1', rho = 1000 kg/m3 and
     // g = 9.81 m/s2, to the digits given. The rounded roots of the thesis make m_4 0.87 % too high and f_10 0.13 % too low.
     for (h, m_liq, m1, l1, f1, m4, f10, zeta) in [

@@ -71,7 +71,7 @@ fn reading_derivatives_that_are_not_finite_is_discarded() {
 }
 
 #[test]
-fn discrete_changes_happen_only_at_events() {
+fn discrete_values_change_only_at_events() {
     let mut instance = continuous(&[("inspection", 5.0)]);
     set(&mut instance, "z", 3.0).unwrap();
     assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(false)));

@@ -11,7 +11,6 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Dimension, Value, Variable};
 
-/// The scalars of each array variable, for the present array sizes.
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
     /// Value references that the scalars have in the layout of scalars, for one array variable after the other.
@@ -21,8 +20,6 @@ pub struct Arrays {
     /// For each scalar, the value reference of its array and its position in the array, counted from 1. The position is 0 if
     /// the scalar is outside the present length of the array.
     places: Vec<(u32, usize)>,
-    /// Positions of the continuous states that exist with the present array sizes, in the order in which the host reads them.
-    /// They are positions in the list of all states that exist with the largest sizes.
     states: Vec<usize>,
 }
 
@@ -151,7 +148,6 @@ pub fn time<M: Model>() -> u32 {
 /// Name of the array variable of event indicators, which FMI 3.0 requires in addition to the variables of the table.
 pub const INDICATORS: &str = "event_indicator";
 
-/// Returns the name of the variable with this value reference; `None` if there is no such variable.
 pub fn name<M: Model>(reference: u32) -> Option<String> {
     let beyond = reference.checked_sub(time::<M>());
     match beyond {
@@ -219,8 +215,7 @@ mod tests {
         assert!(Arrays::default().is_empty());
     }
 
-    /// The value reference of a scalar is mapped to its array and its index in the array. Beyond the present size of the
-    /// array the result is None.
+    /// A scalar that is within the present size of its array has a position in it; beyond the size there is none.
     #[test]
     fn a_scalar_has_an_array_and_an_index_within_its_size() {
         let arrays = Arrays::new::<Trays>(&parameters(2));

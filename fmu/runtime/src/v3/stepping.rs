@@ -16,7 +16,6 @@ use crate::model::Model;
 use crate::number::is_finite;
 use crate::version::Version;
 
-/// Computes the time derivatives of outputs at the end of the last step. All `orders` must be 1.
 pub(super) unsafe fn output_derivatives<M: Model>(
     instance: fmi3Instance,
     (references, count): References,
