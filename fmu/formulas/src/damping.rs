@@ -153,6 +153,7 @@ pub struct Part {
 }
 
 /// Fraction of the wetted wall that a measured shape needs in order to have its full effect on the interval of an estimate.
+/// If other shapes have at least this fraction, the wall counts as a wall of several shapes.
 const COUNTS: f64 = 0.05;
 
 /// Smallest ratio of a correlation's damping to the damping of the laminar layer at which the correlation still has some

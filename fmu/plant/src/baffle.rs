@@ -105,7 +105,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Returns a warning if Miles's formula does not hold for the ring baffle: because the ring is too wide, or because a table
+/// Returns a warning for each reason why Miles's formula does not hold for the ring baffle: the ring is too wide, or a table
 /// of modes describes the tank.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();

@@ -80,9 +80,9 @@ impl Limits {
         }
     }
 
-    /// Returns the first reason why the modes do not represent the liquid at present, or [`LimitedBy::None`]. `modes` yields
-    /// the slosh angles, the squared natural frequency, 1/s2, and the pendulum length, m, of each mode; `omega` is the rate
-    /// of the hub, rad/s.
+    /// Returns the most important reason why the modes do not represent the liquid at present, or [`LimitedBy::None`].
+    /// `modes` yields the slosh angles, the squared natural frequency, 1/s2, and the pendulum length, m, of each mode;
+    /// `omega` is the rate of the hub, rad/s.
     pub fn reason(&self, modes: impl Iterator<Item = (Angles, f64, f64)>, omega: f64) -> LimitedBy {
         let mut reason = LimitedBy::None;
         for (n, (angles, omega2, l)) in modes.enumerate() {

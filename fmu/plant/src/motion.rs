@@ -46,10 +46,10 @@ impl Stop {
         self.offset + t > self.passed
     }
 
-    /// Returns the time of the first gyro sample at which the step stops, s after the start of the stretch; `None` if there
-    /// is no such sample. Only the next `allowed` samples that are due until `h` count. `t` is the time in the stretch at
-    /// which the series begins, and `h` its length, s. The series begins `since_start` seconds after the start of the
-    /// simulation, and `next` is the number of the next sample.
+    /// Returns the time of the first gyro sample at which the step stops, s after the start of the present power series;
+    /// `None` if there is no such sample. The series begins `t` seconds after the start of the stretch and `since_start`
+    /// seconds after the start of the simulation, and it is used for `h` seconds. `next` is the number of the next sample;
+    /// only `allowed` samples are considered.
     // Arguments are passed by value, because a reference would force all data of a stretch into memory.
     #[cold]
     fn at_sample(
