@@ -19,12 +19,15 @@ use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
 use crate::xml;
 
 pub const MOST_ENTRIES: usize = 20_000;
-/// Longest name of an entry, bytes. Windows opens paths of up to 259 characters.
+/// Longest allowed name of a file in an archive, bytes. Windows opens paths of up to 259
+/// characters, so that longer names only occur in damaged or hostile archives.
 pub const LONGEST_NAME: usize = 1024;
-/// Total size to which the files of any archive may unpack, bytes.
+/// Total size to which the files of an archive of any size may unpack, bytes. It protects against
+/// archives that unpack to far more data than they contain.
 pub const UNPACKED: u64 = 64 << 20;
-/// Number of bytes to which the files may unpack for each byte of the archive, in addition to [`UNPACKED`]. Binaries
-/// usually compress to a third and descriptions to a twentieth.
+/// Number of unpacked bytes that are allowed for each byte of the archive, in addition to
+/// [`UNPACKED`]. Larger archives may therefore unpack to more; binaries usually compress to a third
+/// and descriptions to a twentieth.
 pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
@@ -41,8 +44,9 @@ impl Entry {
         self.name.ends_with('/')
     }
 
-    /// Returns the reason why this entry would be written outside the folder into which the archive is unpacked, or
-    /// `None` if it stays inside.
+    /// Returns the reason why the name of this entry is refused, for example because the file would
+    /// be written outside the folder into which the archive is unpacked. Returns `None` if the name
+    /// is acceptable.
     fn name_fault(&self) -> Option<&'static str> {
         let name = &self.name;
         if name.starts_with('/') || name.get(1..2) == Some(":") {
@@ -61,12 +65,12 @@ impl Entry {
     }
 }
 
-/// Returns the path under which the most lenient file system would store an entry. Windows and macOS ignore capitals.
-/// Windows drops full stops and spaces at the end of a part, and treats the text after a colon as the name of a
-/// stream of the file.
+/// Returns the path under which the most lenient file system would store the archive's file `name`.
+/// Windows and macOS ignore capitals. Windows also drops full stops and spaces at the end of a part
+/// of the path, and treats the text after a colon as the name of a stream of the file.
 ///
-/// Two entries with the same place would overwrite each other on some systems. An archive with such entries is refused
-/// on every system, so that an FMU consists of the same files everywhere.
+/// Two files with equal paths would overwrite each other on some systems. An archive with two such
+/// files is refused on every system, so that an FMU consists of the same files everywhere.
 pub fn place(name: &str) -> String {
     let part = |part: &str| {
         let file = part.split(':').next().unwrap_or_default();
@@ -77,19 +81,22 @@ pub fn place(name: &str) -> String {
 
 pub struct Archive {
     file: File,
-    /// Entries in the order of the zip directory, with repeated names, up to the first fault.
+    /// Files and folders in the order of the zip directory. If a name occurs twice, both entries
+    /// are listed. If the directory has a fault, the list ends before the fault.
     pub entries: Vec<Entry>,
-    /// Error in the zip directory, or the limit that the archive exceeds. If there is a fault, no file of the
-    /// archive should be unpacked.
+    /// Error in the zip directory, or the limit that the archive exceeds. If there is a fault, no
+    /// file of the archive should be unpacked.
     pub fault: Option<String>,
 }
 
 impl Archive {
-    /// Reads the directory of an archive.
+    /// Reads the list of files in the archive at `path`, but does not unpack them.
     ///
     /// # Errors
     ///
-    /// If the file cannot be read. A file that is not a valid archive is not an error; [`Archive::fault`] then has the reason.
+    /// If the file cannot be opened. A file that is not a valid archive is not an error here, so
+    /// that `hubslosh check` can report it among other faults: [`Archive::fault`] then has the
+    /// reason.
     pub fn open(path: &Path) -> Result<Archive> {
         let name = path.display();
         let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
@@ -100,7 +107,6 @@ impl Archive {
         Ok(archive)
     }
 
-    /// Explains, without terms of the zip format, why the list of files in an archive cannot be read.
     fn explain_fault(&self, why: &anyhow::Error) -> String {
         let Some(ZipError::InvalidArchive(what)) = why.downcast_ref() else {
             return format!("{why:#}");
@@ -175,11 +181,12 @@ impl Archive {
         Ok(())
     }
 
-    /// Unpacks a file to `to`.
+    /// Unpacks the file `entry` and writes its content to `to`.
     ///
     /// # Errors
     ///
-    /// If its size or checksum differs from the size or checksum in its header.
+    /// If the size or the checksum of the content differs from the size or checksum that the
+    /// archive states for the file.
     pub fn copy(&self, entry: &Entry, to: &mut impl Write) -> Result<()> {
         let said = entry.zip.size();
         if entry.name == DESCRIPTION {

@@ -15,10 +15,11 @@ use sha2::{Digest, Sha256};
 
 use crate::symbol::readable;
 
-/// Newest version of glibc that a binary may need: the version in the oldest Linux on which simulation tools still
-/// run.
+/// Newest version of glibc that a binary may need. It is the version of CentOS 7, the oldest Linux
+/// on which simulation tools still run.
 pub const GLIBC: Version = Version(2, 17);
-/// Newest version of macOS that a binary may need: the oldest version that runs on both architectures.
+/// Newest version of macOS that a binary may need. Version 11 is the oldest that runs on both
+/// architectures, x86_64 and arm64.
 pub const MACOS: Version = Version(11, 0);
 
 const NAMED: usize = 8;
@@ -33,8 +34,9 @@ const LINUX_LIBRARIES: [&str; 8] = [
     "librt.so.1",
     "libutil.so.1",
 ];
-/// Libraries that come with Windows 8 and later, in lower case. The run-time libraries of compilers are not
-/// among them.
+/// Libraries of Windows that a binary may need, in lower case. All of them come with Windows 8 and
+/// later, whereas run-time libraries of compilers do not, so that a binary that needs such a
+/// library fails on other machines.
 const WINDOWS_LIBRARIES: [&str; 12] = [
     "advapi32.dll",
     "api-ms-win-core-synch-l1-2-0.dll",
@@ -95,7 +97,8 @@ pub struct Binary {
     /// Newest version of glibc (Linux) or macOS that the binary needs.
     pub needs: Option<Version>,
     pub exports: Vec<String>,
-    /// Error in the code signature. macOS kills a process that loads unsigned code for arm64.
+    /// Fault in the code signature, as part of a sentence. Without a valid signature macOS kills a
+    /// process that loads code for arm64.
     pub signature: Option<String>,
 }
 
@@ -121,15 +124,17 @@ impl Binary {
         Ok(binary)
     }
 
-    /// Lists all reasons why the binary could not be loaded on a machine without development tools, or why a host would
-    /// not find the functions `wanted`. Each item is a sentence.
+    /// Lists all reasons why the binary could not be loaded on a machine without development tools,
+    /// or why a host would not find the functions with the names `wanted`. Each item is a sentence
+    /// without a full stop.
     pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
         let (loading, lacking) = (self.loading_faults(), self.missing_exports(wanted));
         loading.into_iter().chain(lacking).chain(self.surplus()).collect()
     }
 
-    /// Lists the reasons why the binary could not be loaded on machines without development tools, for each
-    /// processor of its platform.
+    /// Lists the reasons why the binary could not be loaded on machines without development tools.
+    /// A macOS binary must contain code for both processors, x86_64 and arm64; other binaries
+    /// contain code for one processor.
     pub fn loading_faults(&self) -> Vec<String> {
         self.loading_faults_for(match self.kind {
             Kind::Linux | Kind::Windows => &["x86_64"],
@@ -138,7 +143,8 @@ impl Binary {
         })
     }
 
-    /// Lists the reasons why the binary could not be loaded on machines with these processors.
+    /// Lists the reasons why the binary could not be loaded on machines with the processors
+    /// `architectures`, for example `x86_64` or `arm64`, that have no development tools.
     pub fn loading_faults_for(&self, architectures: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
         let (libraries, newest): (&[&str], _) = match self.kind {
@@ -176,7 +182,8 @@ impl Binary {
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
     }
 
-    /// Returns a sentence that names the exported functions that do not belong to FMI, or `None` if there are none.
+    /// Returns a sentence that names exported functions that do not belong to FMI, or `None` if
+    /// there are none. Such functions could replace functions with equal names in the host.
     pub fn surplus(&self) -> Option<String> {
         // On macOS further exports are allowed: they do no harm, because a name is bound to the library from which it comes,
         // and the linker for macOS exports some of Rust's names when it runs on other systems. One library may serve several
@@ -266,8 +273,6 @@ fn linux(bytes: &[u8]) -> Result<Binary> {
     Ok(binary)
 }
 
-/// Parses the name of a symbol version, for example 2.14 for `GLIBC_2.14`. Only two parts of the number are returned,
-/// so that `GLIBC_2.2.5` gives 2.2.
 fn glibc_version(name: &str) -> Option<Version> {
     let mut numbers = name.strip_prefix("GLIBC_")?.split('.').map(str::parse);
     Some(Version(numbers.next()?.ok()?, numbers.next()?.ok()?))
@@ -344,8 +349,9 @@ fn universal(bytes: &[u8]) -> Result<Binary> {
     whole.context("the binary contains no machine code")
 }
 
-/// Returns a description of the fault if the hashes in the code signature differ from hashes of the code. macOS kills a
-/// process that loads a binary which was changed after signing, for example by stripping.
+/// Compares the hashes in the code signature of a macOS binary with the hashes of the code in
+/// `bytes`. Returns the fault if they differ, otherwise `None`. macOS kills a process that loads a
+/// binary that was changed after it was signed, for example by `strip`.
 fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
     const SIGNATURE: u32 = 0xfade_0cc0; // CSMAGIC_EMBEDDED_SIGNATURE
     const DIRECTORY: u32 = 0xfade_0c02; // CSMAGIC_CODEDIRECTORY
@@ -386,7 +392,8 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
     }
 }
 
-/// Joins binaries for several architectures of macOS into one universal binary.
+/// Joins macOS binaries for several architectures into one universal binary, because macOS hosts
+/// look in one folder for both architectures.
 pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     const ALIGNMENT: u32 = 14; // 2^14: arm64's pages are the larger ones
     let page = 1 << ALIGNMENT;
@@ -413,8 +420,8 @@ pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
     Ok(body)
 }
 
-/// Returns the part of a universal binary for `architecture`, `x86_64` or `arm64`. Any other file is returned
-/// unchanged.
+/// Returns the part of the universal macOS binary `bytes` for `architecture`, `x86_64` or `arm64`.
+/// Any other file is returned unchanged.
 pub fn part<'a>(bytes: &'a [u8], architecture: &str) -> &'a [u8] {
     let Ok(whole) = MachOFatFile32::parse(bytes) else { return bytes };
     let wanted =
@@ -452,7 +459,6 @@ mod tests {
         }
     }
 
-    /// The binary needs a library and a glibc that not every system has, exports other names, and has a library search path.
     #[test]
     fn all_faults_of_a_binary_are_reported_at_once() {
         let mut linux = faultless(Kind::Linux);

@@ -50,10 +50,11 @@ struct Sink {
     uncategorised: AtomicUsize,
 }
 
-/// Receivers of the messages of all existing instances. The key is the environment pointer that an FMU passes
-/// back to the callbacks.
+/// Receivers of the messages of all existing instances. The key is the environment pointer that the
+/// host gave to the FMU and that the FMU passes back in each callback.
 ///
-/// An FMU may pass a wrong pointer. The callbacks only look the pointer up in this map, and never dereference it.
+/// An FMU may pass a wrong pointer. Therefore callbacks only look the pointer up in this map, and
+/// never dereference it.
 static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
 
 static FOREIGN: AtomicUsize = AtomicUsize::new(0);
@@ -66,8 +67,9 @@ fn sinks() -> MutexGuard<'static, BTreeMap<usize, Arc<Sink>>> {
     SINKS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// Returns how often FMUs have called a callback of this process with a pointer other than the
-/// componentEnvironment (FMI 3.0: instanceEnvironment) of an instance.
+/// Returns the number of callbacks in which an FMU of this process passed a pointer other than the
+/// componentEnvironment (FMI 3.0: instanceEnvironment) of an existing instance. `hubslosh check`
+/// reports such FMUs.
 pub fn foreign_environments() -> usize {
     FOREIGN.load(Ordering::Relaxed)
 }
@@ -76,8 +78,8 @@ pub(crate) fn count_foreign_environment() {
     FOREIGN.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Environment of an instance. It receives the messages of the instance until it is dropped, which must happen after
-/// the instance is freed.
+/// Environment pointer of an instance, under which messages of the instance are stored. It must be
+/// dropped after the instance is freed, because an FMU may still log while it is freed.
 pub(crate) struct Environment {
     sink: Arc<Sink>,
 }
@@ -97,8 +99,8 @@ impl Environment {
         Arc::as_ptr(&self.sink).cast_mut().cast()
     }
 
-    /// Records that a call of the instance begins on this thread, so that messages with a wrong environment can be
-    /// assigned to the instance.
+    /// Records that a call of the instance begins on this thread, so that messages with a wrong
+    /// environment pointer can be assigned to this instance.
     pub(crate) fn begin_call(&self) {
         CALLED.set(self.address());
     }
@@ -124,8 +126,10 @@ impl Sink {
     }
 }
 
-/// Returns the receiver of messages with this environment pointer. If no instance has this pointer, the message is
-/// assigned to the instance that this thread called last or, if there is only one instance, to this one.
+/// Returns the receiver of messages with the pointer `environment`. If no instance has this
+/// pointer, the message is assigned to the instance that this thread called last. If there was no
+/// call, but exactly one instance exists, the message is assigned to this instance; otherwise the
+/// result is `None`.
 fn find_sink(environment: *mut c_void) -> Option<Arc<Sink>> {
     let sinks = sinks();
     if let Some(sink) = sinks.get(&(environment as usize)) {
@@ -136,8 +140,9 @@ fn find_sink(environment: *mut c_void) -> Option<Arc<Sink>> {
     sinks.get(&CALLED.get()).or_else(only).cloned()
 }
 
-/// Stores a message of an FMU if there are fewer than [`MESSAGES_KEPT`]. This is `logMessage` of FMI 3.0; for
-/// FMI 2.0 `logger.c` formats the message and calls it.
+/// Callback `logMessage` of FMI 3.0: stores a message for the instance with this `environment`. If
+/// [`MESSAGES_KEPT`] messages are stored already, the message is dropped. For FMI 2.0 the C code in
+/// `logger.c` formats the message and then calls this function.
 pub(crate) extern "C" fn log_message(
     environment: *mut c_void,
     status: c_int,
@@ -156,7 +161,8 @@ pub(crate) extern "C" fn log_message(
     }
 }
 
-/// Copies a text of an FMU, because the text is valid only until the next call. NULL becomes an empty text.
+/// Copies a C string of an FMU, because the FMU may overwrite it in the next call. A NULL pointer
+/// gives an empty text.
 ///
 /// # Safety
 ///
@@ -172,7 +178,8 @@ pub(crate) fn c_string(text: Option<&str>) -> Option<CString> {
     text.map(|text| CString::new(text).unwrap_or_default())
 }
 
-/// Returns the pointer to a text for a C function, or NULL for `None`. The text must exist as long as the pointer is used.
+/// Returns a pointer to `text` for an argument of a C function, or NULL for `None`. `text` must
+/// exist as long as the pointer is used.
 pub(crate) fn pointer(text: &Option<CString>) -> *const c_char {
     text.as_ref().map_or(null(), |text| text.as_ptr())
 }
@@ -184,8 +191,8 @@ pub struct Message {
     pub text: String,
 }
 
-/// Largest number of messages stored per instance, so that an FMU that logs every step does not fill the
-/// memory.
+/// Largest number of messages that are stored for one instance. The limit exists because an FMU
+/// that logs in every step would otherwise fill the memory.
 const MESSAGES_KEPT: usize = 1000;
 
 unsafe extern "C" {
@@ -197,7 +204,6 @@ unsafe extern "C" {
 #[derive(Clone, Debug)]
 pub struct CallError {
     pub call: &'static str,
-    /// Status that a call returned, or `Error` if a function returned NULL instead of an instance.
     pub status: Status,
     pub messages: Vec<Message>,
 }
@@ -235,8 +241,9 @@ pub(crate) struct Function<T> {
     pub call: T,
 }
 
-/// Declares a table of C functions with field, symbol and type of each function. A table for both versions of FMI has
-/// one symbol for each version.
+/// Declares a struct of C functions, with a field, the symbols and the type of each function.
+/// `load` finds the functions in a library by their symbols. If the struct is for both versions of
+/// FMI, each function has one symbol for each version.
 macro_rules! functions {
     ($table:ident $(<$boolean:ident>)?: $($field:ident $($symbol:literal)+, $type:ty;)*) => {
         pub(crate) struct $table $(<$boolean>)? {
@@ -248,8 +255,13 @@ macro_rules! functions {
                 vec![$([$($symbol),+][version],)*]
             }
 
+            /// Finds the functions in `library`. `version` is the position of the version of FMI
+            /// among the symbols of each function.
+            ///
             /// # Safety
-            /// The library must be a binary of this version of FMI, because the types of its functions cannot be checked.
+            ///
+            /// The library must be a binary of this version of FMI, because the types of its
+            /// functions cannot be checked.
             pub(crate) unsafe fn load(
                 library: &libloading::Library,
                 version: usize,
@@ -266,7 +278,8 @@ macro_rules! functions {
 
 pub(crate) use functions;
 
-/// State of the process that an FMU shares with its host and must not change.
+/// Settings of the process that an FMU shares with its host and must not change, for example the
+/// rounding mode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HostState {
     pub float_control: u32,
@@ -319,11 +332,13 @@ pub(crate) struct Loaded {
     pub binary: String,
 }
 
-/// Loads the library `identifier` of the FMU that is unpacked in `directory`. `name` is the FMU's name in error messages.
+/// Loads the binary with the model identifier `identifier` from the FMU that is unpacked in
+/// `directory`. `platform` is the folder in `binaries`, and `name` is the FMU's name in error
+/// messages.
 ///
 /// # Errors
 ///
-/// If there is no such library for the platform, or it cannot be loaded; the message states the reason.
+/// If there is no binary for the platform, or it cannot be loaded; the message states the reason.
 pub(crate) fn load(
     directory: &Path,
     name: &Path,
@@ -378,8 +393,8 @@ fn with_readable_symbol(error: &str) -> String {
     }
 }
 
-/// Returns an explanation if the loader's message shows that the binary needs a host process with a Python interpreter;
-/// otherwise an empty text.
+/// Returns an explanation to append to the loader's message `error` if the message shows that the
+/// binary needs a host process with a Python interpreter. Otherwise the result is an empty text.
 fn explain_needs(error: &str) -> &'static str {
     let symbol = error.split("undefined symbol: ").nth(1).unwrap_or_default();
     match symbol.trim_start_matches('_').starts_with("Py") {
@@ -403,7 +418,6 @@ pub(crate) fn missing_functions(library: &Library, symbols: &[&'static str]) -> 
 mod tests {
     use super::*;
 
-    /// An error of the loader that names an undefined symbol of CPython is explained as "needs a Python host".
     #[test]
     fn a_binary_that_lacks_pythons_symbols_needs_a_python_host() {
         for symbol in ["_Py_NoneStruct", "PyExc_TypeError", "__Py_Dealloc"] {

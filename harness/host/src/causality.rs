@@ -6,8 +6,8 @@ macro_rules! attribute {
         #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum $name {
             $($item,)+
-            /// The text of the attribute if it is a causality that FMI does not define; empty if
-            /// the attribute is missing.
+            /// Any other text of the attribute, which FMI does not define; an empty text if the
+            /// attribute is missing.
             Other(String),
         }
 

@@ -27,10 +27,10 @@ pub struct ModelDescription {
     pub units: Vec<Unit>,
     pub types: Vec<SimpleType>,
     pub default_experiment: DefaultExperiment,
-    /// The variables in the order of the file. The elements of an array follow each other in row-major order.
+    /// The variables in the order of the file. An array of FMI 3.0 is listed as one variable for
+    /// each element, in row-major order.
     pub variables: Vec<Variable>,
-    /// Value references of the derivatives of the continuous states, each with the value reference of its
-    /// state.
+    /// Pairs of value references: the derivative of a continuous state, and the state.
     pub derivatives: Vec<(u32, u32)>,
     /// Numbers of continuous states and event indicators that an FMU 2.0 declares.
     pub(crate) sizes: (usize, usize),
@@ -43,7 +43,8 @@ pub struct Array {
     pub length: usize,
     pub c_type: CType,
     pub start: Vec<String>,
-    /// True if structural parameters have changed the array's size, so that its declared start values have no meaning.
+    /// True if structural parameters have changed the size of the array. Its declared start values
+    /// then have no meaning.
     pub(crate) is_resized: bool,
 }
 
@@ -56,8 +57,8 @@ pub struct ArrayElement {
 #[derive(Clone, Debug)]
 pub struct Interface {
     pub model_identifier: String,
-    /// True if the FMU accepts derivatives of inputs (FMI 2.0) or new values of inputs within a step (FMI
-    /// 3.0).
+    /// True if the FMU accepts derivatives of inputs (FMI 2.0), or new values of inputs within a
+    /// step (FMI 3.0), so that inputs can change linearly during a step.
     pub can_interpolate_inputs: bool,
     pub directional_derivatives: bool,
 }
@@ -70,7 +71,8 @@ pub struct DefaultExperiment {
     pub step_size: Option<f64>,
 }
 
-/// A unit in which an FMU exchanges values, with the display units in which users enter and read them.
+/// A unit in which an FMU exchanges values, with the display units in which users may enter values,
+/// for example m and mm.
 #[derive(Clone, Debug)]
 pub struct Unit {
     pub name: String,
@@ -78,7 +80,8 @@ pub struct Unit {
     pub base: Option<BaseUnit>,
 }
 
-/// The element `BaseUnit` of FMI and SSP: value in SI base units = `factor` · value + `offset`.
+/// Relation of a unit to the SI base units (element `BaseUnit` of FMI and SSP): value in SI base
+/// units = `factor` · value in this unit + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseUnit {
     pub exponents: [i32; 8],
@@ -90,8 +93,8 @@ impl BaseUnit {
     /// Base units of FMI and SSP, which are the base units of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
-    /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if the child is missing or one of its
-    /// numbers is not valid.
+    /// Reads the child `BaseUnit` of the XML element `unit`. Returns `None` if the child is missing
+    /// or one of its numbers is not valid.
     pub fn from_element(unit: &Element) -> Option<BaseUnit> {
         let base = unit.child("BaseUnit")?;
         let mut exponents = [0; 8];
@@ -107,7 +110,8 @@ impl BaseUnit {
     }
 }
 
-/// The element `DisplayUnit`: displayed value = `factor` · value + `offset`.
+/// A display unit of FMI (element `DisplayUnit`): value in this unit = `factor` · value in the
+/// variable's unit + `offset`.
 #[derive(Clone, Debug)]
 pub struct DisplayUnit {
     pub name: String,
@@ -131,13 +135,15 @@ pub struct Item {
 #[derive(Clone, Debug)]
 pub struct Variable {
     pub name: String,
-    /// Value reference. For an element of an array, the host assigns a number that no other variable has.
+    /// Value reference, the number by which an FMU identifies a variable. An element of an array
+    /// has no value reference in FMI, so that the host assigns a number that no other variable has.
     pub reference: u32,
     pub causality: Causality,
-    /// Variability; `Other` with an empty text if it is missing.
+    /// Variability; [`Variability::Other`] with an empty text if the attribute is missing.
     pub variability: Variability,
     pub description: String,
-    /// True if the variable may be set or read within a step (FMI 3.0).
+    /// True if a host may set the variable (an input) or read it (an output) within a step; FMI 3.0
+    /// only.
     pub intermediate: bool,
     c_type: CType,
     kind: Type,
@@ -184,7 +190,8 @@ pub enum CType {
 }
 
 impl CType {
-    /// Returns the C type and the displayed type for an element of ModelVariables in FMI 3.0.
+    /// Returns the C type and the type shown to users for the element `name` of ModelVariables in
+    /// FMI 3.0, for example `Float64`, or `None` if FMI 3.0 has no such element.
     pub fn from_element_name(name: &str) -> Option<(CType, Type)> {
         Some(match name {
             "Float32" => (CType::Float32, Type::Real),
@@ -206,7 +213,8 @@ impl CType {
         })
     }
 
-    /// Returns the C type and the displayed type for the child of a ScalarVariable in FMI 2.0.
+    /// Returns the C type and the type shown to users for the child `name` of a ScalarVariable in
+    /// FMI 2.0, for example `Real`, or `None` if FMI 2.0 has no such element.
     pub fn from_child_name(name: &str) -> Option<(CType, Type)> {
         Some(match name {
             "Real" => (CType::Float64, Type::Real),
@@ -242,7 +250,8 @@ pub enum Value {
 }
 
 impl Value {
-    /// Returns the value as a number for tables: Booleans as 0 and 1, texts as NaN.
+    /// Returns the value as a number for tables of results, because these hold only numbers:
+    /// Booleans become 0 and 1, texts become NaN.
     pub fn number(&self) -> f64 {
         match self {
             Value::Real(x) => *x,
@@ -323,8 +332,9 @@ impl Reader {
         }
     }
 
-    /// Reads a required attribute of an element with `read`. If the attribute is missing or not valid, adds a problem
-    /// and returns the default.
+    /// Parses the required `attribute` of `element` with `read`. If the attribute is missing or
+    /// `read` returns `None`, a problem is added to the list of problems and the type's default
+    /// value is returned.
     fn required<T: Default>(
         &mut self,
         element: &Element,
@@ -436,8 +446,9 @@ impl Reader {
         }
     }
 
-    /// Reads the variables of FMI 3.0 with their aliases; an array becomes one variable for each element. `set` has the
-    /// values of structural parameters that differ from the declared values, by value reference.
+    /// Adds the variables of an FMU 3.0 and their aliases to `to`. An array becomes one variable
+    /// for each element. `set` has the values of structural parameters, by value reference, that
+    /// replace the declared values and so determine the sizes of arrays.
     fn variables3(
         &mut self,
         root: &Element,
@@ -546,8 +557,8 @@ impl Reader {
         dimensions
     }
 
-    /// Returns the aliases of a variable as variables that cannot be set, because a variable is set and recorded only
-    /// by its first name.
+    /// Returns the aliases of `variable`, which are declared in `element`, as variables that cannot
+    /// be set. A variable is set and recorded only by its own name, so that no value occurs twice.
     fn aliases(&mut self, element: &Element, variable: &Variable) -> Vec<Variable> {
         let mut aliases = Vec::new();
         for alias in element.children.iter().filter(|child| child.name == "Alias") {
@@ -563,8 +574,8 @@ impl Reader {
     }
 }
 
-/// Returns the value references of the derivatives in ModelStructure, each with the value reference of its
-/// state. FMI 2.0 identifies variables by position, FMI 3.0 by value reference.
+/// Returns pairs of value references, of each derivative in ModelStructure and of its state. FMI
+/// 2.0 identifies variables by their positions in ModelVariables, FMI 3.0 by value references.
 fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     let all: Vec<&Element> = root.list("ModelVariables").collect();
     let reference = |variable: &Element| variable.get("valueReference")?.trim().parse::<u32>().ok();
@@ -591,7 +602,9 @@ fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     unknowns.filter_map(pair).collect()
 }
 
-/// Returns the start values of the elements of an array, or of a scalar, in FMI 3.0, as texts.
+/// Returns the declared start values of a variable in FMI 3.0, as texts: one for a scalar, one for
+/// each element of an array. Texts and binary values are in child elements `Start`, numbers in the
+/// attribute `start`.
 pub fn starts(element: &Element, c_type: CType) -> Vec<String> {
     match c_type {
         CType::String | CType::Binary => {
@@ -605,7 +618,8 @@ pub fn starts(element: &Element, c_type: CType) -> Vec<String> {
     }
 }
 
-/// Converts a row-major index, counted from 0, to indices that are counted from 1 and separated by commas.
+/// Converts the position of an array element, counted from 0 in row-major order, to its indices,
+/// counted from 1: position 5 of a 2 by 3 array becomes `2,3`.
 fn indices(mut index: usize, dimensions: &[usize]) -> String {
     let mut all = Vec::new();
     for size in dimensions.iter().rev() {
@@ -617,14 +631,16 @@ fn indices(mut index: usize, dimensions: &[usize]) -> String {
 }
 
 const LONGEST_NAME: usize = 1024;
-/// Largest number of types, and of items of one type. They are limited because each declaredType is searched
-/// among all types.
+/// Largest number of types in a description, and of items of one enumeration. The number is limited
+/// because the type of every variable is searched among all types, so that the time would grow with
+/// the product of both numbers.
 const MOST_TYPES: usize = 5000;
 const MOST_ELEMENTS: usize = 100_000;
 const NAMED: usize = 20;
 
 impl ModelDescription {
-    /// Reads the description of a packed FMU, without unpacking or loading its binary.
+    /// Reads the model description of the packed FMU at `path`. This is faster than
+    /// [`Fmu::open`](crate::Fmu::open), because nothing is unpacked and no binary is loaded.
     pub fn from_fmu(path: &Path) -> Result<Self> {
         Ok(ModelDescription::from_archive(&Archive::open(path)?, path)?.1)
     }
@@ -638,11 +654,11 @@ impl ModelDescription {
         Ok((text, description))
     }
 
-    /// Checks that the version of FMI is 2.0 or 3.
+    /// Checks that this program can run the FMU's version of FMI, which must be 2.0 or 3.x.
     ///
     /// # Errors
     ///
-    /// If it is another version.
+    /// If it is another version, for example 1.0.
     pub fn check_version(&self) -> Result<()> {
         let version = quote_short(&self.fmi_version).replace('"', "");
         ensure!(
@@ -656,8 +672,8 @@ impl ModelDescription {
         self.fmi_version.starts_with("3.")
     }
 
-    /// Returns the position of an array element by its value reference, or `None` for a variable that is not
-    /// an element.
+    /// Returns the array and the position in it to which the value reference `reference` was
+    /// assigned, or `None` for a variable that is not an element of an array.
     pub fn element(&self, reference: u32) -> Option<ArrayElement> {
         self.elements.get(&reference).copied()
     }
@@ -693,9 +709,10 @@ impl ModelDescription {
         ModelDescription::from_xml_with(text, &BTreeMap::new())
     }
 
-    /// Parses modelDescription.xml with the values `set` of structural parameters, by value reference, from
-    /// which array sizes follow. The declared start values of arrays whose size changes have no meaning (FMI
-    /// 3.0.2, section 2.4.7.2).
+    /// Parses `text`, which is modelDescription.xml, with other values of structural parameters:
+    /// `set` has them by value reference. The sizes of arrays follow from these values. The
+    /// declared start values of an array whose size changes have no meaning (FMI 3.0.2, section
+    /// 2.4.7.2).
     pub(crate) fn from_xml_with(text: &str, set: &BTreeMap<u32, Value>) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
             .map_err(|why| anyhow!("modelDescription.xml: {why}"))?;
@@ -781,7 +798,8 @@ impl ModelDescription {
         named.map_or(&[], |t| &t.items)
     }
 
-    /// Returns the unit in which a variable is exchanged; empty if it has none.
+    /// Returns the unit in which the FMU exchanges `variable`: its own unit, or the unit of its
+    /// declared type. The text is empty if there is no unit.
     pub fn unit<'a>(&'a self, variable: &'a Variable) -> &'a str {
         let declared = variable.attributes.declared_type.as_ref();
         let declared = || self.types.iter().find(|t| Some(&t.name) == declared)?.unit.as_ref();
@@ -794,11 +812,13 @@ impl ModelDescription {
         defined.map_or(&[], |unit| &unit.display)
     }
 
-    /// Converts `number` from `unit`, defined by `base`, to the unit of a Real variable.
+    /// Converts `number` to the unit in which the FMU exchanges a Real variable. `unit` is the name
+    /// of the number's unit, and `base` its definition in SI base units.
     ///
     /// # Errors
     ///
-    /// If the two units measure different quantities, or the FMU does not define the variable's unit.
+    /// If the two units measure different quantities, or the FMU does not define the variable's
+    /// unit.
     pub fn converted(
         &self,
         variable: &Variable,
@@ -831,8 +851,8 @@ impl ModelDescription {
         if all.is_empty() { "a number without unit".into() } else { all.join(", ") }
     }
 
-    /// Parses the value of a Real: `0.05`, or with the variable's unit or one of its display units, for
-    /// example `50mm` or `50 mm`.
+    /// Parses the value of a Real: a plain number such as `0.05`, or a number with the variable's
+    /// unit or one of its display units, for example `50mm` or `50 mm`, which is converted.
     fn real(&self, variable: &Variable, text: &str) -> Result<f64> {
         if let Ok(number) = text.parse() {
             return Ok(number);
@@ -861,7 +881,8 @@ impl ModelDescription {
         }
     }
 
-    /// Parses a value of a variable; a Real may have a unit.
+    /// Parses `text` as a value of `variable`, for example `0.05`, `50 mm`, `true`, or the name of
+    /// an enumeration item.
     ///
     /// # Errors
     ///
@@ -1035,8 +1056,6 @@ mod tests {
         assert_eq!((d.unit(last), last.intermediate), ("rad", true));
     }
 
-    /// A structural parameter n is set to 3. An array of n by n then has 9 elements, and its declared start
-    /// values do not apply.
     #[test]
     fn structural_parameters_set_the_size_of_arrays_whose_start_values_then_do_not_apply() {
         let set = BTreeMap::from([(7, Value::Integer(3))]);

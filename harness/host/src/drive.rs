@@ -17,19 +17,18 @@ pub struct Inputs {
     discrete: Vec<(usize, Variable)>,
     sloped: bool,
     hold: bool,
-    /// Relative tolerance of the host's solver, if the FMU is integrated in Model Exchange; `None`
-    /// in Co-Simulation.
     exchange: Option<f64>,
 }
 
-/// Relative tolerance of the host's solver in Model Exchange, if neither the user nor the default
-/// experiment gives one.
+/// Relative tolerance of the host's solver in Model Exchange if neither the user nor the FMU's
+/// default experiment states a tolerance.
 const TOLERANCE: f64 = 1e-6;
-/// Deviation of an input from the value that its last slope predicts, relative to its magnitude, above which the input
-/// counts as discontinuous. A jump of an input is an event.
+/// Limit above which the deviation of an input from the value that its last slope predicts counts
+/// as a jump, relative to the input's magnitude. A jump is an event in Model Exchange, whereas
+/// rounding errors of a ramp must not be.
 const JUMP: f64 = 1e-9;
 
-/// The inputs between two communication points: value and slope of each input, in the order of [`Inputs`].
+/// Values and slopes of the inputs until the next communication point, in the order of [`Inputs`].
 pub struct Course<'a> {
     pub values: &'a mut [f64],
     /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot interpolate its
@@ -38,8 +37,13 @@ pub struct Course<'a> {
 }
 
 impl Inputs {
-    /// Selects the inputs of an FMU that a run drives, by name. With `hold` they are constant
-    /// during each step (zero-order hold).
+    /// Selects the inputs `names` of an FMU, which a run then sets at each communication point.
+    /// With `hold` they are constant during each step (zero-order hold); otherwise they follow
+    /// their slopes.
+    ///
+    /// # Errors
+    ///
+    /// If the FMU has no variable with one of the names.
     pub fn new(description: &ModelDescription, names: &[&str], hold: bool) -> Result<Self> {
         let (mut references, mut places, mut discrete) = (Vec::new(), Vec::new(), Vec::new());
         for (place, name) in names.iter().enumerate() {
@@ -59,7 +63,8 @@ impl Inputs {
         Ok(Inputs { references, places, discrete, sloped, hold, exchange })
     }
 
-    /// Sets the relative tolerance of the host's solver; `None` leaves the default.
+    /// Sets the relative tolerance of the host's solver in Model Exchange. `None` leaves the
+    /// tolerance of the default experiment.
     pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
         Inputs { exchange: self.exchange.map(|default| tolerance.unwrap_or(default)), ..self }
     }
@@ -68,7 +73,8 @@ impl Inputs {
         matches!(kind, Type::Real | Type::Integer | Type::Enumeration | Type::Boolean)
     }
 
-    /// Initialises an instance whose start values have been set. `values` are the inputs at the start. Times are in s.
+    /// Initialises an instance whose start values have been set. `values` are the inputs at the
+    /// time `start`, s. `tolerance` is relative, and `stop` is in s.
     pub fn initialise(
         &self,
         instance: &mut Instance,
@@ -82,8 +88,9 @@ impl Inputs {
         instance.exit_initialization_mode()
     }
 
-    /// Simulates an initialised instance from `start`, s. At every communication point `at` receives the instance and
-    /// the time, reads outputs, writes the inputs until the next point, and returns the time of the next point, or
+    /// Simulates an initialised instance from `start`, s. At every communication point the closure
+    /// `at` is called with the instance and the time, s. It reads outputs, writes values and slopes
+    /// of the inputs for the time until the next point, and returns the time of the next point, or
     /// `None` to end the run.
     ///
     /// # Errors
@@ -110,8 +117,9 @@ impl Inputs {
         Ok(())
     }
 
-    /// Simulates as [`Inputs::drive`] does, but in Model Exchange. A Real input that deviates from the line of its
-    /// last slope causes an event, and so does every change of another input.
+    /// Simulates as [`Inputs::drive`] does, but in Model Exchange, with the host's solver of
+    /// relative tolerance `tolerance`. A Real input that deviates from the line with its last slope
+    /// causes an event, and so does every change of another input.
     fn integrate<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,

@@ -16,7 +16,8 @@ use crate::fmu::Instance;
 
 /// Accuracy with which the time of an event is located, as a fraction of the integrator's step.
 const LOCATED: f64 = 1e-13;
-/// Smallest time that is kept between two events, as a fraction of the time between two rows of the result.
+/// Shortest time between two events, as a fraction of the time between two rows of the result, so
+/// that the simulation of a chattering FMU comes to its end.
 const APART: f64 = 1e-6;
 pub const MOST_STEPS: usize = 100_000;
 
@@ -55,20 +56,22 @@ pub struct Run<I> {
     t: f64,
     x: Vec<f64>,
     z: Vec<f64>,
-    /// Nominal values of the states: the absolute tolerance of a state is its nominal value times
-    /// the relative tolerance.
+    /// Nominal values of the states. The absolute tolerance of each state is its nominal value
+    /// times the relative tolerance.
     nominals: Vec<f64>,
     tolerance: f64,
     h: f64,
     next_event: Option<f64>,
     most_steps: usize,
-    /// The inputs: value references, values, slopes, and the time at which the values hold.
+    /// Value references, values and slopes of the inputs, and the time at which they had these
+    /// values.
     inputs: (Vec<u32>, Vec<f64>, Vec<f64>, f64),
 }
 
 impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
-    /// Starts a simulation from an instance in event mode, the mode after initialisation. `tolerance` is relative;
-    /// `most_steps` limits the number of steps between two rows.
+    /// Starts a simulation at the time `start`, s, from an instance in event mode, which is the
+    /// mode after initialisation. `tolerance` is relative. `most_steps` limits the number of steps
+    /// between two rows of the result.
     pub fn new(mut instance: I, tolerance: f64, start: f64, most_steps: usize) -> Result<Self> {
         let (states, indicators) = instance.sizes()?;
         let mut run = Run {
@@ -100,8 +103,8 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         self.update()
     }
 
-    /// Sets the values and slopes of Real inputs from now on. `jump` is true if one of the inputs is discontinuous,
-    /// which is an event.
+    /// Sets the values and slopes of Real inputs from the present time on. `jump` is true if one of
+    /// the inputs is discontinuous at this time; the FMU then handles an event.
     pub fn drive(
         &mut self,
         references: &[u32],
@@ -126,7 +129,6 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(self.instance.set_real(references, &at)?)
     }
 
-    /// Iterates the discrete states until they no longer change, and enters continuous-time mode.
     fn update(&mut self) -> Result<()> {
         for _ in 0..1000 {
             let updated = self.instance.update_discrete_states()?;
@@ -177,7 +179,8 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(dx)
     }
 
-    /// Returns true if an event indicator has another sign at the time `t` with the states `x` than at the present point.
+    /// Returns `true` if one of the event indicators has changed its sign between the present point
+    /// and the time `t`, s, with the continuous states `x`.
     fn crosses(&mut self, t: f64, x: &[f64]) -> Result<bool> {
         if self.z.is_empty() {
             return Ok(false);
@@ -187,7 +190,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(self.z.iter().zip(&z).any(|(a, b)| (*a > 0.0) != (*b > 0.0)))
     }
 
-    /// Integrates to the time `end`, s.
+    /// Integrates from the present time to the time `end`, s, and handles the events on the way.
     ///
     /// # Errors
     ///
@@ -277,8 +280,10 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
     }
 }
 
-/// Evaluates the continuous extension at the fraction `s` of a step of length `h` from `x` to `new` with the
-/// stages `k`.
+/// Evaluates the continuous extension of the Dormand–Prince method, so that an event can be located
+/// within a step without further evaluations of the FMU. `x` and `new` are the states at the two
+/// ends of the step, `k` the derivatives of the stages, `h` the length of the step in s, and `s`
+/// the fraction of the step, 0 to 1.
 fn extended(x: &[f64], new: &[f64], k: &[Vec<f64>], h: f64, s: f64) -> Vec<f64> {
     (0..x.len())
         .map(|i| {

@@ -326,7 +326,8 @@ impl Fmu {
         unsafe { copy_text((self.own.functions.get_types_platform.call)()) }
     }
 
-    /// Returns the arguments that [`Fmu::instantiate`] uses; tests of wrong calls modify them.
+    /// Returns the arguments with which [`Fmu::instantiate`] calls fmi2Instantiate. Tests of wrong
+    /// calls modify them and pass them to [`Fmu::instantiate_with`].
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         Instantiation {
             name: Some(name),
@@ -341,7 +342,8 @@ impl Fmu {
         }
     }
 
-    /// Calls fmi2Instantiate with exactly these arguments, which may be wrong in tests.
+    /// Calls fmi2Instantiate with exactly the arguments `with`. Tests use it to pass wrong
+    /// arguments.
     pub fn instantiate_with(&self, with: &Instantiation) -> Result<Instance<'_>, CallError> {
         let (name, guid, resources) =
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
@@ -449,7 +451,8 @@ impl Fmu {
 }
 
 impl Functions {
-    /// Calls the get and set functions of each type with no variables and NULL pointers.
+    /// Calls the get and set functions of each type with zero variables and NULL pointers. Returns
+    /// the status of each call.
     ///
     /// # Safety
     ///
@@ -471,7 +474,8 @@ impl Functions {
     }
 }
 
-/// Callbacks that were passed to an FMU. They must exist as long as the instance, and are freed after it.
+/// Callbacks that were passed to an FMU. They must exist as long as the instance, and are freed
+/// after the instance.
 pub struct Given(*mut CallbackFunctions);
 
 impl Drop for Given {
@@ -484,7 +488,7 @@ impl Drop for Given {
 pub const MODEL_EXCHANGE: i32 = 0;
 pub const CO_SIMULATION: i32 = 1;
 
-/// Value of fmi2StatusKind with which a host asks whether the FMU requests the end of the simulation.
+/// Value of fmi2StatusKind with which a host asks if the FMU requests the end of the simulation.
 pub const TERMINATED: i32 = 3;
 
 /// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.
@@ -501,8 +505,8 @@ pub struct Instantiation<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Callbacks {
     Full,
-    /// Like `Full`, but the struct is overwritten after fmi2Instantiate has returned, because it is valid
-    /// only during that call.
+    /// Like `Full`, but the host overwrites the struct after fmi2Instantiate has returned, because
+    /// FMI guarantees it only during this call. An FMU that uses it later fails the test.
     Fleeting,
     Logger,
     Empty,
@@ -545,7 +549,8 @@ impl<'fmu> Instance<'fmu> {
         self.call_plain(self.stepping().cancel_step)
     }
 
-    /// Calls fmi2DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true.
+    /// Calls fmi2DoStep: simulates from `time` to `time + step`, s. The argument
+    /// noSetFMUStatePriorToCurrentPoint is true, so that the FMU may discard earlier states.
     pub fn do_step(&mut self, time: f64, step: f64) -> Called {
         // SAFETY: all arguments are plain values, and the instance is alive.
         self.call(self.stepping().do_step, |f, c| unsafe { f(c, time, step, 1) })
@@ -568,12 +573,13 @@ impl<'fmu> Instance<'fmu> {
         self.write(self.functions().set_integer, references, values)
     }
 
-    /// Reads Booleans as C integers, of which only 0 and 1 are valid.
+    /// Reads Booleans as C integers instead of `bool`, because an FMU may return other values than
+    /// 0 and 1, which are not valid.
     pub fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Called {
         self.read(self.functions().get_boolean, references, values)
     }
 
-    /// Sets Booleans from C integers, of which every non-zero one is true.
+    /// Sets Booleans from C integers. FMI allows 0 and 1; tests may pass any number.
     pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Called {
         self.write(self.functions().set_boolean, references, values)
     }
@@ -668,8 +674,8 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ for tests of bad calls
 
-    /// Calls fmi2GetReal with nvr = `count` and NULL pointers. An FMU must accept 0 and refuse any other
-    /// number.
+    /// Calls fmi2GetReal for `count` variables with NULL pointers. An FMU must accept this for
+    /// `count` = 0 and return an error for any other number.
     pub fn get_real_null(&mut self, count: usize) -> Called {
         // SAFETY: the call tests that the FMU checks the number before it uses a NULL pointer. The same holds for
         // the next four calls.
@@ -681,7 +687,8 @@ impl<'fmu> Instance<'fmu> {
         self.call(self.functions().set_real, |f, c| unsafe { f(c, null(), count, null()) })
     }
 
-    /// Calls the get and set functions of each type with no variables and NULL pointers, which must succeed.
+    /// Calls the get and set functions of each type with zero variables and NULL pointers, and
+    /// returns the status of each call. The FMU must accept these calls.
     pub fn calls_without_variables(&mut self) -> [(&'static str, Status); 8] {
         // SAFETY: the same as in `get_real_null`.
         unsafe { self.functions().nothing(self.component) }
@@ -697,7 +704,8 @@ impl<'fmu> Instance<'fmu> {
         self.set_state(&FmuState(null_mut()))
     }
 
-    /// Calls fmi2FreeFMUstate with the state itself instead of its address, as fmusim does.
+    /// Calls fmi2FreeFMUstate with the state itself instead of its address. The importer fmusim does
+    /// this, so that an FMU should accept it.
     pub fn free_state_itself(&mut self, state: FmuState) -> Called {
         // SAFETY: the handle comes from this FMU and is not used after this call; it points to something larger than a
         // pointer.

@@ -159,7 +159,8 @@ fn as_text(value: &Value) -> &str {
     if let Value::String(text) = value { text } else { "" }
 }
 
-/// Converts an integer of any C type. A number of more than 63 bits is replaced by the largest i64.
+/// Converts an integer of any C type to a [`Value`]. A number above the largest i64 becomes the
+/// largest i64.
 fn integer(n: impl TryInto<i64>) -> Value {
     Value::Integer(n.try_into().unwrap_or(i64::MAX))
 }
@@ -177,7 +178,7 @@ exchanged! {
     u64, get_uint64 set_uint64, integer, as_integer;
 }
 
-/// Evaluates an expression with the Rust type of a numeric C type.
+/// Evaluates an expression once for the Rust type that belongs to a numeric C type of FMI 3.0.
 macro_rules! numbers {
     ($c_type:expr, $type:ident => $do:expr, $($others:tt)*) => {
         match $c_type {
@@ -201,7 +202,8 @@ macro_rules! numbers {
 pub struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,
-    /// Callback for points within the step. The pointer is valid during one call of fmi3DoStep, and otherwise NULL.
+    /// Callback for points within the step. The pointer is valid during one call of fmi3DoStep, and
+    /// otherwise NULL.
     within: Cell<*mut Within<'static>>,
     updates: Cell<usize>,
     line: Cell<Line>,
@@ -209,11 +211,11 @@ pub struct Stepping {
 }
 
 thread_local! {
-    /// The instance whose fmi3DoStep runs on this thread, or NULL.
+    /// The instance whose fmi3DoStep runs on this thread, so that its callback finds the instance;
+    /// otherwise NULL.
     static STEPPING: Cell<*const Stepping> = const { Cell::new(null()) };
 }
 
-/// Callback for a point within a step; it returns the time at which the step should end early, or `None`.
 type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 
 #[allow(clippy::too_many_arguments)]
@@ -258,7 +260,7 @@ extern "C" fn intermediate_update(
     }
 }
 
-/// A point within a step at which the FMU has called intermediateUpdate (section 4.2.2).
+/// A point within a step at which the FMU has called intermediateUpdate (FMI 3.0.2, section 4.2.2).
 pub struct Update<'a> {
     pub time: f64,
     pub set_requested: bool,
@@ -351,7 +353,8 @@ impl Version for Fmi3 {
         }
     }
 
-    /// Returns the path of the resources with a separator at its end (section 2.3.1).
+    /// Returns the path of the folder of resources with a separator at its end, as FMI 3.0.2
+    /// requires (section 2.3.1), or `None` if the FMU has no such folder.
     fn resources(directory: &Path) -> Option<String> {
         let resources = directory.join("resources");
         let separator = std::path::MAIN_SEPARATOR;
@@ -499,8 +502,9 @@ impl Fmu {
         all
     }
 
-    /// Returns the arguments of an ordinary instance, without event mode and early return; tests of wrong calls modify
-    /// them. If the FMU provides intermediate update, the arguments request all inputs that may be set within a step.
+    /// Returns the arguments for an instance without event mode and early return. Tests of wrong
+    /// calls modify them. If the FMU provides intermediate update, the arguments request all inputs
+    /// that may be set within a step.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         let stepping = self.description.co_simulation.as_ref();
         let updates = stepping.is_some_and(|cs| cs.can_interpolate_inputs);
@@ -573,7 +577,8 @@ impl Fmu {
     }
 }
 
-/// Type of a callback that is missing, because a NULL pointer needs a type.
+/// Type argument for a callback that is not passed, because `None` for an optional closure needs a
+/// type.
 type Nobody = fn(&Update) -> Option<f64>;
 
 /// Arguments of fmi3InstantiateCoSimulation or fmi3InstantiateModelExchange; `None` becomes a NULL pointer.
@@ -593,7 +598,8 @@ pub struct Instantiation<'a> {
 
 // ---------------------------------------------------------------- an instance
 
-/// Results of fmi3DoStep other than its status: the bytes as the FMU wrote them, or [`UNWRITTEN`].
+/// Results of fmi3DoStep in addition to its status: the bytes as the FMU wrote them, or
+/// [`UNWRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     pub event: u8,
@@ -603,7 +609,8 @@ pub struct Step {
     pub last_time: f64,
 }
 
-/// Value of a result byte before the call. It is neither 0 nor 1, so that a missing result is noticed.
+/// Content of a result byte before the call. It is neither 0 nor 1, so that a result that the FMU
+/// does not write is noticed.
 pub const UNWRITTEN: u8 = 0xa5;
 
 /// Results of fmi3UpdateDiscreteStates: the bytes as the FMU wrote them, or [`UNWRITTEN`].
@@ -684,8 +691,9 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// Calls fmi3DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true and without a
-    /// callback for points within the step.
+    /// Calls fmi3DoStep: simulates from `time` to `time + step`, s. The argument
+    /// noSetFMUStatePriorToCurrentPoint is true, and no callback is passed for points within the
+    /// step.
     pub fn do_step(&mut self, time: f64, step: f64) -> Called<Step> {
         self.do_step_with_updates(time, step, None)
     }
@@ -719,7 +727,8 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables by reference
 
-    /// Calls fmi3Get… for the type of the values; `values` has room for all elements of all variables.
+    /// Calls the function fmi3Get… for the type `T`, for example fmi3GetFloat64. `values` must have
+    /// room for all elements of all variables in `references`.
     pub fn get_numbers<T: Exchanged>(&mut self, references: &[u32], values: &mut [T]) -> Called {
         self.read(T::calls(self.functions()).0, references, values)
     }
@@ -728,7 +737,8 @@ impl<'fmu> Instance<'fmu> {
         self.write(T::calls(self.functions()).1, references, values)
     }
 
-    /// Reads Booleans as bytes, of which only 0 and 1 are valid.
+    /// Reads Booleans as bytes instead of `bool`, because an FMU may write other values than 0 and
+    /// 1, which are not valid.
     pub fn get_boolean_bytes(&mut self, references: &[u32], values: &mut [u8]) -> Called {
         self.read(self.functions().get_boolean, references, values)
     }
@@ -747,8 +757,9 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// Calls fmi3GetDirectionalDerivative. `seed` has one value per element of the knowns; `count` is the
-    /// number of elements of the unknowns.
+    /// Calls fmi3GetDirectionalDerivative for the variables `unknowns` with respect to `knowns`.
+    /// `seed` has one value for each element of the knowns; `count` is the number of elements of
+    /// the unknowns and of the result.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -760,8 +771,9 @@ impl<'fmu> Instance<'fmu> {
         self.derivative(function, unknowns, knowns, seed, count)
     }
 
-    /// Calls fmi3GetAdjointDerivative. `seed` has one value per element of the unknowns; `count` is the
-    /// number of elements of the knowns.
+    /// Calls fmi3GetAdjointDerivative for the variables `unknowns` with respect to `knowns`. `seed`
+    /// has one value for each element of the unknowns; `count` is the number of elements of the
+    /// knowns and of the result.
     pub fn adjoint_derivative(
         &mut self,
         unknowns: &[u32],
@@ -844,19 +856,21 @@ impl<'fmu> Instance<'fmu> {
     }
 }
 
-/// Inputs that change linearly within a step and that an FMU 3.0 accepts within the step, by their value references in
-/// the FMU. If one element of an array changes, all elements of the array are listed.
+/// Inputs that change linearly within a step and that an FMU 3.0 accepts within the step, by their
+/// value references. FMI sets arrays as a whole: if one element changes, all elements of the array
+/// are listed.
 #[derive(Default)]
 struct Line {
     references: Vec<u32>,
     values: Vec<f64>,
-    /// Positions of the values that change within the step, each with the position of its input among the arguments.
+    /// Pairs of positions of each value that changes within the step: in `values`, and among the
+    /// arguments of the step.
     moving: Vec<(usize, usize)>,
 }
 
 impl Line {
-    /// Selects from the inputs `references`, with the present `values`, the inputs that the FMU accepts within a step, and
-    /// stores them.
+    /// Fills this list with those of the inputs `references` that the FMU accepts within a step.
+    /// `values` are the present values of the inputs.
     fn fill(&mut self, instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
         let description = instance.fmu().description();
         self.references.clear();
@@ -891,7 +905,8 @@ impl Line {
     }
 }
 
-/// Returns an error for a step that did not reach its end although the FMU was not allowed an early return.
+/// Returns an error if the step ended before its end although the host had not allowed early
+/// return. `done` is the result of fmi3DoStep.
 fn require_whole_step(instance: &Instance, done: Step) -> Called {
     let time = done.last_time;
     let (status, mut messages, text) = if done.terminate == 1 {

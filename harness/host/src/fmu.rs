@@ -15,20 +15,21 @@ use crate::c_abi::{Called, Message};
 use crate::description::{ModelDescription, Value, Variable};
 use crate::{fmi2, fmi3};
 
-/// An opened FMU, unpacked into a temporary folder, with its binary loaded.
+/// An opened FMU of either version of FMI: it is unpacked into a temporary folder, and its binary
+/// is loaded.
 #[allow(clippy::large_enum_variant)] // made once and hardly moved
 pub enum Fmu {
     V2(fmi2::Fmu),
     V3(fmi3::Fmu),
 }
 
-/// An instance of an FMU. It is freed when it is dropped, and belongs to the thread that created it.
+/// An instance of an FMU of either version of FMI. It is freed when it is dropped, and it cannot be
+/// sent to another thread than the thread that created it.
 pub enum Instance<'fmu> {
     V2(fmi2::Instance<'fmu>),
     V3(fmi3::Instance<'fmu>),
 }
 
-/// Evaluates an expression with the inner FMU or instance, for both versions of FMI.
 macro_rules! each {
     ($type:ident, $of:expr, $one:ident => $do:expr) => {
         match $of {
@@ -39,14 +40,16 @@ macro_rules! each {
 }
 
 impl Fmu {
-    /// Opens a packed FMU for Co-Simulation and loads the binary for this platform.
+    /// Opens the packed FMU at `path` for Co-Simulation: unpacks it into a temporary folder and
+    /// loads the binary for this platform.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         Fmu::open_with(path, &[])
     }
 
-    /// Opens a packed FMU for Co-Simulation. Of `settings` only structural parameters of FMI 3.0 are used,
-    /// because they determine the sizes of arrays: every instance sets them first, and the description has
-    /// the resulting elements.
+    /// Opens the packed FMU at `path` for Co-Simulation with other values of structural parameters
+    /// of FMI 3.0, which determine the sizes of arrays. `settings` are pairs of a name and a value;
+    /// other parameters among them are ignored. Every instance sets the structural parameters
+    /// first, and the description has the resulting array elements.
     ///
     /// # Errors
     ///
@@ -55,8 +58,9 @@ impl Fmu {
         Fmu::open_for(Interface::CoSimulation, path, settings)
     }
 
-    /// Opens an FMU for simulations between communication points: in Co-Simulation, or in Model Exchange if it does not
-    /// offer Co-Simulation. For `settings` see [`Fmu::open_with`].
+    /// Opens an FMU for simulations that advance from one communication point to the next: in
+    /// Co-Simulation if the FMU offers it, otherwise in Model Exchange with the host's solver. For
+    /// `settings` see [`Fmu::open_with`].
     pub fn open_to_run(path: impl AsRef<Path>, settings: &[(String, String)]) -> Result<Self> {
         let path = path.as_ref();
         let description = ModelDescription::from_fmu(path)?;
@@ -95,8 +99,8 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.binary_hash())
     }
 
-    /// Lists the parts of the process state, for example the rounding mode, that have changed while
-    /// the binary was loaded.
+    /// Names the settings of the process, for example the rounding mode, that changed while the
+    /// binary was loaded. An FMU must not change them.
     pub fn changed(&self) -> &[&'static str] {
         each!(Fmu, self, fmu => fmu.changed())
     }
@@ -105,7 +109,8 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.path())
     }
 
-    /// Creates an instance with logging on, for the interface for which the FMU was opened.
+    /// Creates an instance with the name `name` and with logging on, for the interface
+    /// (Co-Simulation or Model Exchange) for which the FMU was opened.
     pub fn instantiate(&self, name: &str) -> Called<Instance<'_>> {
         Ok(match self {
             Fmu::V2(fmu) => Instance::V2(fmu.instantiate(name)?),
@@ -114,8 +119,7 @@ impl Fmu {
     }
 }
 
-/// Declares methods of [`Instance`] that call the method of the same name of an instance of FMI 2.0
-/// or 3.0.
+/// Declares methods of [`Instance`] that call the equally named method for FMI 2.0 or for FMI 3.0.
 macro_rules! passed_on {
     ($($(#[$doc:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
         impl Instance<'_> {$(
@@ -131,7 +135,8 @@ passed_on! {
     take_messages() -> Vec<Message>;
     take_warnings() -> Vec<String>;
     exit_initialization_mode() -> Called;
-    /// Saves the state. It must be freed with [`Instance::free_state`]; otherwise its memory is lost.
+    /// Saves the state of the instance. The state must be freed with [`Instance::free_state`];
+    /// otherwise its memory is lost.
     get_state() -> Called<State>;
     set_state(state: &State) -> Called;
     serialize(state: &State) -> Called<Vec<u8>>;
@@ -140,17 +145,19 @@ passed_on! {
     get_real(references: &[u32], values: &mut [f64]) -> Called;
     set_real(references: &[u32], values: &[f64]) -> Called;
     value(variable: &Variable) -> Called<Value>;
-    /// Sets a variable or one element of an array. The other elements of the array keep the values that were set last,
-    /// or their start values.
+    /// Sets a variable or one element of an array. FMI sets an array as a whole, so that the other
+    /// elements are sent with it: they keep the values that were set last, or their start values.
     set_value(variable: &Variable, value: Value) -> Called;
     get(name: &str) -> Result<Value>;
     real(name: &str) -> Result<f64>;
-    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or number.
+    /// Sets the variable `name` from a text, for example from the command line: a number, `true` or
+    /// `false`, or an item of an enumeration by its name or number.
     ///
     /// # Errors
     ///
-    /// If the text is not a value of the variable's type, the FMU refuses the value, or the variable is a structural
-    /// parameter of FMI 3.0 and the value differs from the value with which the FMU was opened.
+    /// If the text is not a value of the variable's type, the FMU refuses the value, or the
+    /// variable is a structural parameter of FMI 3.0 and the value differs from the value with
+    /// which the FMU was opened.
     set(name: &str, text: &str) -> Result<()>;
     /// Enters event mode. This and the following calls need an FMU that was opened for Model Exchange.
     enter_event_mode() -> Called;
@@ -182,14 +189,15 @@ impl<'fmu> Instance<'fmu> {
         each!(Instance, self, instance => Version::step(instance, time, step))
     }
 
-    /// Sets the time derivatives of inputs of an FMU 2.0 from now on, per s. An FMU 3.0 receives them only
-    /// within the step.
+    /// Sets the time derivatives of inputs, per s, in an FMU 2.0. In an FMU 3.0 the call does
+    /// nothing, because FMI 3.0 passes new values of inputs within the step instead of derivatives.
     pub fn set_slopes(&mut self, references: &[u32], slopes: &[f64]) -> Called {
         each!(Instance, self, instance => Version::set_slopes(instance, references, slopes))
     }
 
-    /// Makes a step in which Real inputs change linearly. The inputs have already been set to `values`; `slopes` are
-    /// their derivatives, per s. An FMU 3.0 receives further values in intermediate updates.
+    /// Simulates from `time` to `time + step`, s, while the Real inputs `references` change
+    /// linearly. The inputs have already been set to `values`; `slopes` are their derivatives, per
+    /// s. An FMU 3.0 receives further values within the step.
     pub fn do_step_along(
         &mut self,
         time: f64,
@@ -203,7 +211,9 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// Returns true if the FMU 2.0 has refused a step because it requests the end of the simulation.
+    /// Returns `true` if an FMU 2.0 has refused a step because it requests the end of the
+    /// simulation. An FMU 3.0 states this in the result of the step, so that the function returns
+    /// `false`.
     pub fn wants_to_end(&mut self) -> bool {
         match self {
             Instance::V2(instance) => instance.boolean_status(fmi2::TERMINATED).unwrap_or(false),
@@ -211,8 +221,9 @@ impl<'fmu> Instance<'fmu> {
         }
     }
 
-    /// Returns the derivatives of `unknowns` for the change `direction` of `knowns`; all must be scalars of
-    /// the FMU.
+    /// Returns the change of the variables `unknowns` per unit of a change of the variables
+    /// `knowns` in the direction `direction`, which has one component for each known. All variables
+    /// must be scalars.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],

@@ -35,23 +35,26 @@ use files::{bug, temporary};
 
 pub const OPTION: &str = "--guarded";
 pub const CALL: Duration = Duration::from_secs(8);
-/// Default limit of the memory that an FMU may allocate, bytes.
+/// Default limit of the memory that an FMU may allocate in its process, bytes.
 pub const MEMORY: u64 = 320 << 20;
-/// Default limit of the size of a file, bytes. It is raised for large tables.
+/// Default limit of the size of a file that the process may write, bytes. It is raised for large
+/// tables of results.
 pub const FILE: u64 = 64 << 20;
-/// Number of bytes of a process's output that are stored, each of stdout and stderr.
+/// Number of bytes of stdout, and of stderr, that are stored. The rest is counted, but not stored.
 pub const PRINTED: usize = 64 << 10;
 
-/// Number of bytes that a process may print if its output is stored.
+/// Number of bytes that a process may print if its output is stored. Above this limit the process
+/// is killed.
 pub const FLOOD: u64 = 16 << 20;
-/// Number of bytes that a process may print if its output is shown.
+/// Number of bytes that a process may print if its output is shown to the user. Above this limit
+/// the process is killed.
 pub const FLOOD_SHOWN: u64 = 4 << 30;
 
 #[derive(Clone, Debug)]
 pub struct Limits {
     pub call: Duration,
     pub total: Option<Duration>,
-    /// Limit of the memory that the process may use in addition to its memory when the first binary is loaded, bytes.
+    /// Limit of the memory that the process may allocate after the first binary is loaded, bytes.
     /// The same limit applies to temporary files and to shared memory.
     pub memory: u64,
     pub file: u64,
@@ -77,7 +80,8 @@ pub enum Cause {
 #[derive(Debug)]
 pub struct Outcome {
     pub cause: Cause,
-    /// Output to stdout and to stderr, each up to [`PRINTED`] bytes. With [`Output::Shown`] the first element contains both.
+    /// Output of the process to stdout and to stderr, each up to [`PRINTED`] bytes. With
+    /// [`Output::Shown`] the first element contains both.
     pub printed: [Vec<u8>; 2],
 }
 
@@ -102,8 +106,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
-/// Runs a program that calls [`enter`], and waits until this program and all processes that it has started have ended.
-/// `hear` receives the answers that the program sends.
+/// Runs `program` with `arguments` in a process with limits of time, memory and output, so that a
+/// crash or an endless call of an FMU does not stop this program. `program` must call [`enter`].
+/// The function returns when this process and all processes that it has started have ended. `hear`
+/// receives each answer of the process.
 pub fn run<A: AsRef<OsStr>>(
     program: &Path,
     arguments: impl IntoIterator<Item = A>,
@@ -163,7 +169,8 @@ pub fn run<A: AsRef<OsStr>>(
     Ok(Outcome { cause, printed })
 }
 
-/// Waits until a process ends, or kills it if it exceeds a limit. Returns the reason why it ended.
+/// Waits until the process `child` ends, or kills it when it exceeds a limit. Returns the reason
+/// why it ended.
 fn wait_for_end(
     mut child: Child,
     news: &mut Messages<impl FnMut(&[u8])>,
@@ -227,7 +234,8 @@ fn wait_for_end(
     Ok(panic.or(cause).unwrap_or(Cause::Ended(status)))
 }
 
-/// Longest time that a process may still run after it has closed its connection to the parent. Afterwards the parent kills it.
+/// Longest time that a process may still run after it has closed its connection to the parent.
+/// Afterwards the parent kills it.
 const CLOSED: Duration = Duration::from_secs(1);
 
 const COUNTING: Duration = Duration::from_millis(50);
@@ -262,8 +270,8 @@ fn size_on_disk(file: &std::fs::Metadata) -> u64 {
     file.len()
 }
 
-/// Returns the memory that a process shares with other processes, bytes: the mapped memory, or the size of open files
-/// that are in no folder, whichever is larger.
+/// Returns the memory that the process `id` shares with other processes, bytes: the mapped shared
+/// memory, or the size of its open files that are in no folder, whichever is larger.
 #[cfg(target_os = "linux")]
 fn shared_memory(id: u32) -> u64 {
     let process = Path::new("/proc").join(id.to_string());
@@ -295,8 +303,8 @@ fn shared_memory(_: u32) -> u64 {
     0
 }
 
-/// Kills a process, its group, and the processes that have left the group, which are recognised by the temporary
-/// folder in their environment.
+/// Kills the process `child` with its process group. Processes that have left the group are killed,
+/// too: they are recognised by the temporary folder `files` in their environment.
 fn end(id: u32, child: &mut Child, files: &Path) {
     kill_group(id);
     let _ = child.kill(); // it may have ended; either is fine
@@ -308,8 +316,8 @@ fn end(id: u32, child: &mut Child, files: &Path) {
     }
 }
 
-/// Ends all guarded processes, when a signal ends this program. The processes have one second to remove incomplete
-/// files, and no new process can start.
+/// Ends all guarded processes when a signal ends this program. The processes have one second to
+/// remove incomplete files, and no new process can start.
 pub fn end_all() {
     let running = lock(&RUNNING);
     #[cfg(unix)]
@@ -342,8 +350,8 @@ fn kill_group(id: u32) {
 #[cfg(not(unix))]
 fn kill_group(_: u32) {}
 
-/// Returns true if a process has ended. The function does not wait for it, so that the system does not give its
-/// identifier to another process.
+/// Returns `true` if the process has ended. The process remains a zombie, so that the system does
+/// not give its identifier to another process.
 #[cfg(unix)]
 fn has_ended(child: &mut Child) -> Result<bool> {
     let id = rustix::process::Pid::from_raw(i32::try_from(child.id())?);
@@ -362,7 +370,8 @@ fn has_ended(child: &mut Child) -> Result<bool> {
     Ok(child.try_wait()?.is_some())
 }
 
-/// Kills the processes whose environment names `files` as the temporary folder. Returns true if there was such a process.
+/// Kills all processes whose environment variable TMPDIR is the folder `files`. Returns `true` if
+/// there was such a process.
 #[cfg(target_os = "linux")]
 fn kill_descendants(files: &Path) -> bool {
     use rustix::process::{Pid, Signal, kill_process};
@@ -391,7 +400,6 @@ struct Messages<F> {
     channel: channel::Parent,
     hear: F,
     heard_at: Instant,
-    /// Size of the temporary files when the first binary was loaded, bytes; `None` before that.
     loaded: Option<u64>,
     is_endless: bool,
     panic: Option<String>,
@@ -417,7 +425,8 @@ impl<F: FnMut(&[u8])> Messages<F> {
         Messages { channel, hear, heard_at, loaded, is_endless: false, panic, done }
     }
 
-    /// Waits for messages for at most `pause` and handles them. Returns false if none has arrived.
+    /// Waits at most `pause` for messages of the process and handles those that arrive. Returns
+    /// `false` if none has arrived.
     fn read(&mut self, pause: Duration) -> bool {
         let text = |content: &[u8]| String::from_utf8_lossy(content).into_owned();
         self.channel.read(pause, |kind, content| {
@@ -435,8 +444,8 @@ impl<F: FnMut(&[u8])> Messages<F> {
     }
 }
 
-/// Stored part of the output that a process wrote to a pipe: the beginning of the text, and the number of bytes that follow
-/// and were not stored.
+/// Beginning of the output that a process wrote to a pipe, with the number of further bytes that
+/// were not stored.
 #[derive(Default)]
 struct Printed {
     kept: Vec<u8>,
@@ -448,7 +457,8 @@ struct Reader {
     end: Receiver<()>,
 }
 
-/// Starts a thread. If the system is briefly short of resources (EAGAIN), repeats the attempt for up to two seconds.
+/// Starts a thread for `work`. If the system has no resources for a thread at the moment (EAGAIN),
+/// the attempt is repeated for up to two seconds.
 ///
 /// # Panics
 ///
@@ -476,7 +486,8 @@ pub fn spawn(work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
     panic!("a thread could not be started: the system is short of resources");
 }
 
-/// Starts a thread that reads a pipe to its end and stores the beginning, so that the writer never has to wait.
+/// Starts a thread that reads `pipe` to its end and stores the beginning. The process that writes
+/// to the pipe therefore never has to wait. If `shown` is true, the thread also prints the output.
 fn start_reader(mut pipe: PipeReader, shown: bool) -> Reader {
     let (printed, (tell, end)) = (Arc::<Mutex<Printed>>::default(), channel());
     let to = printed.clone();
@@ -501,7 +512,6 @@ fn start_reader(mut pipe: PipeReader, shown: bool) -> Reader {
 struct Guarded {
     channel: channel::Process,
     limits: Limits,
-    /// The pipe for the output of the FMU's binary, and this process's original stdout and stderr.
     #[cfg(unix)]
     streams: Option<[File; 3]>,
 }
@@ -559,24 +569,28 @@ fn send(kind: u8, content: &[u8]) {
     }
 }
 
-/// Sends an answer to the caller of [`run`] in the parent process.
+/// Sends an answer from a guarded process to the parent, where the closure `hear` of [`run`]
+/// receives it.
 pub fn send_answer(content: &[u8]) {
     send(ANSWER, content);
 }
 
-/// Tells the parent that the guarded process has done its work and ends with this exit code.
+/// Tells the parent that this guarded process has done its work and ends with the exit code `code`.
 /// If this process is not guarded, nothing is sent.
 pub fn done(code: u8) {
     send(DONE, &[code]);
 }
 
-/// Reports a panic of the program itself to the parent. Returns false if this process is not guarded.
+/// Reports a panic of our own code to the parent, so that it is not taken for a crash of the FMU.
+/// `report` is the text for the user. Returns `false` if this process is not guarded.
 pub fn panics(report: &str) -> bool {
     send(PANICS, report.as_bytes());
     GUARDED.get().is_some()
 }
 
-/// Returns the original stdout and stderr of a guarded process, which the binary cannot reach by their usual file descriptors.
+/// Returns the original stdout and stderr of a guarded process. The usual file descriptors lead to
+/// a pipe, so that output of the FMU's binary does not mix with results. The result is `None` if
+/// this process is not guarded.
 pub fn streams() -> Option<(&'static File, &'static File)> {
     #[cfg(unix)]
     if let Some([_, stdout, stderr]) = GUARDED.get().and_then(|guarded| guarded.streams.as_ref()) {
@@ -585,8 +599,8 @@ pub fn streams() -> Option<(&'static File, &'static File)> {
     None
 }
 
-/// Sends a sign of life to the parent four times a second, until a call of the FMU takes longer
-/// than its limit.
+/// Sends a sign of life to the parent four times a second. It stops when a call of the FMU takes
+/// longer than its limit; the parent then kills this process.
 fn send_signs_of_life() {
     let Some(guarded) = GUARDED.get() else { return };
     let mut seen: Vec<(Weak<AtomicU64>, u64, Instant)> = Vec::new();
@@ -609,11 +623,12 @@ fn send_signs_of_life() {
     }
 }
 
-/// Call counters of all users of a binary; a counter is odd during a call.
+/// Call counters of all users of a loaded binary. A counter is odd during a call, so that the
+/// parent can detect a call that does not return.
 static CALLS: Mutex<Vec<Weak<AtomicU64>>> = Mutex::new(Vec::new());
 
-/// Marks the beginning and the end of each call by one user of a binary, so that the parent notices a call that does
-/// not return.
+/// Counter of the calls of one user of a binary. It is incremented at the beginning and at the end
+/// of each call.
 #[derive(Debug)]
 pub(crate) struct Calls(Arc<AtomicU64>);
 
@@ -628,7 +643,7 @@ impl Calls {
         calls
     }
 
-    /// Returns a mark that counts as one call of the binary until the mark is dropped.
+    /// Begins a call of a binary that ends when the returned value is dropped.
     pub(crate) fn one() -> Calls {
         let calls = Calls::new();
         calls.begin();
@@ -644,8 +659,9 @@ impl Calls {
     }
 }
 
-/// Sets the limits, and redirects stdout and stderr for the binary that is loaded next. In a guarded process the first
-/// call does this; other calls do nothing.
+/// Sets the limits of the process, and redirects stdout and stderr of the binary that is loaded
+/// next. In a guarded process only the first call does this; in other processes the function does
+/// nothing.
 pub(crate) fn before_loading() {
     static ONCE: Once = Once::new();
     let Some(guarded) = GUARDED.get() else { return };
@@ -675,8 +691,8 @@ pub(crate) fn before_loading() {
     });
 }
 
-/// Raises the limits of memory and file size of a guarded process by `bytes`, because the program's own tables need
-/// memory in addition to the FMU.
+/// Raises the limits of memory and file size of a guarded process by `bytes`, because the program's
+/// own tables of results need memory in addition to the FMU.
 pub fn allow(bytes: u64) {
     before_loading();
     #[cfg(target_os = "linux")]
@@ -689,7 +705,8 @@ pub fn allow(bytes: u64) {
     let _ = bytes;
 }
 
-/// Sets the soft limit of a resource of this process. The limit with which the process was started cannot be exceeded.
+/// Lowers the soft limit of `resource` of this process to `bytes`. The limit with which the process
+/// was started is never exceeded.
 #[cfg(unix)]
 fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let mut limit = rustix::process::getrlimit(resource);
@@ -728,8 +745,9 @@ fn kilobytes(status: &str, kind: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Argument with which a test starts the test program as the guarded process. The test harness reads the argument
-    /// as the name of a test, which does not exist.
+    /// Argument with which a test starts the test program again as the guarded process. Rust's test
+    /// runner reads the argument as the name of a test that does not exist, and therefore runs no
+    /// test.
     const CHILD: &str = "guarded_process";
 
     fn end_of_child(name: &str, work: fn()) -> Cause {
@@ -766,7 +784,6 @@ mod tests {
         assert!(report.contains("row 7 is odd (harness/host/src/guard.rs:"), "{report}");
     }
 
-    /// A guarded process catches a panic and later aborts; the parent reports a crash, not the panic.
     #[test]
     fn a_panic_that_was_caught_does_not_explain_a_later_crash() {
         let cause = end_of_child("a_panic_that_was_caught_does_not_explain_a_later_crash", || {

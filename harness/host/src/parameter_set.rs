@@ -24,7 +24,8 @@ pub struct ParameterSet {
 pub struct Parameter {
     pub name: String,
     pub value: Value,
-    /// Unit that the file states for the value. A value without a unit is in the unit of the FMU's variable.
+    /// Unit that the file states for the value. A value without a unit is in the unit of the FMU's
+    /// variable.
     pub unit: Option<Unit>,
     line: u64,
 }
@@ -38,11 +39,13 @@ pub struct Unit {
 }
 
 impl ParameterSet {
-    /// Reads a file; the ending of its name determines the format.
+    /// Reads a file of parameters. The ending of its name determines the format: TOML, JSON of
+    /// `hubslosh identify`, or SSV.
     ///
     /// # Errors
     ///
-    /// If the file is not valid, has no parameters, or sets a parameter twice. The message begins with the path.
+    /// If the file is not valid, has no parameters, or sets a parameter twice. The message begins
+    /// with the path.
     pub fn read(path: &Path) -> Result<ParameterSet> {
         let shown = path.display();
         let text = input::text(path).with_context(|| format!("the file {shown} cannot be read"))?;
@@ -62,12 +65,14 @@ impl ParameterSet {
 }
 
 impl Parameter {
-    /// Creates a parameter that does not come from a file.
+    /// Creates a parameter that does not come from a file, for example from an argument of the
+    /// command line.
     pub fn new(name: &str, value: Value, unit: Option<Unit>) -> Parameter {
         Parameter { name: name.into(), value, unit, line: 0 }
     }
 
-    /// Returns the value as a text in the unit of the FMU's variable.
+    /// Returns the value as a text in the unit of the FMU's variable, as
+    /// [`Instance::set`](crate::Instance::set) expects it.
     ///
     /// # Errors
     ///
@@ -169,7 +174,8 @@ fn from_toml(text: &str) -> Result<ParameterSet> {
     refuse_duplicates(found)
 }
 
-/// A JSON object in which a repeated name is an error, whereas a map would silently keep the last value.
+/// A JSON object as a list of names and values. Unlike a map, which would silently keep the last
+/// value, it reports a repeated name as an error.
 #[derive(Default)]
 struct Entries<T>(Vec<(String, T)>);
 
@@ -204,7 +210,8 @@ struct Identified {
     parameters: Option<Entries<serde_json::Value>>,
     #[serde(default)]
     settings: Entries<serde_json::Value>,
-    /// True if the fit was accepted. Files of version 0.2 and earlier call this key `described`.
+    /// True if the fit was accepted. Files of version 0.2 and earlier have the key `described`
+    /// instead.
     #[serde(alias = "described")]
     fits: Option<bool>,
     converged: Option<bool>,
@@ -212,8 +219,9 @@ struct Identified {
     decided_by_solver: Vec<serde_json::Value>,
 }
 
-/// Reads the result of an identification: first its `settings`, then the estimates in `parameters`, which override the
-/// settings. The initial states of the recordings are not read, because they are not parameters of the FMU.
+/// Reads the result of an identification. The estimates in `parameters` override the `settings` of
+/// the file. The initial states of the recordings are not read, because they are not parameters of
+/// the FMU.
 fn from_json(text: &str) -> Result<ParameterSet> {
     let none = "it is not a result of `hubslosh identify` with parameters of an FMU";
     let found: Identified = serde_json::from_str(text).map_err(|why| match why.classify() {
@@ -252,9 +260,10 @@ fn from_json(text: &str) -> Result<ParameterSet> {
     Ok(keep_parameters_of_one_run(ParameterSet { parameters, warnings }))
 }
 
-/// Returns the parameters of an identification that one simulation can use: the parameters common to all recordings
-/// and, if there is only one recording, also its own parameters (`NAME@1`). If there are several recordings, their own
-/// parameters are left out, and a warning names them.
+/// Returns the parameters of an identification that one simulation can use. These are the
+/// parameters common to all recordings and, if there is only one recording, also its own parameters
+/// (`NAME@1`). If there are several recordings, their own parameters are left out, and a warning
+/// names them.
 fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     let recording = |name: &str| -> Option<usize> { name.rsplit_once('@')?.1.parse().ok() };
     let has_others = found.parameters.iter().any(|p| recording(&p.name).is_some_and(|n| n > 1));

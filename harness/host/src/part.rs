@@ -21,8 +21,9 @@ pub struct Limit<'a> {
     pub most: usize,
     /// True if each element of the arrays has its own event indicators.
     pub has_indicators: bool,
-    /// The arrays whose size the parameter determines, each with the position of this dimension
-    /// among its indices.
+    /// The arrays whose size the parameter determines. Each is listed with the position of the
+    /// index that counts up to the parameter, for example 0 for the tank and 1 for the mode of
+    /// `tank[1].p[2,3]`.
     pub arrays: &'a [(&'a str, usize)],
 }
 
@@ -32,7 +33,8 @@ pub struct Part {
     pub start_values: Option<String>,
 }
 
-/// Returns start values by name in the format of FMI. `settings` are names and texts as a user writes them.
+/// Converts `settings`, pairs of a name and a text as a user writes it (for example `50 mm`), to
+/// start values in the format of FMI, by name.
 ///
 /// # Errors
 ///
@@ -53,13 +55,15 @@ pub fn start_values(
     settings.into_iter().map(start).collect()
 }
 
-/// Returns the description with only the variables within the limits. `starts` has start values of parameters by name,
-/// in the format of FMI, that replace the values in the description.
+/// Reduces a model description to fewer tanks, modes or appendages, so that people who click in a
+/// tool see only the variables that they use. `xml` is the full description, `limits` has the
+/// number of each kind, and `starts` has start values by name, in the format of FMI, that replace
+/// the values in the description.
 ///
 /// # Errors
 ///
-/// If a limit is above the largest value, a parameter in `starts` is not in the reduced description, or the XML is not
-/// a description of scalars from this project.
+/// If a limit is above the largest value, a parameter in `starts` is not in the reduced
+/// description, or the XML is not a description of scalars from this project.
 pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) -> Result<Part> {
     for limit in limits {
         let Limit { parameter, size, most, .. } = limit;
@@ -144,7 +148,10 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
     Ok(Part { xml: edits.apply_to(xml), start_values })
 }
 
-/// Returns the GUID of a reduced description. Its format is described in `fmu/runtime/src/extent.rs`.
+/// Returns the GUID of a reduced description, from which the binary recognises the sizes: `whole`
+/// is the GUID of the full description, `states` the number of continuous states, and
+/// `start_values` the text of changed start values. The format is described in
+/// `fmu/runtime/src/extent.rs`.
 fn token_of_part(
     whole: &str,
     limits: &[Limit],
@@ -166,8 +173,8 @@ fn fnv(bytes: &[u8]) -> u128 {
     })
 }
 
-/// Splits a name into its form in the table, without indices, and the indices. For example `tank[1].p[2,3]` becomes
-/// `tank[].p` and 1, 2, 3.
+/// Splits the name of an array element into the name of the array in the FMU's table and the
+/// indices. For example `tank[1].p[2,3]` becomes `tank[].p` and 1, 2, 3.
 fn pattern(name: &str) -> (String, Vec<usize>) {
     let (mut text, mut indices, mut rest) = (String::new(), Vec::new(), name);
     while let Some((before, after)) = rest.split_once('[') {
@@ -190,8 +197,8 @@ fn is_within(name: &str, limits: &[Limit]) -> bool {
     })
 }
 
-/// Returns the number of the event indicator of FMI 3.0 that a variable's name denotes, or `None` if the variable
-/// is no event indicator.
+/// Returns the number of the event indicator for a variable with the name `event_indicator[N]` in
+/// FMI 3.0, or `None` for any other variable.
 fn is_indicator(name: &str) -> Option<usize> {
     name.strip_prefix("event_indicator[")?.strip_suffix(']')?.parse().ok()
 }

@@ -9,21 +9,24 @@ use files::budget;
 
 use crate::description::ModelDescription;
 
-/// A row of the result is moved to a row of an input or to the stop time if the two differ by less than this fraction
-/// of the row interval. This is needed because, for example, 3 · 0.02 is not exactly 0.06.
+/// Fraction of the row interval below which two times count as equal. A row of the result this
+/// close to a row of an input, or to the stop time, is moved there. This is needed because, for
+/// example, 3 · 0.02 is not exactly 0.06.
 const SAME: f64 = 1e-6;
 
-/// Sentence in the metadata of a result file. It states the times to which the inputs and the outputs in one row belong.
+/// Sentence in the metadata of a result file. It states the times to which the inputs and the
+/// outputs in one row belong.
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 
-/// Returns a description of the inputs between rows for the metadata of a result.
+/// Returns the words with which the metadata of a result describe the inputs between rows. `hold`
+/// is true for a zero-order hold.
 pub const fn between(hold: bool) -> &'static str {
     if hold { "held from row to row" } else { "straight lines between rows" }
 }
 
-/// An input as a function of time. Two rows with the same time are a jump. Before the first and after the
-/// last row the input is constant.
+/// An input as a function of time, given by rows. Two rows with equal times are a jump. Before the
+/// first and after the last row the input is constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
     time: Vec<f64>,
@@ -33,9 +36,10 @@ pub struct History {
 }
 
 impl History {
-    /// Creates a history with the value `values[k]` at `time[k]` (s). From there it has the slope `slopes[k]` (per s)
-    /// until the next row, at which it may jump. Without `slopes` two rows are joined by a straight line; with `hold`
-    /// the value is constant between rows.
+    /// Creates a history in which row `k` has the time `time[k]`, s, and the value `values[k]`.
+    /// Between two rows the input has the slope `slopes[k]`, per s, and may jump at the next row.
+    /// Without `slopes` two rows are joined by a straight line; with `hold` the value is constant
+    /// between rows.
     ///
     /// # Errors
     ///
@@ -92,28 +96,30 @@ impl History {
         self.slopes.iter().all(|slope| *slope == 0.0)
     }
 
-    /// Returns the value and the slope (per s) that the input has immediately after the time `t` (s). At a jump these are
-    /// the values after it.
+    /// Returns the value and the slope, per s, of the input immediately after the time `t`, s. If
+    /// the input jumps at `t`, these are the values after the jump.
     pub fn after(&self, t: f64) -> (f64, f64) {
         self.at_row(self.time.partition_point(|row| *row <= t), t)
     }
 
-    /// Returns the value at `t` (s) for a clock with rounding errors: a row that begins at most 1e-9 (1 + |t|) s after
-    /// `t` counts as begun.
+    /// Returns the value of the input at the time `t`, s, of a clock with rounding errors. A row
+    /// that begins at most 1e-9 (1 + |t|) s after `t` counts as begun, so that a jump at this row
+    /// is not missed.
     pub fn near(&self, t: f64) -> f64 {
         let slack = 1e-9 * (1.0 + t.abs());
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
-    /// Returns the value of the input and its slope, per s, at `t`, s. `begun` is the number of rows that begin
-    /// at `t` or before.
+    /// Returns the value of the input and its slope, per s, at the time `t`, s. `begun` is the
+    /// number of rows that begin at `t` or before; the callers find it by a search or by counting.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);
         (if t == self.time[k] { value } else { value + slope * (t - self.time[k]) }, slope)
     }
 
-    /// Returns a cursor that evaluates the history at ascending times. This is faster than a search for each time.
+    /// Returns a cursor that evaluates the history at ascending times. This is faster than a search
+    /// for each time.
     pub fn cursor(&self) -> Cursor<'_> {
         Cursor { history: self, begun: 0 }
     }
@@ -125,7 +131,8 @@ pub struct Cursor<'h> {
 }
 
 impl Cursor<'_> {
-    /// Returns the value and the slope (per s) immediately after `t` (s). `t` must not be before the `t` of the previous call.
+    /// Returns the value and the slope, per s, immediately after the time `t`, s. `t` must not be
+    /// before the time of the previous call, because the cursor only moves forwards.
     pub fn after(&mut self, t: f64) -> (f64, f64) {
         let time = &self.history.time;
         while time.get(self.begun).is_some_and(|row| *row <= t) {
@@ -138,14 +145,14 @@ impl Cursor<'_> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     pub time: Vec<f64>,
-    /// True for each point that is a row of the result; `None` if all are.
+    /// For each point, true if the point is a row of the result. `None` if every point is a row.
     pub rows: Option<Vec<bool>>,
 }
 
 impl Schedule {
-    /// Returns the communication points from `start` to `stop`, s: both ends, the times `inputs`, and the
-    /// rows of the result. The rows are `step` seconds apart and end at `stop`; without `step` every
-    /// communication point is a row.
+    /// Returns the communication points from `start` to `stop`, s: both ends, the times in
+    /// `inputs`, at which inputs change, and the rows of the result. The rows are `step` seconds
+    /// apart and end at `stop`; without `step` every communication point is a row.
     ///
     /// # Errors
     ///
@@ -221,8 +228,9 @@ impl Schedule {
     }
 }
 
-/// Returns true if the FMU can receive the slopes of its inputs. An FMU with only Model Exchange can, because
-/// the host integrates it and sets the inputs at any time.
+/// Returns `true` if inputs can change linearly between communication points. The FMU must accept
+/// derivatives or intermediate values of inputs. An FMU with only Model Exchange always can,
+/// because the host integrates it and sets the inputs at any time.
 pub fn interpolates(description: &ModelDescription) -> bool {
     description
         .co_simulation
@@ -230,13 +238,10 @@ pub fn interpolates(description: &ModelDescription) -> bool {
         .is_none_or(|co_simulation| co_simulation.can_interpolate_inputs)
 }
 
-/// Refuses inputs with slopes for an FMU that cannot interpolate. If such inputs were held over each step, they would
-/// lag, and a row of the result would pair an input with the response to the previous input. `hold` is the option by
-/// which the user can hold inputs between rows, for the message.
-///
-/// # Errors
-///
-/// If there is such an input.
+/// Returns an error if an input has slopes, but the FMU cannot interpolate its inputs. If such an
+/// input were held over each step, it would lag, and a row of the result would pair an input with
+/// the response to the previous input. `hold` is the option by which the user can hold inputs
+/// between rows; the message names it.
 pub fn check_interpolation<'h>(
     description: &ModelDescription,
     inputs: impl IntoIterator<Item = (&'h str, &'h History)>,

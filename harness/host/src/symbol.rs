@@ -7,8 +7,8 @@ use cpp_demangle::{DemangleOptions, Symbol};
 
 const LONGEST: usize = 60;
 
-/// A text that stores only the first characters of a symbol's name. Writing fails when it is full, because short
-/// symbols of C++ may stand for extremely long names.
+/// A text that stores only the first characters of a symbol's name. Writing fails when it is full,
+/// because short mangled symbols of C++ may stand for extremely long names.
 #[derive(Default)]
 struct Short(String);
 
@@ -25,7 +25,8 @@ impl Write for Short {
     }
 }
 
-/// Returns the readable name of a symbol, shortened, for a message. `None` if the symbol is mangled and cannot be decoded.
+/// Returns the readable and shortened name of `symbol`, a function of a binary in Rust, C or C++,
+/// for a message. The result is `None` if the symbol is mangled and cannot be decoded.
 pub fn readable(symbol: &str) -> Option<String> {
     let mut name = Short::default();
     let written = if let Ok(rust) = rustc_demangle::try_demangle(symbol) {
@@ -42,7 +43,8 @@ pub fn readable(symbol: &str) -> Option<String> {
     (written.is_ok() || name.0.ends_with('…')).then_some(name.0)
 }
 
-/// Decodes simple names of Microsoft's compiler: `?method@type@ns@@QEAAXXZ` becomes `ns::type::method`.
+/// Decodes simple names of Microsoft's C++ compiler: `?method@type@ns@@QEAAXXZ` becomes
+/// `ns::type::method`. Names with templates or operators give `None`.
 fn demangle_microsoft(symbol: &str) -> Option<String> {
     let (name, _) = symbol.strip_prefix('?')?.split_once("@@")?;
     let parts: Vec<&str> = name.split('@').rev().collect();

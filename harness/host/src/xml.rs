@@ -5,32 +5,36 @@ use std::borrow::Cow;
 use roxmltree::{Document, Error, Node};
 
 pub const DEEPEST: usize = 256;
-/// Size of the largest XML file that is read, bytes. This and the next two limits allow a hundred
+/// Size of the largest XML file that is read, bytes. This limit and the next two allow a hundred
 /// thousand variables, whose description has 27 MB and takes 0.6 GB of memory.
 pub const LONGEST: usize = 32 << 20;
 pub const MOST: usize = 400_000;
 pub const MOST_ATTRIBUTES: usize = 1_000_000;
-/// Largest number of attributes of one element; FMI uses up to 13.
+/// Largest number of attributes of one element. FMI uses up to 13.
 pub const MOST_OF_ONE: usize = 200;
 pub const LONGEST_NAME: usize = 1000;
 /// Longest value of an attribute, bytes. The longest values in FMI are lists of dependencies.
 pub const LONGEST_VALUE: usize = 1 << 20;
-/// Largest number of XML namespaces that a file may declare. It is limited because the time to look up a name grows with it.
+/// Largest number of XML namespaces that a file may declare. It is limited because the time to look
+/// up a name grows with the number of namespaces.
 pub const MOST_NAMESPACES: usize = 100;
 
-/// Reason for refusing a file. All texts except `TooLarge` begin with `line 1, column 1: `.
+/// Reason why an XML file is refused. All texts except `TooLarge` begin with the place, for example
+/// `line 1, column 1: `.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     #[error("{0}")]
     Malformed(String),
     #[error("{0}")]
     TooLarge(String),
-    /// The file has a document type declaration, which can define entities and refer to other files.
+    /// The file has a document type declaration. It is refused because it can define entities that
+    /// expand to huge texts, and can refer to other files.
     #[error("{0}")]
     Doctype(String),
 }
 
-/// An element with its attributes and child elements; text is left out.
+/// An XML element with its attributes and child elements. The text between elements is left out,
+/// because FMI does not use it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
     pub name: Cow<'static, str>,
@@ -40,12 +44,12 @@ pub struct Element {
 }
 
 impl Element {
-    /// Parses a file.
+    /// Parses the XML file with the content `bytes` and returns its root element.
     ///
     /// # Errors
     ///
-    /// If the file is not well-formed, not UTF-8, has a DOCTYPE, or exceeds a limit such as [`DEEPEST`]. The
-    /// text begins with line and column.
+    /// If the file is not well-formed, not UTF-8, has a DOCTYPE, or exceeds a limit such as
+    /// [`DEEPEST`]. The text begins with line and column.
     pub fn parse(bytes: &[u8]) -> Result<Element, Fault> {
         if bytes.len() > LONGEST {
             let length = bytes.len();
@@ -91,7 +95,8 @@ impl Element {
         }
     }
 
-    /// Appends the element in a binary format, which [`Element::unpack`] reads many times faster than XML.
+    /// Appends the element to `to` in a binary format, which [`Element::unpack`] reads many times
+    /// faster than XML.
     pub fn pack(&self, to: &mut Vec<u8>) {
         let number = |number: usize, to: &mut Vec<u8>| to.extend((number as u32).to_le_bytes());
         let text = |text: &str, to: &mut Vec<u8>| {
@@ -109,8 +114,9 @@ impl Element {
         self.children.iter().for_each(|child| child.pack(to));
     }
 
-    /// Reads an element in the format of [`Element::pack`] and removes it from `bytes`, without copying its texts.
-    /// Returns `None` if the bytes have another format.
+    /// Reads an element in the binary format of [`Element::pack`] from the beginning of `bytes` and
+    /// removes it from them. Its texts are borrowed, not copied. The result is `None` if the bytes
+    /// have another format.
     pub fn unpack(bytes: &mut &'static [u8]) -> Option<Element> {
         fn number(bytes: &mut &'static [u8]) -> Option<usize> {
             let number;
@@ -143,12 +149,14 @@ impl Element {
         self.attributes.iter().find(|(name, _)| name == attribute).map(|(_, value)| &**value)
     }
 
-    /// Returns the value of a numeric attribute, or `None` if it is missing or not a number.
+    /// Returns the value of the numeric attribute `attribute`, or `None` if it is missing or not a
+    /// number.
     pub fn number(&self, attribute: &str) -> Option<f64> {
         self.get(attribute).and_then(double)
     }
 
-    /// Returns true if the attribute has the value true or 1.
+    /// Returns `true` if the Boolean attribute `attribute` is true or 1, and `false` if it is
+    /// anything else or missing.
     pub fn flag(&self, attribute: &str) -> bool {
         matches!(self.get(attribute).map(str::trim), Some("true" | "1"))
     }
@@ -162,8 +170,9 @@ impl Element {
     }
 }
 
-/// Returns the first limit that a file exceeds. The limits are checked before parsing, because the time of some parsers
-/// grows with the square of the depth or of the number of attributes. The parser checks later if the file is well-formed.
+/// Returns the first limit that the XML text exceeds, as a sentence. The limits are checked before
+/// parsing, because the time of some parsers grows with the square of the depth or of the number of
+/// attributes. The parser checks later if the file is well-formed.
 fn exceeded_budget(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {
@@ -233,8 +242,8 @@ fn exceeded_budget(text: &str) -> Option<String> {
     None
 }
 
-/// Counts lines incrementally, because counting from the beginning for every element would take quadratic
-/// time.
+/// Position in a text with the number of its line. Lines are counted from the last position on,
+/// because counting from the beginning for every element would take quadratic time.
 struct Lines<'t> {
     text: &'t str,
     at: usize,
@@ -242,8 +251,8 @@ struct Lines<'t> {
 }
 
 impl Lines<'_> {
-    /// Returns the number of the line in which the byte `byte` of the text is. `byte` must not be
-    /// smaller than in the last call.
+    /// Returns the number of the line that contains the byte with the position `byte`. The position
+    /// must not be smaller than in the previous call.
     fn line_at(&mut self, byte: usize) -> u64 {
         let passed = &self.text.as_bytes()[self.at..byte.max(self.at)];
         self.line += passed.iter().filter(|b| **b == b'\n').count() as u64;
@@ -252,7 +261,8 @@ impl Lines<'_> {
     }
 }
 
-/// Parses a number in the format of XML (`xs:double`): with a decimal point, or `INF`, `-INF`, `NaN`.
+/// Parses a number in the format of XML (`xs:double`): a number with a decimal point and an
+/// exponent, `INF`, `-INF` or `NaN`. Returns `None` for any other text, for example for `inf`.
 pub fn double(text: &str) -> Option<f64> {
     match text.trim() {
         "INF" => Some(f64::INFINITY),

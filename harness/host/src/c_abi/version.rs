@@ -56,7 +56,6 @@ functions! { Exchange<B>:
     get_nominals "fmi2GetNominalsOfContinuousStates" "fmi3GetNominalsOfContinuousStates", GetVector;
 }
 
-/// A C function that writes the values of variables into an array of the host.
 pub(crate) trait Getter<T> {
     /// # Safety
     /// The function must belong to the FMU of this instance.
@@ -86,7 +85,6 @@ impl std::fmt::Display for Interface {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Updated {
-    /// The host must update the discrete states again.
     pub again: bool,
     pub terminate: bool,
     pub next_event: Option<f64>,
@@ -110,7 +108,8 @@ pub(crate) const PLATFORM: [&str; 2] = {
     }
 };
 
-/// A version of FMI: its C functions, and the order in which a host calls them.
+/// A version of FMI: its C functions, and the order in which a host calls them. `Fmu` and
+/// `Instance` are generic over this trait, so that code common to FMI 2.0 and 3.0 is written once.
 pub trait Version: Sized {
     const NUMBER: usize;
     const PLATFORM: &'static str = PLATFORM[Self::NUMBER];
@@ -123,7 +122,7 @@ pub trait Version: Sized {
     /// Co-Simulation, `exchanges` if it has Model Exchange.
     fn required_functions(steps: bool, exchanges: bool) -> Vec<&'static str>;
 
-    /// Finds the version's functions in a library.
+    /// Finds the C functions of this version of FMI in `library`.
     ///
     /// # Errors
     ///
@@ -131,17 +130,18 @@ pub trait Version: Sized {
     ///
     /// # Safety
     ///
-    /// The library must be a binary for this version of FMI, because the types of the functions cannot be
-    /// checked.
+    /// The library must be a binary for this version of FMI, because the types of the functions
+    /// cannot be checked.
     unsafe fn load(library: &Library) -> Result<Self, libloading::Error>;
 
-    /// Returns the location of the resources of an FMU that is unpacked in `directory`, in the form that this
-    /// version's instantiation expects.
+    /// Returns the location of the resources of the FMU that is unpacked in `directory`, in the
+    /// form that the instantiation expects: a URI in FMI 2.0, a path in FMI 3.0.
     fn resources(directory: &Path) -> Option<String>;
 
     fn instantiate<'fmu>(fmu: &'fmu Fmu<Self>, name: &str) -> Called<Instance<'fmu, Self>>;
 
-    /// Enters initialization mode with start and stop time (s) and relative tolerance.
+    /// Enters initialization mode. `start` and `stop` are in s, `tolerance` is relative. `None`
+    /// tells the FMU that the stop time or the tolerance is not defined.
     fn initialize(
         instance: &mut Instance<'_, Self>,
         tolerance: Option<f64>,
@@ -153,11 +153,12 @@ pub trait Version: Sized {
 
     fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
 
-    /// Sets the time derivatives of inputs, per s, if this version has a call for that.
+    /// Sets time derivatives of the inputs with the value references `references`, per s. In a
+    /// version of FMI without a function for derivatives of inputs it does nothing.
     fn set_slopes(instance: &mut Instance<'_, Self>, references: &[u32], slopes: &[f64]) -> Called;
 
-    /// Makes a step in which inputs change linearly: their values at the start of the step are `values`, and their
-    /// derivatives are `slopes`, per s.
+    /// Simulates from `time` to `time + step`, s, while the inputs change linearly: `values` are
+    /// the inputs at the start of the step, and `slopes` are their derivatives, per s.
     fn step_along(
         instance: &mut Instance<'_, Self>,
         time: f64,
@@ -203,11 +204,12 @@ pub struct Fmu<V: Version> {
     binary_hash: String,
     path: PathBuf,
     changed: Vec<&'static str>,
-    /// True if all Reals are scalars of type Float64, so that they can be exchanged in one call.
+    /// True if all Reals are scalars of type Float64. They can then be exchanged in one call
+    /// without a check of each reference.
     is_plain: bool,
     plain: Vec<u32>,
-    /// Value references of those Float64 inputs, and elements of input arrays, that an FMU 3.0 accepts within a step;
-    /// ascending.
+    /// Value references, in ascending order, of Float64 inputs, and of elements of input arrays,
+    /// whose values an FMU 3.0 accepts within a step.
     pub(crate) taken: Vec<u32>,
     structural: BTreeMap<u32, Value>,
     // The order of these fields is the order in which they are dropped: first the library, then its files.
@@ -230,7 +232,8 @@ impl<V: Version> Fmu<V> {
         Fmu::from_archive(&archive, described, path, Interface::CoSimulation, &[])
     }
 
-    /// Loads the FMU in an archive for one interface. Of `settings` only structural parameters of FMI 3.0 are used,
+    /// Unpacks an FMU and loads its binary for `interface`. `text` is modelDescription.xml and
+    /// `description` its content. Only structural parameters of FMI 3.0 among `settings` are used,
     /// because they determine the sizes of arrays.
     pub(crate) fn from_archive(
         archive: &Archive,
@@ -266,7 +269,9 @@ impl<V: Version> Fmu<V> {
         Fmu::load_binary(None, directory, path)
     }
 
-    /// Loads the binary of one interface; the two interfaces may have different binaries.
+    /// Loads the binary of the FMU that is unpacked in `directory`. Co-Simulation and Model
+    /// Exchange may have different binaries: `interface` selects one, and without it Co-Simulation
+    /// is used if the FMU offers it.
     pub(crate) fn load_binary(
         interface: Option<Interface>,
         directory: &Path,
@@ -284,8 +289,9 @@ impl<V: Version> Fmu<V> {
         Fmu::load_described(description, interface, directory, path)
     }
 
-    /// Loads the binary for a model description that is already parsed, because parsing a large one takes
-    /// most of the time.
+    /// Loads the binary of the FMU that is unpacked in `directory`, with the model description
+    /// `root`. The caller parses the description once for several calls, because parsing a large
+    /// description takes most of the time.
     pub fn load_for(
         interface: Option<Interface>,
         directory: &Path,
@@ -356,9 +362,11 @@ impl<V: Version> Fmu<V> {
         })
     }
 
-    /// Sets structural parameters to values other than the declared ones. Every instance of [`Fmu::instantiate`] then
-    /// sets them first, in configuration mode, and [`Fmu::description`] has the resulting array sizes. For arrays of
-    /// another size the start values are read from the FMU. `text` is modelDescription.xml.
+    /// Sets structural parameters to values other than the declared values. `settings` are pairs of
+    /// a name and a value, and `text` is modelDescription.xml. Every instance from
+    /// [`Fmu::instantiate`] then sets these parameters first, in configuration mode, and
+    /// [`Fmu::description`] has the resulting array sizes. The start values of arrays whose size
+    /// changes are read from the FMU.
     ///
     /// # Errors
     ///
@@ -413,8 +421,8 @@ impl<V: Version> Fmu<V> {
         &self.binary_hash
     }
 
-    /// Lists the parts of the process state, for example the rounding mode, that have changed while
-    /// the binary was loaded.
+    /// Names the settings of the process, for example the rounding mode, that changed while the
+    /// binary was loaded. An FMU must not change them.
     pub fn changed(&self) -> &[&'static str] {
         &self.changed
     }
@@ -485,8 +493,8 @@ impl<V: Version> Fmu<V> {
     }
 }
 
-/// Returns true if all Reals are scalars of type Float64, and the value references of all Reals that are scalars of
-/// type Float64, in ascending order.
+/// Returns `true` if all Reals of the FMU are scalars of type Float64, and the value references of
+/// all such scalars in ascending order.
 fn scalar_reals(description: &ModelDescription) -> (bool, Vec<u32>) {
     let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
     let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
@@ -510,7 +518,8 @@ pub struct CompletedStep {
     pub terminate: bool,
 }
 
-/// One instance of an FMU. It is freed when it is dropped, and belongs to the thread that created it.
+/// Instance of an FMU. It is freed when it is dropped, and it cannot be sent to another thread than
+/// the thread that created it.
 pub struct Instance<'fmu, V: Version> {
     pub(crate) fmu: &'fmu Fmu<V>,
     pub(crate) component: Component,
@@ -518,8 +527,8 @@ pub struct Instance<'fmu, V: Version> {
     pub(crate) kept: V::Kept,
     warned: Cell<Option<&'static str>>,
     pub(crate) calls: Calls,
-    /// Values of arrays, by value reference. An array is here if single elements of it were set before the whole array
-    /// could be read from the FMU.
+    /// Values of arrays by value reference. FMI sets an array as a whole, so that the array is
+    /// stored here if single elements were set before the array could be read from the FMU.
     arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
     one_thread: PhantomData<*mut ()>,
 }
@@ -536,8 +545,8 @@ impl<V: Version> Drop for Instance<'_, V> {
     }
 }
 
-/// A saved state. It belongs to the instance from which it was taken and must be returned to that instance
-/// with [`Instance::free_state`]; otherwise its memory is lost.
+/// A saved state of an instance. It belongs to the instance from which it was taken. It must be
+/// returned to the instance with [`Instance::free_state`]; otherwise its memory is never freed.
 pub struct FmuState(pub(crate) State);
 
 impl<'fmu, V: Version> Instance<'fmu, V> {
@@ -549,7 +558,8 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.environment.take()
     }
 
-    /// Returns the texts of the warnings since the last call, and drops all other messages.
+    /// Returns the texts of the warnings that the FMU has logged since the last call, and drops all
+    /// other stored messages.
     pub fn take_warnings(&self) -> Vec<String> {
         let messages = self.take_messages().into_iter();
         let warnings = messages.filter(|message| message.status == Status::Warning);
@@ -560,7 +570,8 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.environment.uncategorised()
     }
 
-    /// Returns the name of the last function that returned a warning since the last call of `take_warning`.
+    /// Returns the name of the last C function that returned the status Warning since the previous
+    /// call of `take_warning`, or `None` if no function did.
     pub fn take_warning(&self) -> Option<&'static str> {
         self.warned.take()
     }
@@ -711,8 +722,8 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(values.into_iter().nth(index).unwrap_or(Value::String(String::new())))
     }
 
-    /// Sets a variable or one element of an array. The other elements of the array keep the values that were set last,
-    /// or their start values.
+    /// Sets a variable or one element of an array. FMI sets an array as a whole, so that the other
+    /// elements are sent with it: they keep the values that were set last, or their start values.
     pub fn set_value(&mut self, variable: &Variable, value: Value) -> Called {
         let description = &self.fmu.description;
         let Some(element) = description.element(variable.reference) else {
@@ -763,12 +774,14 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         }
     }
 
-    /// Sets a variable from a text: a number, `true` or `false`, or an item of an enumeration by name or number.
+    /// Sets the variable `name` from a text, for example from the command line: a number, `true` or
+    /// `false`, or an item of an enumeration by its name or number.
     ///
     /// # Errors
     ///
-    /// If the text is not a value of the variable's type, the FMU refuses the value, or the variable is a structural
-    /// parameter of FMI 3.0 and the value differs from the value with which the FMU was opened.
+    /// If the text is not a value of the variable's type, the FMU refuses the value, or the
+    /// variable is a structural parameter of FMI 3.0 and the value differs from the value with
+    /// which the FMU was opened.
     pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
         let description = &self.fmu.description;
         let variable = description.variable(name)?;
@@ -837,11 +850,12 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.fmu.exchange.as_ref().expect("the FMU exports the functions of model exchange")
     }
 
-    /// Enters continuous-time mode.
+    /// Enters continuous-time mode of Model Exchange, in which the host integrates the states.
     ///
     /// # Panics
     ///
-    /// If the FMU does not export the functions of Model Exchange. This applies to all calls of this section.
+    /// If the FMU does not export the functions of Model Exchange. This holds for all functions of
+    /// Model Exchange below.
     pub fn enter_continuous_time_mode(&mut self) -> Called {
         self.call_plain(self.exchange().enter_continuous_time_mode)
     }

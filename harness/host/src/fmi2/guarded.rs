@@ -10,8 +10,8 @@ const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 struct Guarded {
     words: Vec<u64>,
     bytes: usize,
-    /// Content of the array before the call, if the FMU may only read the array; `None` for an
-    /// array into which it may write.
+    /// Content of the array before the call, if the FMU may only read the array. `None` for an
+    /// array that the FMU may write.
     input: Option<Vec<u8>>,
 }
 
@@ -63,7 +63,8 @@ impl Guarded {
     }
 }
 
-/// A write outside an array, or into an array that may only be read.
+/// A fault of an FMU: it has written outside an array of the host, or into an array that it may
+/// only read.
 #[derive(Clone, Debug)]
 pub struct StrayWrite {
     pub call: &'static str,
@@ -94,8 +95,9 @@ fn lengths(all: usize) -> Vec<usize> {
 }
 
 impl Instance<'_> {
-    /// Makes calls with margins around every array, and returns the stray writes that it finds, also in calls
-    /// that fail; for tests.
+    /// Calls the functions that take arrays with guard bytes around every array, and returns the
+    /// places where the FMU has written beyond an array or into an input. It also checks calls that
+    /// the FMU refuses.
     pub fn find_stray_writes(&mut self, lists: &Lists) -> Vec<StrayWrite> {
         let mut found = Vec::new();
         self.begin_call();

@@ -32,7 +32,8 @@ pub struct Parent {
     end: End,
     nonce: [u8; NONCE],
     bytes: Vec<u8>,
-    /// True if bytes have arrived that do not begin with the nonce, so that they were not sent by our own code.
+    /// True if the connection carried bytes that do not begin with the nonce, so that something
+    /// other than our own code has written to it.
     pub is_forged: bool,
     pub is_closed: bool,
 }
@@ -45,14 +46,16 @@ pub struct Process {
 pub const REQUEST: usize = 3;
 const REQUEST_BYTES: usize = NONCE + 8 * REQUEST;
 
-/// Returns random bytes from the hashers of the standard library's maps, which are seeded with random numbers of the system.
+/// Returns random bytes that mark messages of our own code. They come from the hashers of the
+/// standard library's maps, which are seeded with random numbers of the system.
 fn nonce() -> [u8; NONCE] {
     let half = || u128::from(RandomState::new().hash_one(0));
     (half() << 64 | half()).to_ne_bytes()
 }
 
-/// Creates a connection on which the request is already waiting. Returns the parent's end of the connection, and
-/// stdin for the process.
+/// Creates a connection between this program and a process to be started, with `request` already
+/// waiting in it. The process receives `pipe` for its output. Returns the parent's end, and the
+/// stdin to give to the process.
 #[cfg(unix)]
 pub fn open(
     request: [u64; REQUEST],
@@ -77,8 +80,9 @@ pub fn open(
     Ok((parent, OwnedFd::from(stdin).into()))
 }
 
-/// Creates a connection, which is a file in `folder`, on which the request is already waiting. Returns the parent's end
-/// of the connection, and stdin for the process.
+/// Creates a connection between this program and a process to be started, with `request` already
+/// waiting in it. The connection is a file in `folder`. Returns the parent's end, and the stdin to
+/// give to the process.
 #[cfg(not(unix))]
 pub fn open(
     request: [u64; REQUEST],
@@ -105,8 +109,8 @@ impl Parent {
         [&self.nonce[..], &numbers.map(u64::to_le_bytes).concat()].concat()
     }
 
-    /// Waits for messages for at most `pause`, and passes the kind and the content of each message to `hear`. Returns
-    /// false if no message has arrived.
+    /// Waits at most `pause` for messages of the process, and passes kind and content of each
+    /// message to `hear`. Returns `false` if no message has arrived.
     pub fn read(&mut self, pause: Duration, mut hear: impl FnMut(u8, &[u8])) -> bool {
         #[cfg(unix)]
         let _ = self.end.set_read_timeout(Some(pause));
@@ -147,8 +151,8 @@ impl Parent {
 }
 
 impl Process {
-    /// Takes over the connection from stdin, which is empty afterwards. Returns the connection with the request
-    /// and the attached pipe.
+    /// Takes over the connection from stdin, which is empty afterwards, so that an FMU cannot read
+    /// it. Returns the connection, the request of the parent, and the pipe for the output.
     #[cfg(unix)]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::io::IoSliceMut;
@@ -178,7 +182,8 @@ impl Process {
         Ok((process, numbers, pipe))
     }
 
-    /// Takes over the connection from stdin. Returns the connection with the request; there is no pipe on this system.
+    /// Takes over the connection from stdin. Returns the connection and the request of the parent.
+    /// There is no pipe on this system.
     #[cfg(not(unix))]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::os::windows::io::AsHandle;
@@ -196,7 +201,8 @@ impl Process {
         (Process { end: Mutex::new(end), nonce }, std::array::from_fn(number))
     }
 
-    /// Sends a message to the parent process. If the parent has ended, the message is lost.
+    /// Sends a message with its kind and content to the parent process. If the parent has ended,
+    /// the message is lost.
     pub fn send(&self, kind: u8, content: &[u8]) {
         let length = (content.len() as u32).to_le_bytes();
         let message = [&self.nonce, &[kind][..], &length, content].concat();
