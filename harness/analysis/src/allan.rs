@@ -29,8 +29,8 @@ pub use self::fit::{Estimate, Fit, Octaves, Outlier};
 
 use std::f64::consts::{LN_2, PI};
 
-/// Ratio of the flat part of the Allan deviation of flicker noise to the bias instability B. The
-/// FMU's Gauss–Markov bias has the standard deviation B/0.664.
+/// Height of the flat part of the Allan deviation of flicker noise, relative to the bias
+/// instability B. The FMU's Gauss–Markov bias has the standard deviation B/0.664.
 pub const FLICKER: f64 = 0.664;
 
 const PER_DECADE: f64 = 15.0;
@@ -41,11 +41,12 @@ pub struct Point {
     pub variance: f64,
 }
 
-/// Ratio of a record's length to the longest averaging time for which an Allan variance is computed.
+/// Smallest number of averaging intervals in a record: Allan variances are computed for averaging
+/// times up to a tenth of the record, because at longer times too few averages remain.
 const LONGEST: usize = 10;
 
-/// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally spaced in
-/// the logarithm from one sample to a tenth of the record.
+/// Returns the overlapping Allan variance of samples that are `step` seconds apart. The averaging
+/// times are equally spaced in their logarithm, from one sample to a tenth of the record.
 pub fn variances(step: f64, samples: &[f64]) -> Vec<Point> {
     overlapping(step, samples, factors(samples.len() / LONGEST))
 }
@@ -77,8 +78,9 @@ fn factors(last: usize) -> Vec<usize> {
     factors
 }
 
-/// Terms of a gyro's noise. The coefficients are N² (white), B² (flicker), K² (rate random walk), R² (ramp),
-/// and the variance of a Gauss–Markov bias.
+/// Terms of a gyro's noise. The coefficient of each term in the Allan variance is a square: N²
+/// (white noise), B² (flicker noise), K² (rate random walk), R² (rate ramp), or the variance of a
+/// Gauss–Markov bias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
     White,
@@ -89,8 +91,9 @@ pub enum Term {
 }
 
 impl Term {
-    /// Returns the Allan variance at averaging time `tau` (s) for a coefficient of 1. `time` is the
-    /// correlation time of the Gauss–Markov bias, s.
+    /// Returns the Allan variance that this term contributes at the averaging time `tau`, s, if its
+    /// coefficient is 1. `time` is the correlation time of the Gauss–Markov bias, s; other terms do
+    /// not use it.
     fn variance(self, tau: f64, time: f64) -> f64 {
         match self {
             Term::White => 1.0 / tau,
@@ -102,10 +105,14 @@ impl Term {
     }
 }
 
-/// Parameters of a gyro's noise; a term that is absent is 0. They are the angle random walk N, rad/s/√Hz
-/// (`arw`), the bias instability B of flicker noise, rad/s, the rate random walk K, rad/s/√s (`rrw`), the
-/// rate ramp R, rad/s², and a Gauss–Markov bias with its bias instability, rad/s, which is 0.664 times its
-/// standard deviation, and its correlation time T, s, which has no meaning without such a bias.
+/// Noise of a gyro. A term that is absent is 0.
+///
+/// - `arw`: angle random walk N, rad/s/√Hz.
+/// - `flicker`: bias instability B of flicker noise, rad/s.
+/// - `rrw`: rate random walk K, rad/s/√s.
+/// - `ramp`: rate ramp R, rad/s².
+/// - `bias_instability`: 0.664 times the standard deviation of a Gauss–Markov bias, rad/s.
+/// - `bias_time`: correlation time of this bias, s; it has no meaning if `bias_instability` is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     pub arw: f64,
@@ -149,14 +156,16 @@ impl Noise {
         all.into_iter().filter(|term| self.coefficient(*term) > 0.0).collect()
     }
 
-    /// Returns the Allan variance of this noise, (rad/s)², at the averaging time `tau`, s.
+    /// Returns the Allan variance of this noise, (rad/s)², at the averaging time `tau`, s: the sum
+    /// of the variances of its terms.
     pub fn variance(&self, tau: f64) -> f64 {
         let part = |term: Term| self.coefficient(term) * term.variance(tau, self.bias_time);
         self.terms().into_iter().map(part).sum()
     }
 }
 
-/// Returns the Allan variance of a Gauss–Markov process divided by its variance, at `x` correlation times.
+/// Returns the Allan variance of a Gauss–Markov process, divided by the variance of the process.
+/// `x` is the averaging time divided by the correlation time.
 fn markov(x: f64) -> f64 {
     // exp_m1 avoids cancellation: for small x, only (2/3) x³ remains of the terms
     (2.0 * x + 4.0 * (-x).exp_m1() - (-2.0 * x).exp_m1()) / (x * x)

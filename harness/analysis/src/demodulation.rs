@@ -13,36 +13,41 @@ use crate::response::FrequencyResponse;
 use crate::sweep::Sweep;
 use fourier::Complex64;
 
-/// Smallest number of cycles in a window. With three cycles a Hann window still separates the sweep from
-/// other components.
+/// Smallest number of cycles in a window. With three cycles a Hann window still separates the sweep
+/// from other components of the signal.
 pub const LEAST_CYCLES: f64 = 3.0;
 
-/// Length of the window in cycles for a slow sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's sweep
-/// moves by 9 mHz. This is small compared with the 14 mHz half-power width of the slosh at 10 cm, and long
-/// enough to separate the harmonics of a sticking bearing from the sweep.
+/// Number of cycles in the window for a slow sweep. 24 cycles are 10 s at 2.4 Hz, during which the
+/// thesis's sweep moves by 9 mHz. This is little compared with the 14 mHz half-power width of the
+/// slosh in 10 cm of water, and long enough to separate the harmonics of a sticking bearing from
+/// the sweep.
 pub const CYCLES: f64 = 24.0;
 
 const MOST_MOVE: f64 = 0.015;
 
-/// Returns the number of cycles in the window at a frequency, Hz: [`CYCLES`], or fewer if the sweep
-/// would change by more than 1.5 % of its frequency, but at least [`LEAST_CYCLES`], with which
-/// harmonics still average out.
+/// Returns the number of cycles in the demodulation window when the sweep passes `frequency`, Hz.
+/// It is [`CYCLES`], or fewer if the sweep would change by more than 1.5 % of its frequency in the
+/// window. It is at least [`LEAST_CYCLES`], because with fewer cycles harmonics would not average
+/// out.
 pub fn cycles(sweep: &Sweep, frequency: f64) -> f64 {
     let slow = MOST_MOVE * frequency.powi(2) / sweep.rate_at(frequency).abs();
     slow.clamp(LEAST_CYCLES, CYCLES)
 }
 
-/// Frequency responses, one for each output, with the data from which their uncertainty follows. `noise_gain`
-/// is the variance of H if the output has noise of unit power spectral density: Σ|w|²/(h |U|²) at the
-/// responses' frequencies, with the time h between samples.
+/// Frequency responses, one for each output, with the data from which their uncertainty follows.
+///
+/// - `noise_gain`: variance of the response at each frequency if the output has noise of unit power
+///   spectral density. With the window w, the demodulated input U and the time h between samples it
+///   is Σ|w|²/(h |U|²).
 pub struct Demodulated<const N: usize> {
     pub responses: [FrequencyResponse; N],
     pub noise_gain: Vec<f64>,
 }
 
-/// Returns the relative standard deviation of |H|, which is also the standard deviation of the phase in rad.
-/// `unexplained` is the two-sided power spectral density of the part of the output that the response does not
-/// explain, such as noise.
+/// Returns the relative standard deviation of the response's magnitude at each frequency, which is
+/// also the standard deviation of the phase in rad. `unexplained` is the two-sided power spectral
+/// density of the part of the output, such as noise, that the response does not explain.
+/// `noise_gain` is the field of [`Demodulated`].
 pub fn deviation(
     response: &FrequencyResponse,
     unexplained: &[f64],
@@ -52,16 +57,19 @@ pub fn deviation(
     each.map(|((h, v), gain)| (v * gain / 2.0).sqrt() / h.norm()).collect()
 }
 
-/// Returns how fast the error of the response changes with the frequency, relative to the error,
-/// 1/Hz. It is the root of ∫w'²/∫w², which is 2π/√3 divided by the length of a Hann window, divided
-/// by the sweep's rate, Hz/s.
+/// Returns a measure, in 1/Hz, of how fast the random error of the response varies along the
+/// frequency axis when the sweep passes `frequency`, Hz. It is the root mean square of the error's
+/// derivative divided by the root mean square of the error. For a Hann window this is 2π/√3 divided
+/// by the length of the window, s, and by the rate of the sweep, Hz/s.
 pub fn slope(sweep: &Sweep, frequency: f64) -> f64 {
     let window = cycles(sweep, frequency) / frequency;
     std::f64::consts::TAU / 3f64.sqrt() / (window * sweep.rate_at(frequency).abs())
 }
 
-/// Returns the frequency responses of `outputs` to `input`, sampled at `time` (s, equal steps), while `sweep`
-/// passes each of `frequencies` (Hz). Leaves out frequencies that the sweep does not pass.
+/// Returns the frequency responses of `outputs` to `input` by lock-in demodulation: signals are
+/// averaged in a window around the time at which `sweep` passes each of `frequencies`, Hz.
+/// Frequencies that the sweep does not pass are left out. The signals are sampled at the equally
+/// spaced times `time`, s.
 pub fn frequency_responses<const N: usize>(
     sweep: &Sweep,
     time: &[f64],

@@ -4,8 +4,11 @@ use crate::random::Random;
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
 
-/// Features of a frequency response: the frequency of the local maximum of |H| (resonance), the frequency of the local minimum
-/// (antiresonance), both in Hz, and the ratio of the two magnitudes, dB.
+/// Features of a slosh tank's frequency response H.
+///
+/// - `f_res`: frequency of the local maximum of |H| (resonance), Hz.
+/// - `f_dip`: frequency of the local minimum of |H| (antiresonance), Hz.
+/// - `notch_db`: ratio of the two magnitudes, dB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
     pub f_res: Option<f64>,
@@ -20,15 +23,18 @@ pub struct Deviations {
 }
 
 impl Features {
-    /// Returns the standard deviations of the features. They are computed by adding simulated errors to the response. `relative`
-    /// is the relative standard deviation of the response at each frequency. `slope` is the rate at which the error changes with
-    /// the frequency, relative to the error, 1/Hz. In a check with other simulated errors, 95 % of the shifts of a feature were
-    /// below 1.96 of its standard deviations.
+    /// Returns the standard deviations of the features that follow from errors of the response.
+    /// `relative` is the relative standard deviation of the response at each frequency. `slope`
+    /// returns how fast the error varies along the frequency axis at a frequency in Hz, relative to
+    /// the error, in 1/Hz. Simulated errors are added to the response, and the features are found
+    /// again. In a check with other simulated errors, 95 % of the shifts of a feature were below
+    /// 1.96 standard deviations.
     ///
-    /// The error is additive and complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are normal numbers with
-    /// the standard deviation s, the slope, so that errors at frequencies Δf apart have the correlation exp(−s²Δf²/2) of a
-    /// Gaussian window. The slope of the error divided by the curvature of ln |H| would be simpler, but is valid only if the
-    /// error is small compared with the response, which is not the case at an antiresonance.
+    /// The error is complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are
+    /// normal numbers whose standard deviation s is the slope, so that errors at frequencies Δf
+    /// apart have the correlation exp(−s²Δf²/2) of a Gaussian window. It would be simpler to divide
+    /// the slope of the error by the curvature of ln |H|. However, this is valid only if the error
+    /// is small compared with the response, which is not the case at an antiresonance.
     pub fn deviations(
         &self,
         response: &FrequencyResponse,
@@ -82,12 +88,15 @@ impl Features {
         Deviations { f_res, f_dip }
     }
 
-    /// Finds antiresonance and resonance: the lower and the upper end of the largest rise of |H| (in dB) with frequency.
+    /// Finds antiresonance and resonance: the lower and the upper end of the largest rise of the
+    /// magnitude |H|, in dB, with the frequency.
     ///
-    /// The thesis's definition (its 6.9 and 6.10), the smallest and largest |H| in the band, gives the same result if the
-    /// resonance is the highest and the antiresonance the lowest point of the band. It fails if a damped resonance is lower than
-    /// |H| at the band's edge of 1.25 Hz, where the hub's inertia dominates, or if a ripple above the resonance is lower than the
-    /// antiresonance. An end of the band is neither antiresonance nor resonance, and a rise of less than [`LEAST`] is not slosh.
+    /// The thesis defines them as the smallest and the largest |H| in the band (its equations 6.9
+    /// and 6.10). This gives the same result if the resonance is the highest and the antiresonance
+    /// the lowest point of the band. It fails if a damped resonance is lower than |H| at the band's
+    /// edge of 1.25 Hz, where the hub's inertia dominates, or if a ripple above the resonance is
+    /// lower than the antiresonance. An end of the band counts as neither, and a rise of less than
+    /// [`LEAST`] is not slosh.
     pub fn find(response: &FrequencyResponse) -> Self {
         Features::find_within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
@@ -119,16 +128,17 @@ impl Features {
     }
 }
 
-/// Number of simulated errors from which the standard deviation of a feature is computed; 100 determine it to 7 %.
+/// Number of simulated errors from which the standard deviation of a feature is computed. 100
+/// errors determine it to 7 %.
 const DRAWS: usize = 100;
 const WAVES: usize = 8;
 
-/// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still rises by
-/// 3.9 dB.
+/// Smallest rise of the magnitude from antiresonance to resonance that counts as slosh, dB. A tank
+/// damped to ζ = 0.05 still rises by 3.9 dB.
 pub const LEAST: f64 = 1.0;
 
-/// Returns the indices of the lowest and the highest value between which a sequence rises most; `None` if it
-/// rises by less than [`LEAST`].
+/// Returns the indices of the lowest and of the highest value between which the sequence `level`
+/// rises most, or `None` if the rise is less than [`LEAST`].
 fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
     let (mut lowest, mut best, mut rise) = (0, None, LEAST);
     for (i, &value) in level.iter().enumerate() {
@@ -141,8 +151,9 @@ fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
     best
 }
 
-/// Returns the vertex of the parabola through the extremum's three points (dB over log f): frequency in Hz
-/// and level in dB. The grid is equally spaced in log f.
+/// Interpolates an extremum at index `i` by a parabola through three points, in dB over the
+/// logarithm of the frequency. Returns the frequency, Hz, and the level, dB, of its vertex. The
+/// frequencies must be equally spaced in the logarithm.
 fn vertex(response: &FrequencyResponse, level: &[f64], i: usize) -> (f64, f64) {
     let (a, b, c) = (level[i - 1], level[i], level[i + 1]);
     let offset = 0.5 * (a - c) / (a - 2.0 * b + c);

@@ -28,24 +28,27 @@ use fourier::Complex64;
 
 pub const LEAST_PERIODS: f64 = 5.0;
 
-/// A record of a free decay: the oscillating signal in any unit U, at increasing times, s, which need not be
-/// equally spaced.
+/// A record of a free decay: an oscillating signal in any unit, at increasing times, s, which need
+/// not be equally spaced.
 #[derive(Clone, Copy, Debug)]
 pub struct Record<'a> {
     pub time: &'a [f64],
     pub signal: &'a [f64],
 }
 
-/// Returns the amplitude at the time `t` (s) of an oscillation with this frequency (Hz), ζ and ζ_A, whose amplitude is `start`
-/// at t = 0.
+/// Returns the amplitude of a decaying oscillation at the time `t`, s, if its amplitude at t = 0 is
+/// `start`. `frequency` is in Hz, `zeta` is the damping ratio at small amplitudes, and `zeta_a` is
+/// the growth of the damping ratio with the amplitude.
 pub fn amplitude(t: f64, start: f64, [frequency, zeta, zeta_a]: [f64; 3]) -> f64 {
     let s = TAU * frequency * t;
     let g = if (zeta * s).abs() < 1e-9 { s } else { -(-zeta * s).exp_m1() / zeta };
     start * (-zeta * s).exp() / (1.0 + zeta_a * start * g)
 }
 
-/// Evaluates the model with frequency (Hz), ζ, ζ_A and κ at the times of a record. `own` contains the values that differ from
-/// record to record: amplitude, phase, offset and slope at `time[0]`.
+/// Evaluates the model of a free decay at the times `time`, s. The first array has the frequency,
+/// Hz, the damping ratio ζ, its growth ζ_A with the amplitude, and the coefficient κ of the
+/// frequency shift with the squared amplitude. `own` has the values that differ from record to
+/// record: amplitude, phase, offset and slope of the signal at `time[0]`.
 pub fn model(time: &[f64], [frequency, zeta, zeta_a, kappa]: [f64; 4], own: [f64; 4]) -> Vec<f64> {
     let omega = TAU * frequency;
     let damped = (1.0 - zeta * zeta).max(0.0).sqrt();
@@ -66,8 +69,9 @@ pub fn model(time: &[f64], [frequency, zeta, zeta_a, kappa]: [f64; 4], own: [f64
 
 const LINES: usize = 400;
 
-/// Returns frequency, Hz, and amplitude of the largest other oscillation. It is searched in the residual of a fit of an
-/// oscillation with this `frequency`, Hz.
+/// Returns frequency, Hz, and amplitude of the largest oscillation in `residual`, which remains
+/// after an oscillation with `frequency`, Hz, was fitted and subtracted. The search covers half of
+/// `frequency` to ten times `frequency`, but ends at the Nyquist frequency of the mean step.
 pub fn largest_other(time: &[f64], residual: &[f64], frequency: f64) -> (f64, f64) {
     let (n, seconds) = (time.len() as f64, time[time.len() - 1] - time[0]);
     let amplitude = |f: f64| {
@@ -97,12 +101,14 @@ pub struct Start {
 }
 
 const FINE: usize = 4;
-/// Smallest amplitude of the phasor that is used, relative to its largest amplitude in the record.
-/// Noise dominates smaller amplitudes.
+/// Smallest amplitude that is used, relative to the largest amplitude in the record, because noise
+/// dominates smaller amplitudes.
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
-    /// Returns `None` for a record of fewer than [`LEAST_PERIODS`] periods.
+    /// Estimates start values for a fit of the model from the spectrum of `record` and from the
+    /// decay of its amplitude. Returns `None` if the record has fewer than [`LEAST_PERIODS`]
+    /// periods or does not oscillate.
     pub fn fit(record: &Record) -> Option<Start> {
         let Record { time, signal } = *record;
         let n = time.len();
@@ -192,9 +198,10 @@ impl Start {
     }
 }
 
-/// Returns the frequency of the largest line of a signal between `low` and `top`, Hz. Each sample is assigned
-/// to the nearest point of a grid with the mean step, so that one Fourier transform serves samples with any
-/// spacing. Below the Nyquist frequency of this step the error is negligible.
+/// Returns the frequency of the largest line in the spectrum of a signal between `low` and `top`,
+/// Hz. Each sample is assigned to the nearest point of an equally spaced grid, so that one Fourier
+/// transform serves samples with any spacing. Below the Nyquist frequency of this grid the error is
+/// negligible.
 fn largest_line(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;

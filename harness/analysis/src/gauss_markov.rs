@@ -9,8 +9,11 @@
 //! filter turns sensitivities of the rate into sensitivities of the innovations. Least squares of
 //! the innovations is then maximum likelihood, and slow drift is not mistaken for a signal.
 
-/// White noise of the standard deviation σ_w and a Gauss–Markov bias: `drift` is σ_b/σ_w and `time` the
-/// correlation time T of the bias, s.
+/// Noise of a gyro: white noise and a Gauss–Markov bias.
+///
+/// - `white`: standard deviation of the white noise of one sample, in the unit of the signal.
+/// - `drift`: standard deviation of the bias, divided by `white`.
+/// - `time`: correlation time of the bias, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     pub white: f64,
@@ -18,8 +21,11 @@ pub struct Noise {
     pub time: f64,
 }
 
-/// Whitening filter for the rows of one recording. For each row it contains φ of the preceding step, the
-/// Kalman gain K, and 1/sqrt(innovation variance); `log_variance` is Σ ln(innovation variance).
+/// Kalman filter that turns the rows of one recording into white innovations.
+///
+/// - `rows`: for each row the decay φ of the bias since the last row, the Kalman gain, and the
+///   reciprocal of the innovation's standard deviation.
+/// - `log_variance`: sum of the logarithms of the innovations' variances.
 pub struct Whitening {
     rows: Vec<[f64; 3]>,
     log_variance: f64,
@@ -30,8 +36,9 @@ impl Noise {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }
 
-    /// Returns the whitening filter for rows at these times, s. Rows that are not `fresh` contain no new
-    /// measurement; their innovation is 0.
+    /// Returns the whitening filter for rows at the times `time`, s. Rows that are not `fresh`
+    /// repeat an old measurement, so that their innovation is 0; without `fresh` every row is a
+    /// measurement.
     pub fn whitening(&self, time: &[f64], fresh: Option<&[bool]>) -> Whitening {
         let (white, drift) = (self.white.powi(2), (self.white * self.drift).powi(2));
         let mut variance = drift;
@@ -68,7 +75,8 @@ impl Noise {
 }
 
 impl Whitening {
-    /// Replaces a residual, or a sensitivity, by its innovations divided by their standard deviation.
+    /// Replaces `signal` by its innovations, divided by their standard deviations. The signal is a
+    /// residual, or the derivative of a residual with respect to a parameter.
     pub fn apply(&self, signal: &mut [f64]) {
         let mut bias = 0.0;
         for (value, [keep, gain, scale]) in signal.iter_mut().zip(&self.rows) {
@@ -79,7 +87,8 @@ impl Whitening {
         }
     }
 
-    /// Returns Σ ln(innovation variance); together with Σ e² it is −2 ln L up to a constant.
+    /// Returns the sum of the logarithms of the innovations' variances. Together with the sum of
+    /// the squared innovations it is −2 ln L, with the likelihood L, up to a constant.
     pub fn log_variance(&self) -> f64 {
         self.log_variance
     }

@@ -17,21 +17,25 @@ use serde::Serialize;
 use crate::statistics::{mean, median};
 
 pub const LAGS: usize = 50;
-/// Number of rows in a window, which is 20 s at 50 Hz.
+/// Number of rows in a time window of the test, which is 20 s at 50 Hz.
 pub const WINDOW: usize = 1000;
 const BANDS: usize = 100;
 const FEWEST_LINES: usize = 4;
 /// Limit of each test, in standard deviations. If the residual is the gyro's noise, one test
-/// exceeds it with the probability 1e-6, and any of about a hundred tests with 1e-4.
+/// exceeds it with the probability 1e-6, and one of about a hundred tests with 1e-4.
 pub const LIMIT: f64 = 5.0;
 
-/// Results of the tests. Each is in standard deviations of the result that pure noise would give.
+/// Results of the tests of a residual. They are in standard deviations of the result that pure
+/// noise would give.
 ///
 /// - `whiteness`: result of the whiteness test.
-/// - `in_time`, `in_frequency`: largest excess of the power in a time window or a frequency band, with its time,
-///   s, or frequency, Hz.
-/// - `torque`, `torque_squared`: largest cross-correlation with an input, or with its square, over lags up to 2 s.
-/// - `excess`: root mean square of the residual above the noise in the worst band, rad/s (not in standard deviations).
+/// - `in_time`: largest excess of the power in a time window, and the time of the window, s.
+/// - `in_frequency`: largest excess of the power in a frequency band, and the frequency of the
+///   band, Hz.
+/// - `torque`, `torque_squared`: largest cross-correlation with an input, or with its square, over
+///   lags up to 2 s.
+/// - `excess`: root mean square of the residual above the noise in the worst band, rad/s (not in
+///   standard deviations).
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Tests {
     pub whiteness: f64,
@@ -54,8 +58,9 @@ impl Tests {
             .fold(0.0, f64::max)
     }
 
-    /// Tests innovations `e` at `time` (s) under `inputs`, such as a torque; `white` is the standard
-    /// deviation of the noise in the unit of the signal.
+    /// Tests if the innovations `e` of a fit are white noise. `time` are their times, s, `inputs`
+    /// are the inputs of the model, such as the torque, and `white` is the standard deviation of
+    /// the noise in the unit of the signal.
     pub fn run(time: &[f64], inputs: &[&[f64]], e: &[f64], white: f64) -> Self {
         let count = e.len() as f64;
         let middle = mean(e);
@@ -102,15 +107,17 @@ impl Tests {
     }
 }
 
-/// Converts χ² with `n` degrees of freedom into a standard normal deviate (Wilson and Hilferty).
+/// Converts a χ² value with `n` degrees of freedom into a standard normal deviate, by the
+/// approximation of Wilson and Hilferty.
 fn normal(chi_squared: f64, n: f64) -> f64 {
     let spread = 2.0 / (9.0 * n);
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the largest excess of a level over the median of all levels, as a standard normal deviate, and the time or
-/// frequency of this level. Each level is a mean of `n` squares. The conversion to a normal deviate is needed because
-/// the probability of a given excess depends on n.
+/// Returns the largest excess of a level over the median of all levels, as a standard normal
+/// deviate, and the time or the frequency of this level. `levels` are pairs of a level and its time
+/// or frequency; each level is a mean of `n` squares. The conversion to a normal deviate is needed
+/// because the probability of a given excess depends on n.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
     // The mean of χ² is needed, which is larger than its median by this factor.
@@ -121,8 +128,8 @@ fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
         .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
 }
 
-/// Returns the mean periodogram in bands from 0 to half the sampling frequency, the bands' width (Hz), and
-/// the number of lines in each.
+/// Returns the mean of the periodogram of `e` in each of several bands from 0 to half the sampling
+/// frequency, the width of the bands, Hz, and the number of spectral lines in each band.
 fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
     let spectrum = Forward::new(e.len()).transform(e.to_vec());
     let bands = BANDS.min((spectrum.len() - 1) / FEWEST_LINES).max(1);
@@ -136,8 +143,9 @@ fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
     (bands, lines as f64 / (e.len() as f64 * step), lines as f64)
 }
 
-/// Returns the largest cross-correlation of e with an input over lags from 0 to 2 s, in standard deviations
-/// for white e and any input.
+/// Returns the largest cross-correlation of the innovations `e` with `input` over lags from 0 to 2
+/// s. It is in standard deviations of the result for white innovations that do not depend on the
+/// input.
 pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
     let mean = mean(input);
     let lags = ((2.0 / step) as usize).min(e.len() / 2);

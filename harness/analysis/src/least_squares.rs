@@ -2,11 +2,16 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 
 pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
-/// Function that returns the derivatives of the residuals at x, one row per residual; `None` ends the search.
+/// Function that returns the derivatives of the residuals with respect to the unknowns, with one
+/// row for each residual. `None` ends the search.
 pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
-/// Minimum of a sum of squares, as [`minimise`] found it: the unknowns `x` and the `cost` there.
-/// `converged` is false if the search reached its limit of iterations.
+/// Minimum of a sum of squares.
+///
+/// - `x`: values of the unknowns at the minimum.
+/// - `cost`: sum of squares there.
+/// - `converged`: false if the search reached its limit of iterations.
+/// - `reason`: reason for which the search ended.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     pub x: Vec<f64>,
@@ -15,9 +20,9 @@ pub struct Minimum {
     pub reason: String,
 }
 
-/// Returns the solution x with the smallest norm of the least-squares problem |a x − b|. Singular
-/// values up to `least` count as 0. Returns `None` if an entry is NaN or infinite, because the
-/// iteration for the singular values would not end.
+/// Returns the vector x that minimises |a x − b|; if there are several, the shortest of them.
+/// Singular values of `a` up to `least` count as 0. Returns `None` if an entry is NaN or infinite,
+/// because the iteration for the singular values would not end.
 pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector<f64>> {
     if !a.iter().chain(b.iter()).all(|entry| entry.is_finite()) {
         return None;
@@ -25,8 +30,9 @@ pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector
     a.svd(true, true).solve(b, least).ok()
 }
 
-/// Minimises the sum of squares, starting at `x`, by the Levenberg–Marquardt method. `derivatives` is called
-/// only at the point for which `residuals` was called last.
+/// Minimises the sum of squares of `residuals`, starting from the unknowns `x`, by the
+/// Levenberg–Marquardt method. `derivatives` is called only at the point for which `residuals` was
+/// called last, so that both may share a simulation.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
     let method = LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9);
     minimise_by(&method, residuals, derivatives, x)

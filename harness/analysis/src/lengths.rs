@@ -7,18 +7,19 @@ use crate::response::BAND;
 use crate::sweep::Sweep;
 use crate::{spa, welch};
 
-/// Number of samples per cycle of the band's highest frequency that an estimate from a whole record needs. The thesis's
-/// sweep has 14.3 samples per cycle.
+/// Number of samples per cycle of the band's highest frequency that an estimate from a whole record
+/// needs. The thesis's sweep has 14.3 samples per cycle.
 const SAMPLES: f64 = 14.0;
 const MOST_LAG: f64 = 0.5;
 
-/// Longest lag, length of the segments, and decimation for estimates from a whole record; times in s.
+/// Lengths that an estimate of a frequency response from a whole record uses.
 ///
-/// - `lag`: longest lag of [`spa`], with the same number of cycles at the band's centre as 200 s of the thesis's sweep,
-///   and at most half of the record. Its resolution is 1/lag.
-/// - `segment`: length of the segments for coherence. For a sweep, six half-overlapping segments cover each frequency, L =
-///   sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the thesis's sweep.
-/// - `decimation`: number of samples that are averaged to one, in torque and rate alike.
+/// - `lag`: longest lag of [`spa`], s. It has as many cycles at the band's centre as 200 s of the
+///   thesis's sweep, but is at most half of the record. The resolution is 1/lag.
+/// - `segment`: length of the segments for the coherence, s. For a sweep, six half-overlapping
+///   segments cover each frequency, which gives sqrt(1/(3 rate)) with the rate of the sweep in
+///   Hz/s. For noise, a segment has as many cycles as 20 s of the thesis's sweep.
+/// - `decimation`: number of samples that are averaged to one sample, in torque and rate alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lengths {
     pub lag: f64,
@@ -27,8 +28,9 @@ pub struct Lengths {
 }
 
 impl Lengths {
-    /// Returns the longest lag, the length of the segments and the decimation for a record of `duration` s, sampled every
-    /// `step` s. `band` (Hz) contains the power of the torque, and `sweep` is the torque if it is a sweep.
+    /// Returns suitable lengths for a record of `duration` seconds that is sampled every `step`
+    /// seconds. `band` is the range of frequencies with the power of the torque, Hz, and `sweep` is
+    /// the torque if it is a sweep.
     pub fn for_record(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
         let middle = |(from, to): (f64, f64)| (from * to).sqrt();
         let slower = middle(BAND) / middle(band);
@@ -59,8 +61,6 @@ mod tests {
         }
     }
 
-    /// The length of the demodulation window for a sweep from 0.01 to 0.3 Hz is proportional to the mean period. If the
-    /// sweep takes only 2700 s, the window is half of the record.
     #[test]
     fn a_slow_spacecraft_has_longer_windows_and_a_fast_sweep_fewer_cycles() {
         let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };

@@ -18,9 +18,13 @@ use crate::exponential::exponential;
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
 
-/// Parameters of the linear model of hub and liquid: inertia I0 of hub and rigid liquid about the axis, kg·m²,
-/// viscous friction b, N·m·s, torsional stiffness k of the suspension line, N·m/rad, and distance r of the tank
-/// from the axis, m. Each mode has its mass m, kg, its natural frequency, Hz, and its damping ratio ζ.
+/// Linear model of a hub with slosh modes.
+///
+/// - `inertia`: inertia of hub and rigid liquid about the axis, kg·m².
+/// - `friction`: viscous friction of the bearing, N·m·s.
+/// - `stiffness`: torsional stiffness of the suspension line, N·m/rad.
+/// - `arm`: distance of the tank from the axis, m.
+/// - `modes`: mass, kg, natural frequency, Hz, and damping ratio of each slosh mode.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
     pub inertia: f64,
@@ -41,7 +45,8 @@ const SAME: f64 = 1e-9;
 const FLOWS: usize = 1000;
 
 impl Linear {
-    /// Returns Ω/τ at a frequency in Hz, (rad/s)/(N·m).
+    /// Returns the frequency response of the hub's rate to the torque, (rad/s)/(N·m), at
+    /// `frequency`, Hz.
     pub fn response(&self, frequency: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency);
         let slosh: Complex64 = self
@@ -56,16 +61,18 @@ impl Linear {
         (s * (slosh + self.inertia) + self.friction + self.stiffness / s).inv()
     }
 
-    /// Simulates the rate, rad/s, for a torque (N·m) that is linear between samples `step` s apart, from an
-    /// initial rate and liquid at rest.
+    /// Simulates the hub's rate, rad/s, for a torque whose samples, N·m, are `step` seconds apart
+    /// and joined by straight lines. `start` is the rate at the beginning, when the liquid is at
+    /// rest.
     pub fn simulate(&self, step: f64, torque: &[f64], start: f64) -> Vec<f64> {
         let slope = |pair: &[f64]| (pair[1] - pair[0]) / step;
         let slopes: Vec<f64> = torque.windows(2).map(slope).chain([0.0]).collect();
         self.propagate(&|_| step, torque, &slopes, start)
     }
 
-    /// Simulates the hub's rate, rad/s, at the times `time`, s. The torque is given by its value at
-    /// each time, N·m, and by its slope until the next time, N·m/s.
+    /// Simulates the hub's rate, rad/s, at the times `time`, s. The torque has the value
+    /// `torque[k]`, N·m, at `time[k]` and the slope `slopes[k]`, N·m/s, until the next time, at
+    /// which it may jump. `start` is the rate at the first time.
     pub fn simulate_ramps(
         &self,
         time: &[f64],
@@ -77,10 +84,11 @@ impl Linear {
         self.propagate(&step, torque, slopes, start)
     }
 
-    /// Simulates the hub's rate for a torque given by its value at the beginning of each step, N·m, and its slope over
-    /// the step, N·m/s. `step` returns the length of each step, s. The result is exact, because it uses the matrix
-    /// exponential of the states together with the torque's value and slope. The states are ω, y = l α and y' for each
-    /// mode, and the hub's angle.
+    /// Simulates the hub's rate, rad/s, for a torque given by its value at the beginning of each
+    /// step, N·m, and its slope over the step, N·m/s. `step` returns the length of each step, s,
+    /// and `start` is the rate at the beginning. The result is exact, because it uses the matrix
+    /// exponential of the states together with the torque's value and slope. The states are the
+    /// hub's rate, the displacement and the velocity of each mode, and the hub's angle.
     fn propagate(
         &self,
         step: &dyn Fn(usize) -> f64,
@@ -149,13 +157,15 @@ impl Linear {
 }
 
 impl Linear {
-    /// Returns the thesis's bench with 10 cm of water: Table 4.1 with the exact first root of J1', ρ = 1000
-    /// kg/m³, g = 9.81 m/s². `damping` is the damping ratio of the slosh mode.
+    /// Returns the model of the thesis's bench with 10 cm of water: Table 4.1 with the exact first
+    /// root of J1', the density 1000 kg/m³ and g = 9.81 m/s². `damping` is the damping ratio of the
+    /// slosh mode.
     pub fn bench_10_cm(damping: f64) -> Self {
         Self::bench(1.3304311085, 0.7562932719, 2.3436181431, damping)
     }
 
-    /// Returns the thesis's bench with 5 cm of water; everything else is as in [`Linear::bench_10_cm`].
+    /// Returns the model of the thesis's bench with 5 cm of water. `damping` is the damping ratio
+    /// of the slosh mode.
     pub fn bench_5_cm(damping: f64) -> Self {
         Self::bench(0.4165810206, 0.6267811696, 2.1335346636, damping)
     }
@@ -180,8 +190,6 @@ mod tests {
     use crate::{demodulation, spa};
     use std::f64::consts::TAU;
 
-    /// A torque that jumps from sample to sample is held between them. The rate of the free hub equals the
-    /// integral of this torque.
     #[test]
     fn a_torque_jump_is_not_taken_for_a_slope() {
         // a free hub: 0.2 N·m for 1 s, 0 for 1 s, -0.2 N·m for 1 s; the jumps are between samples 0.1 s apart
@@ -221,9 +229,9 @@ mod tests {
         }
     }
 
-    /// Integrates the linear bench by the Runge–Kutta method of fourth order with steps of 2.5 ms (phase error
-    /// over a whole sweep: 2e-5 rad). The torque is a sweep, sampled at 50 Hz and interpolated linearly. Returns
-    /// time, torque and rate.
+    /// Integrates the linear bench `plant` by the Runge–Kutta method of fourth order with steps of
+    /// 2.5 ms, whose phase error over a whole sweep is 2e-5 rad. The torque is sampled at 50 Hz and
+    /// interpolated linearly. Returns time, torque and rate.
     fn swept(plant: &Linear, sweep: &Sweep) -> [Vec<f64>; 3] {
         let mode = plant.modes[0];
         let (w, r) = (TAU * mode.frequency, plant.arm);
@@ -261,8 +269,6 @@ mod tests {
         signals
     }
 
-    /// Sweeps from 3.5 to 1.25 Hz on the exact linear bench are evaluated by lock-in demodulation
-    /// and by spectral analysis.
     #[test]
     fn a_downward_sweep_finds_the_same_antiresonance_and_a_resonance_shifted_downwards() {
         let grid = logarithmic_grid(BAND, 2000);
@@ -289,8 +295,6 @@ mod tests {
         }
     }
 
-    /// Sweeps from 1.25 to 3.5 Hz on the exact linear bench are evaluated by lock-in demodulation
-    /// and by spectral analysis.
     #[test]
     fn both_estimators_find_the_antiresonance_and_the_sweep_shifts_the_resonance_upwards() {
         let grid = logarithmic_grid(BAND, 2000);

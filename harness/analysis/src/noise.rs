@@ -21,13 +21,15 @@ use fourier::Complex64;
 
 const SIDE: usize = 6;
 const LINES: usize = 2 * SIDE + 1;
-/// Number of unknowns of the local rational model: b0, b1, b2, t0, t1, t2, a.
+/// Number of unknowns of the local rational model: three coefficients of the numerator, three of
+/// the transient, and one of the denominator.
 const UNKNOWNS: usize = 7;
 
-/// Returns the two-sided power spectral density of the unexplained part V (unit of the output squared, times
-/// s) at `frequencies` (Hz), for signals sampled every `step` s. It is NaN where no estimate is possible. It
-/// is the mean of five residuals around the frequency, because a single residual has only six degrees of
-/// freedom; five determine a standard deviation to 20 %.
+/// Returns the two-sided power spectral density of the part of `output` that a linear model does
+/// not explain, at `frequencies`, Hz. Its unit is the square of the output's unit, times s. The
+/// signals are sampled every `step` seconds. The result is NaN at frequencies at which no estimate
+/// is possible. Each value is the mean of five neighbouring residuals, because a single residual
+/// has only six degrees of freedom; five determine a standard deviation to 20 %.
 pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
     // A record of N steps has N + 1 samples. N is used because it is usually a round number, whose transform
     // is twice as fast.
@@ -58,8 +60,9 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
     frequencies.iter().map(at).collect()
 }
 
-/// Returns the mean of |V|² over the spectral lines around one frequency, from the spectra `u` of the input
-/// and `y` of the output; `None` if a spectrum is 0 at these lines.
+/// Returns the mean power that a local rational model does not explain in the spectral lines around
+/// one frequency. `u` and `y` are the spectra of input and output there. The result is `None` if a
+/// spectrum is 0 at these lines.
 fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let mean = |x: &[Complex64]| x.iter().map(|x| x.norm()).sum::<f64>() / LINES as f64;
     let (scale_u, scale_y) = (mean(u), mean(y));
@@ -93,8 +96,8 @@ mod tests {
 
     const STEP: f64 = 0.02;
 
-    /// Returns the thesis's sweep with this torque amplitude, N·m, the torque, and the rate
-    /// of the linear bench.
+    /// Returns the thesis's sweep with the torque amplitude `amplitude`, N·m, its torque at every
+    /// sample, and the rate of the linear bench under this torque.
     fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
         let sweep = Sweep { amplitude, ..Sweep::THESIS };
         let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();

@@ -15,9 +15,12 @@
 use crate::response::FrequencyResponse;
 use crate::statistics::about_mean;
 
-/// Off-axis figures of a sweep: the median over the samples of the fraction F_r²/(F_r² + F_t²), 0 to 1, as in
-/// the thesis; the fraction of the whole record, Σ F_r² / Σ (F_r² + F_t²); and the root mean square of the
-/// leakage over the frequencies.
+/// Off-axis part of the liquid's force in a run, in three measures. F_r is the radial force, which
+/// does not turn the hub, and F_t the tangential force, which does.
+///
+/// - `median`: median over the samples of F_r²/(F_r² + F_t²), 0 to 1, as in the thesis.
+/// - `energy`: ratio for the whole record, Σ F_r² / Σ (F_r² + F_t²).
+/// - `leakage`: root mean square of the leakage over the frequencies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OffAxis {
     pub median: f64,
@@ -26,8 +29,8 @@ pub struct OffAxis {
 }
 
 impl OffAxis {
-    /// Computes the off-axis figures of a sweep from the radial and tangential force, N, at every
-    /// sample, and from the leakage at every frequency.
+    /// Computes the off-axis figures from the radial and the tangential force of the liquid, N, at
+    /// every sample, and from the leakage at every frequency.
     pub fn from_forces(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
         let (mut off, mut all) = (0.0, 0.0);
         let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());
@@ -53,15 +56,16 @@ impl OffAxis {
     }
 }
 
-/// Computes the figures for a platform that may tilt, from its rates (rad/s) about the hub's axis and about
-/// other axes, each with its response H to the torque. As in the thesis, the cross-axis energy fraction is
-/// CEF = Σω_i²/(Σω_i² + ω²), and the leakage L = √(Σ|H_i|²)/|H|. Returns the leakage at the responses'
-/// frequencies, then the figures; `None` without a rate about another axis.
+/// Computes the off-axis figures of a platform that may tilt. `rate` is the rate about the hub's
+/// axis, rad/s, and `response` its frequency response H to the torque; `others` has responses H_i
+/// and rates ω_i about other axes. As in the thesis, the cross-axis energy fraction is
+/// Σω_i²/(Σω_i² + ω²), and the leakage is √(Σ|H_i|²)/|H|. Returns the leakage at the frequencies of
+/// the response and the figures, which are `None` without a rate about another axis.
 ///
-/// The mean of each rate is subtracted. Otherwise the bias of a gyro would count as energy: a bias of 1
-/// deg/s about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`] does not
-/// subtract the means of the forces, because they are not measured by a biased sensor, and the centripetal
-/// force of a wave has a mean.
+/// The mean of each rate is subtracted. Otherwise the bias of a gyro would count as energy: a bias
+/// of 1 deg/s about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`]
+/// does not subtract the means of the forces, because they are not measured by a biased sensor, and
+/// the centripetal force of a wave has a mean.
 pub fn off_axis_from_rates(
     response: &FrequencyResponse,
     rate: &[f64],
@@ -84,8 +88,9 @@ pub fn off_axis_from_rates(
     (leakage, Some(off_axis))
 }
 
-/// Returns the leakage at each frequency, from the radial force's response to the torque (N per N·m) and the
-/// tank's distance from the axis, m.
+/// Returns the leakage at each frequency: the moment of the radial force per torque. `radial` is
+/// the response of the radial force to the torque, N per N·m, and `arm` is the tank's distance from
+/// the axis, m.
 pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
     radial.response.iter().map(|h| arm * h.norm()).collect()
 }
@@ -114,8 +119,6 @@ mod tests {
         assert_eq!(off_axis_from_rates(&all, &rate, &[]), (Vec::new(), None));
     }
 
-    /// The rates are 0.1 rad/s about the axis and a twentieth of that about x and y, with a gyro's bias of up
-    /// to 5 deg/s on each axis.
     #[test]
     fn a_bias_of_up_to_5_deg_s_on_any_axis_does_not_change_the_cross_axis_energy_fraction() {
         let wave = |size: f64, phase: f64| -> Vec<f64> {

@@ -19,12 +19,13 @@ impl Random {
         Random(generator)
     }
 
-    /// Returns a uniformly distributed number from 0 (included) to 1 (excluded).
+    /// Returns a uniformly distributed random number from 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Returns a normally distributed number with mean 0 and standard deviation 1 (Box and Muller).
+    /// Returns a normally distributed random number with mean 0 and standard deviation 1, by the
+    /// method of Box and Muller.
     pub fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.uniform()));
         radius * libm::cos(TAU * self.uniform())

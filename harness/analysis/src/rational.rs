@@ -21,16 +21,20 @@ use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use fourier::Complex64;
 
-/// Largest number of spectral lines in a fit. From a band with more lines, equally spaced ones are selected.
+/// Largest number of spectral lines in a fit. If the band has more lines, equally spaced lines are
+/// selected, so that the time of a fit does not grow with the length of the record.
 const POINTS: usize = 1500;
 const LEAST: usize = 20;
 const ROUNDS: usize = 20;
 
 type Spread = [[f64; 6]; 9];
 
-/// The fitted transfer function, with s in units of the band's centre `unit`, rad/s. `misfit` is the root
-/// mean square of the fit's residual, relative to |Y|. `spread` is the square root of the covariance of
-/// numerator and denominator, with one column for each unknown of the fit.
+/// Transfer function from torque to rate, fitted to the spectra of a record.
+///
+/// - `unit`: centre of the band, rad/s, in units of which s is expressed.
+/// - `misfit`: root mean square of the fit's residual, relative to the spectrum of the rate.
+/// - `spread`: square root of the covariance matrix of numerator and denominator, with one column
+///   for each unknown of the fit.
 #[derive(Clone, Debug)]
 pub struct Rational {
     unit: f64,
@@ -40,8 +44,9 @@ pub struct Rational {
 }
 
 impl Rational {
-    /// Fits the transfer function to torque, N·m, and rate, rad/s, sampled every `step` s, from their spectra
-    /// between the frequencies `from` and `to`, Hz. Returns `None` if the spectra have no lines in this band.
+    /// Fits a transfer function to the spectra of torque, N·m, and rate, rad/s, between the
+    /// frequencies `from` and `to`, Hz. The signals are sampled every `step` seconds. Returns
+    /// `None` if the spectra have too few lines in this band.
     pub fn fit(step: f64, torque: &[f64], rate: &[f64], (from, to): (f64, f64)) -> Option<Self> {
         let count = torque.len();
         let bin = 1.0 / (step * count as f64);
@@ -70,9 +75,10 @@ impl Rational {
         misfit.is_finite().then_some(Rational { unit, coefficients, misfit, spread })
     }
 
-    /// Returns the relative standard deviation of the response at `frequencies` (Hz), and the standard
-    /// deviations of its antiresonance and resonance. They are computed by adding each column of the
-    /// covariance's square root to the coefficients.
+    /// Returns the relative standard deviation of the fitted response at `frequencies`, Hz, and the
+    /// standard deviations of its antiresonance and resonance. Each column of the covariance's
+    /// square root is added to the coefficients, and the changes of the results are summed in
+    /// squares.
     pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
         let nominal = self.frequency_response(frequencies);
         let found = Features::find(&nominal);
@@ -111,8 +117,9 @@ impl Rational {
     }
 }
 
-/// Solves the least-squares problem of nine unknowns. Also returns the root mean square residual, and the
-/// rows of a square root of the covariance for the first and the last three unknowns.
+/// Solves the linear least-squares problem `a` x = `b` of nine unknowns. Also returns the root mean
+/// square of the residual, and those rows of a square root of the covariance that belong to the
+/// first three and the last three unknowns.
 fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, Spread))> {
     let sizes = DVector::from_iterator(9, a.column_iter().map(|column| column.norm().max(1e-300)));
     for (mut column, size) in a.column_iter_mut().zip(&sizes) {

@@ -6,8 +6,13 @@ use crate::statistics;
 use crate::transfer_function::{TransferFunction, fit_time};
 use crate::welch::{Segments, Spectra};
 
-/// A transfer function fitted to a run, and its residual: skewness, kurtosis (3 for Gaussian noise), and the
-/// mean coherence with the torque between antiresonance and resonance, `None` if one of them is missing.
+/// A transfer function fitted to a run, with statistics of the residual, which is the rate minus
+/// the rate of the model.
+///
+/// - `fit_frequency`, `fit_time`: explained part in the frequency domain and in the time domain, %.
+/// - `coherence`: mean coherence of residual and torque between antiresonance and resonance; `None`
+///   if one of them is missing.
+/// - `skewness`, `kurtosis`: 0 and 3 for Gaussian noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelFit {
     pub model: TransferFunction,
@@ -19,9 +24,10 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Fits the model to the measured response, and simulates it with the run's torque. Signals are sampled
-    /// every `step` s. Returns the fit together with the spectra of torque and residual in segments of
-    /// `segment` s, or `None` without a response.
+    /// Fits a transfer function to the response `measured` of a run, and simulates it with the
+    /// run's torque. The signals are sampled every `step` seconds. Returns the fit, and the spectra
+    /// of torque and residual in segments of `segment` seconds; returns `None` if `measured` is
+    /// empty.
     pub fn fit(
         step: f64,
         segment: f64,
@@ -54,8 +60,8 @@ impl ModelFit {
     }
 }
 
-/// Returns skewness and kurtosis of a signal: the means of z³ and z⁴, where z is the signal minus its mean,
-/// divided by its standard deviation. They are 0 and 3 for Gaussian noise.
+/// Returns skewness and kurtosis of a signal: the means of z³ and z⁴, where z is the signal minus
+/// its mean, divided by its standard deviation. For Gaussian noise they are 0 and 3.
 pub fn skewness_and_kurtosis(signal: &[f64]) -> (f64, f64) {
     let count = signal.len() as f64;
     let mean = statistics::mean(signal);

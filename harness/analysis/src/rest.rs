@@ -9,22 +9,28 @@ use crate::statistics::{deviation, mean, variance};
 
 const QUANTILES: usize = 200;
 const CHUNKS: usize = 1000;
-/// Range of the histogram to both sides, and the usual width of its bins, both in standard deviations of the readings.
+/// Range of the histogram to both sides of the mean, and the usual width of its bins, both in
+/// standard deviations of the readings.
 const BINS: (f64, f64) = (5.0, 0.1);
-/// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat.
-/// Assoc. 69, 1974, table 1A, case 3: mean and variance estimated).
+/// Limit that the Kolmogorov–Smirnov distance of normal noise exceeds with a probability of 5 %
+/// (Stephens, J. Am. Stat. Assoc. 69, 1974, table 1A, case 3, in which mean and variance are
+/// estimated from the data).
 pub const KOLMOGOROV: f64 = 0.895;
 
 /// Statistics of a record of a gyro at rest.
 ///
-/// - `mean`: the gyro's bias, rad/s; `trend`: slope of the line that fits best, rad/s².
-/// - `deviation` (rad/s), `skewness` and excess `kurtosis`: of the samples after subtraction of this line.
+/// - `mean`: the gyro's bias, rad/s.
+/// - `trend`: slope of the straight line that fits best, rad/s².
+/// - `deviation`, `skewness`, `kurtosis`: standard deviation (rad/s), skewness and excess kurtosis
+///   of the samples minus this line.
 /// - `quantum`: smallest change of the reading, rad/s, which is its quantisation.
-/// - `histogram`: centre of the bin and density of the samples without the line, divided by their standard
-///   deviation.
-/// - `quantiles`: pairs of a standard normal quantile and the same quantile of these samples.
+/// - `histogram`: centre and density of each bin, for the samples minus the line, divided by their
+///   standard deviation.
+/// - `quantiles`: pairs of a standard normal quantile and the quantile of these samples for the
+///   same probability.
 /// - `autocorrelation`: at lags of 0, 1, … steps.
-/// - `allan`: Allan variances, (rad/s)²; `noise`: the noise that was fitted to them ([`Octaves::describe`]).
+/// - `allan`: Allan variances, (rad/s)².
+/// - `noise`: the noise that was fitted to them ([`Octaves::describe`]).
 #[derive(Clone, Debug)]
 pub struct Rest {
     pub step: f64,
@@ -48,17 +54,20 @@ pub struct Chunk {
     pub from: f64,
     pub mean: f64,
     pub variance: f64,
-    /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance, multiplied by √n
-    /// − 0.01 + 0.85/√n (Stephens). For normal readings, quantisation with the step Δ makes it Δ √n/(2σ√(2π)).
+    /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and
+    /// variance, multiplied by √n − 0.01 + 0.85/√n for n readings (Stephens). Quantisation with the
+    /// step Δ raises the distance of normal readings to about Δ √n/(2σ√(2π)).
     pub kolmogorov: f64,
-    /// Kolmogorov–Smirnov distance evaluated only midway between the levels of the readings, where quantisation has no
-    /// effect. The variance of the readings is reduced by the variance of the quantisation error, Δ²/12 (Sheppard).
+    /// Kolmogorov–Smirnov distance as in `kolmogorov`, but evaluated only midway between the levels
+    /// of the readings, where quantisation has no effect. The variance of the readings is reduced
+    /// by the variance of the quantisation error, Δ²/12 (Sheppard).
     pub between_levels: f64,
 }
 
 impl Rest {
-    /// Analyses samples `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to the lag
-    /// `lag` (s).
+    /// Analyses a record of a gyro at rest. `samples` are rates, rad/s, `step` seconds apart.
+    /// Statistics of parts are computed for chunks of `chunk` seconds, and the autocorrelation up
+    /// to a lag of `lag` seconds.
     pub fn analyse(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
         let n = samples.len() as f64;
         let middle = (n - 1.0) / 2.0;
@@ -117,37 +126,39 @@ impl Rest {
         }
     }
 
-    /// Returns the ratio of the samples' variance to the variance of their quantisation, Δ²/12; infinite
-    /// without quantisation.
+    /// Returns the variance of the samples divided by the variance of their quantisation error,
+    /// Δ²/12 with the quantisation step Δ. It is infinite if the samples are not quantised.
     pub fn quantisation_ratio(&self) -> f64 {
         12.0 * (self.deviation / self.quantum).powi(2)
     }
 
-    /// Returns two counts of chunks whose readings are not normal, because their Kolmogorov–Smirnov distance
-    /// exceeds [`KOLMOGOROV`]: the first count uses the distance at the readings, the second the distance between
-    /// the levels of the readings.
+    /// Counts the chunks whose readings are not normal, because their Kolmogorov–Smirnov distance
+    /// exceeds [`KOLMOGOROV`]. The first count uses the distance at all readings, the second the
+    /// distance midway between the levels of quantised readings.
     pub fn not_normal(&self) -> [usize; 2] {
         let count =
             |of: fn(&Chunk) -> f64| self.chunks.iter().filter(|c| of(c) > KOLMOGOROV).count();
         [count(|chunk| chunk.kolmogorov), count(|chunk| chunk.between_levels)]
     }
 
-    /// Returns half of the width of the 95 % interval of white noise's autocorrelation, 1.96/√n.
+    /// Returns the limit within which the autocorrelation of white noise lies with a probability of
+    /// 95 %: 1.96/√n for n samples.
     pub fn white_bound(&self) -> f64 {
         1.96 / (self.count as f64).sqrt()
     }
 
-    /// Returns the fraction of the lags, without lag 0, at which the autocorrelation is outside the
-    /// 95 % interval of white noise. It is 0.05 for white noise.
+    /// Returns the fraction of the lags, except lag 0, at which the autocorrelation is outside the
+    /// 95 % interval of white noise. For white noise this fraction is about 0.05.
     pub fn outside(&self) -> f64 {
         let rest = &self.autocorrelation[1..];
         let out = rest.iter().filter(|r| r.abs() > self.white_bound()).count();
         out as f64 / rest.len().max(1) as f64
     }
 
-    /// Returns two ratios for chunks of `chunk` samples: the standard deviation of the chunks' means divided by its value for
-    /// white noise, and the standard deviation of the chunks' variances divided by its value for normal noise (√(2/n) of the
-    /// variance). Both are 1 for white, stationary noise.
+    /// Compares the scatter between chunks of `chunk` samples with its value for white, stationary,
+    /// normal noise. Returns the standard deviation of the chunks' means, and the standard
+    /// deviation of the chunks' variances, each divided by this value. Both ratios are about 1 for
+    /// white, stationary noise.
     pub fn scatter(&self, chunk: usize) -> [f64; 2] {
         let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
         let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();
@@ -163,8 +174,8 @@ impl Rest {
     }
 }
 
-/// Returns the autocorrelation of a zero-mean signal at lags of 0 to `lags` steps, Σ x_k x_{k+m} / Σ x². It
-/// is 0 for a signal of zeros.
+/// Returns the autocorrelation of a signal with zero mean, Σ x_k x_{k+m} / Σ x_k², at lags m from 0
+/// to `lags` steps. It is 0 for a signal of zeros.
 pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     let lags = lags.clamp(1, signal.len() - 1);
     let length = (signal.len() + lags + 1).next_power_of_two();
@@ -225,7 +236,8 @@ fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Returns the quantile of the standard normal distribution for the probability `part`, by Newton's method for erfc.
+/// Returns the value below which a standard normal variable lies with the probability `part`, 0 to
+/// 1. It is computed by Newton's method from the complementary error function.
 pub fn normal_quantile(part: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..60 {
@@ -267,8 +279,7 @@ mod tests {
         assert!(off.fold(0.0, f64::max) < 0.03);
     }
 
-    /// The noise of the thesis's gyro is normal, with a standard deviation of 0.4 mrad/s. Its readings are not normal, because
-    /// they have steps of 0.15 mrad/s; between these levels they are.
+    /// Readings of the thesis's gyro have normal noise of 0.4 mrad/s and steps of 0.15 mrad/s.
     #[test]
     fn quantised_normal_noise_is_normal_between_its_levels() {
         let mut random = Random::new(3, 0);

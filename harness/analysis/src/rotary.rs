@@ -12,17 +12,22 @@
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
 
-/// Swirl number above which motion counts as rotary. An ellipse with the axis ratio 1 : 3.7 has this swirl number.
+/// Magnitude of the swirl number above which a motion counts as rotary. An ellipse with the axis
+/// ratio 1 : 3.7 has this swirl number.
 pub const ROTARY: f64 = 0.5;
 
-/// Smallest slosh angle, rad, at which the swirl number is evaluated. At smaller angles the small radial part of a
-/// planar wave would dominate it.
+/// Smallest slosh angle at which the swirl number is evaluated, rad. At smaller angles the small
+/// radial part of a planar wave would dominate the swirl number.
 pub const LEAST: f64 = 0.02;
 
 const PERIODS: f64 = 10.0;
 
-/// Rotary motion in a run: its duration, s; the swirl number with the largest absolute value; and for a sweep the
-/// first and the last frequency, Hz, at which the slosh was rotary, `None` if it never was.
+/// Rotary slosh (swirl) in a run.
+///
+/// - `from`, `to`: for a sweep, the first and the last frequency at which the slosh was rotary, Hz;
+///   `None` if it never was.
+/// - `time`: total duration of rotary slosh, s.
+/// - `swirl`: swirl number with the largest magnitude, −1 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
     pub from: Option<f64>,
@@ -31,8 +36,10 @@ pub struct Rotary {
     pub swirl: f64,
 }
 
-/// Returns the swirl number at each frequency, from the responses of the radial and of the tangential slosh angle
-/// to the torque. It is 0 where a torque with the amplitude `torque`, N·m, causes a slosh angle below [`LEAST`].
+/// Returns the swirl number at each frequency: ±1 for a circular motion of the liquid, 0 for a
+/// planar motion. `radial` and `tangential` are the responses of the slosh angles to the torque,
+/// rad/(N·m), and `torque` is the amplitude of the torque, N·m. The result is 0 where the slosh
+/// angle is below [`LEAST`], because noise would dominate.
 pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque: f64) -> Vec<f64> {
     let number = |(x, y): (&Complex64, &Complex64)| {
         let power = x.norm_sqr() + y.norm_sqr();
@@ -57,9 +64,10 @@ impl Rotary {
         }
     }
 
-    /// Measures rotary slosh under any torque, from slosh angles (rad) at equal steps (s), for a liquid with this
-    /// natural frequency (Hz). The result contains the largest swirl number and the duration of rotary slosh. In a
-    /// window with the positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ v²).
+    /// Measures rotary slosh under any torque from the radial and the tangential slosh angle, rad,
+    /// sampled every `step` seconds. `frequency` is the natural frequency of the liquid, Hz, from
+    /// which the length of the evaluated windows follows. In a window with the positions q and the
+    /// velocities v the swirl number is Σ q × v / √(Σ q² Σ v²).
     pub fn from_angles(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
         let length = (PERIODS / frequency / step).ceil() as usize;
         let window = |(x, y): (&[f64], &[f64])| {

@@ -12,8 +12,11 @@ use nalgebra::{DMatrix, DVector};
 
 use fourier::Complex64;
 
-/// Spectra at one frequency: s = jω in a unit near the middle of all lines (which conditions the equations
-/// well), the spectra U and Y, and the divisor `scale` that weights the equation.
+/// Spectra of input and output at one frequency, which give one equation of the fit.
+///
+/// - `s`: complex frequency jω, in a unit near the middle of all lines, so that the equations are
+///   well conditioned.
+/// - `scale`: divisor that weights the equation.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     pub s: Complex64,
@@ -22,8 +25,10 @@ pub struct Line {
     pub scale: f64,
 }
 
-/// Coefficients of B/A, with s in the unit of the lines: the numerator b2, b1, b0 and the denominator a2, a1,
-/// a0, in which the coefficient of s³ is 1.
+/// Coefficients of a transfer function, with s in the unit of [`Line::s`].
+///
+/// - `numerator`: b2, b1, b0 of b2 s² + b1 s + b0.
+/// - `denominator`: a2, a1, a0 of s³ + a2 s² + a1 s + a0.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients {
     pub numerator: [f64; 3],
@@ -42,9 +47,10 @@ impl Coefficients {
     }
 }
 
-/// Fits spectra in `rounds` iterations, with the leakage T if `transient` is true. `solve` solves the
-/// equations of the last iteration by least squares and may return further results, which are returned
-/// together with the coefficients. Returns `None` without data.
+/// Fits a transfer function to `lines` in `rounds` iterations. If `transient` is true, the fit also
+/// contains the leakage of the record's ends. `solve` solves the linear equations of the last
+/// iteration and may compute further results of type `S`, such as a covariance. Returns `None` if
+/// there are too few lines.
 pub fn fit<S>(
     lines: &[Line],
     transient: bool,

@@ -12,12 +12,15 @@ use crate::response::FrequencyResponse;
 use crate::statistics;
 use fourier::Complex64;
 
-/// Longest lag for the thesis's band, s. The resolution of `spa` is about 1/lag: 100 s give 10 mHz. 200 s hardly change
-/// the shape of the antiresonance, whose half-power width is 14 mHz.
+/// Longest lag for the frequency band of the thesis, s. The resolution is about 1/lag: 100 s give
+/// 10 mHz. With 200 s the shape of the antiresonance, whose half-power width is 14 mHz, hardly
+/// changes.
 pub const LAG: f64 = 200.0;
 
-/// A frequency response with the data from which its uncertainty follows. `input` is the two-sided power spectral
-/// density of the input at the response's frequencies, in the input's unit squared times s.
+/// A frequency response with the data from which its uncertainty follows.
+///
+/// - `input`: two-sided power spectral density of the input at the response's frequencies, in the
+///   input's unit squared times s.
 pub struct Estimate {
     pub response: FrequencyResponse,
     pub input: Vec<f64>,
@@ -43,31 +46,36 @@ impl Estimate {
         }
     }
 
-    /// Returns the standard deviation of |H| relative to |H| (and of the phase, rad), from the power that the
-    /// response does not explain. The window averages T/∫w² = T/(3M/4) independent lines:
+    /// Returns the relative standard deviation of the response's magnitude |H| at each frequency,
+    /// which is also the standard deviation of the phase in rad. `unexplained` is the power
+    /// spectral density Φ_v of the part of the output that the response does not explain. A record
+    /// of the length T with the longest lag M averages n = 4 T/(3 M) independent lines, so that
     ///
     /// ```text
-    /// var |H| / |H|² = Φ_v / (2 n |H|² Φ_uu), n = 4 T / (3 M)
+    /// var |H| / |H|² = Φ_v / (2 n |H|² Φ_uu)
     /// ```
     ///
-    /// (Ljung, *System Identification*, 2nd ed., 1999, equations 6.59 and 6.60).
+    /// with the power spectral density Φ_uu of the input (Ljung, *System Identification*, 2nd ed.,
+    /// 1999, equations 6.59 and 6.60).
     pub fn deviation(&self, unexplained: &[f64]) -> Vec<f64> {
         let average = 4.0 * self.duration / (3.0 * self.lag);
         let each = self.response.response.iter().zip(unexplained).zip(&self.input);
         each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
     }
 
-    /// Returns how fast the error of the response changes with the frequency, relative to the error, 1/Hz. It is 2π
-    /// times the root mean square of the lag, weighted with the squared window. The mean square is (1/2 − 15/(4π²)) 2/3
-    /// M² for Hann's window.
+    /// Returns a measure, in 1/Hz, of how fast the random error of the response varies along the
+    /// frequency axis: the root mean square of its derivative divided by its own root mean square.
+    /// It is 2π times the root mean square of the lag, weighted with the squared window. For Hann's
+    /// window with the longest lag M, the mean square of the lag is (1/2 − 15/(4π²)) 2/3 M².
     pub fn slope(&self) -> f64 {
         let pi = std::f64::consts::PI;
         2.0 * pi * self.lag * ((0.5 - 3.75 / (pi * pi)) * 2.0 / 3.0).sqrt()
     }
 }
 
-/// Returns the frequency response of `output` to `input`, sampled every `step` s, at `frequencies` (Hz), with
-/// lags up to `lag` s. Means are removed first.
+/// Returns the frequency response of `output` to `input` by spectral analysis at `frequencies`, Hz.
+/// The signals are sampled every `step` seconds, and their means are removed first. `lag` is the
+/// longest lag of the correlation functions, s.
 pub fn frequency_response(
     step: f64,
     input: &[f64],
@@ -128,14 +136,15 @@ fn estimate(
     response.map(|(h, power)| (h, power * unit)).unzip()
 }
 
-/// Number of frequencies that are summed at the same time. One sum alone would wait for its last addition each time;
-/// sixteen independent sums are six times as fast.
+/// Number of frequencies whose sums are computed at the same time. A single sum would wait for its
+/// last addition each time; sixteen independent sums are six times as fast.
 const TOGETHER: usize = 16;
 
-/// Returns the frequency response from correlation functions, for each angle φ per lag (rad): Σ even cos kφ + j odd sin
-/// kφ divided by Σ auto cos kφ, where `lags` has the even and the odd part of the cross-correlation and the
-/// autocorrelation at each lag k. Also returns the sum in the denominator. The sums use the exact frequencies, because
-/// interpolation between the bins of a transform misses deep antiresonances.
+/// Returns the frequency response at sixteen frequencies from correlation functions, and the power
+/// spectrum of the input. `lags` has the even and the odd part of the cross-correlation and the
+/// autocorrelation at each lag; `angles` are the frequencies in rad per lag. The sums use the exact
+/// frequencies, because interpolation between the lines of a Fourier transform misses deep
+/// antiresonances.
 fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64); TOGETHER] {
     let turn = angles.map(Complex64::cis);
     let (turn_re, turn_im) = (turn.map(|t| t.re), turn.map(|t| t.im));

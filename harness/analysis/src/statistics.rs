@@ -16,7 +16,8 @@ pub fn deviation(values: &[f64]) -> f64 {
     variance(values).sqrt()
 }
 
-/// Returns the correlation coefficient of two signals, −1 to 1; NaN if one of them is constant.
+/// Returns the correlation coefficient of two signals, −1 to 1. It is NaN if one of the signals is
+/// constant.
 pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (mean_a, mean_b) = (mean(a), mean(b));
     let product: f64 = a.iter().zip(b).map(|(x, y)| (x - mean_a) * (y - mean_b)).sum();
@@ -27,20 +28,23 @@ pub fn peak(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()))
 }
 
-/// Returns the value below which the fraction `part` of the values lies; `None` without values.
+/// Returns the value below which the fraction `part` of `values` lies, for example the median for
+/// 0.5, or `None` without values.
 pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get((sorted.len() as f64 * part) as usize).copied()
 }
 
-/// Returns the median; for an even number of values the larger of the two middle ones. `None` without values.
+/// Returns the median of `values`, or `None` without values. For an even number of values it is the
+/// larger of the two middle values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Returns the standard deviation of a signal's white noise, computed from its third differences, in which a motion of a
-/// few hertz almost vanishes. The result is at least step/√12, the rounding error for the smallest step of the signal.
+/// Returns the standard deviation of the white noise in a signal. It is computed from the third
+/// differences of the signal, in which a motion of a few hertz almost vanishes. The result is at
+/// least step/√12, which is the rounding error for the smallest step between two readings.
 pub fn noise_level(signal: &[f64]) -> f64 {
     let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
     let squares: Vec<f64> = third.map(|d| d * d).collect();

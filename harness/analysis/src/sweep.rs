@@ -4,8 +4,12 @@ use std::f64::consts::TAU;
 
 use crate::response::BAND;
 
-/// Torque A sin φ(t) whose frequency φ'/2π goes from f0 to f1, Hz, upwards or downwards, in the duration T,
-/// s.
+/// Torque with a constant amplitude and a frequency that sweeps from one value to another, upwards
+/// or downwards.
+///
+/// - `amplitude`: amplitude of the torque, N·m.
+/// - `f0`, `f1`: frequencies at the beginning and at the end, Hz.
+/// - `duration`: time from `f0` to `f1`, s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     pub amplitude: f64,
@@ -15,8 +19,9 @@ pub struct Sweep {
     pub law: Law,
 }
 
-/// Laws of a sweep's frequency over time: f = f0 e^{at} with a = ln(f1/f0)/T (Rubaga's thesis 5.1.4), or f =
-/// f0 + s t with s = (f1 − f0)/T.
+/// Laws of a sweep's frequency f over the time t, for a sweep from f0 to f1 with the duration T.
+/// Exponential: f = f0 e^{at} with a = ln(f1/f0)/T (Rubaga's thesis, 5.1.4). Linear: f = f0 + s t
+/// with s = (f1 − f0)/T.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     Exponential,
@@ -24,7 +29,7 @@ pub enum Law {
 }
 
 impl Sweep {
-    /// The sweep of Rubaga's thesis (chapter 5) at 0.1 N·m.
+    /// The sweep of Rubaga's thesis (chapter 5), with a torque amplitude of 0.1 N·m.
     pub const THESIS: Sweep =
         Sweep { amplitude: 0.1, f0: BAND.0, f1: BAND.1, duration: 2700.0, law: Law::Exponential };
 
@@ -32,8 +37,9 @@ impl Sweep {
         self.amplitude * self.phase(t).sin()
     }
 
-    /// Returns the phase φ(t) of the sweep, rad: 2π f0 (e^{at} − 1)/a for an exponential sweep with the growth a, and
-    /// 2π (f0 t + s t²/2) for a linear sweep with the slope s.
+    /// Returns the phase of the sweep at the time `t`, s, in rad. For an exponential sweep with the
+    /// growth rate a it is 2π f0 (e^{at} − 1)/a, for a linear sweep with the slope s it is
+    /// 2π (f0 t + s t²/2).
     pub fn phase(&self, t: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {
@@ -53,7 +59,8 @@ impl Sweep {
         }
     }
 
-    /// Returns the time at which the sweep passes `frequency` (Hz), s, or `None` if it does not pass it.
+    /// Returns the time at which the sweep passes `frequency`, Hz, in s, or `None` if the sweep
+    /// does not pass this frequency.
     pub fn time_at_frequency(&self, frequency: f64) -> Option<f64> {
         let Sweep { f0, f1, duration, .. } = *self;
         let t = match self.law {
@@ -63,7 +70,8 @@ impl Sweep {
         (-1e-9..=duration * (1.0 + 1e-12)).contains(&t).then_some(t)
     }
 
-    /// Returns df/dt at `frequency`, Hz/s, negative for a downward sweep.
+    /// Returns the rate at which the frequency changes when the sweep passes `frequency`, Hz, in
+    /// Hz/s. It is negative for a downward sweep.
     pub fn rate_at(&self, frequency: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {
@@ -72,8 +80,9 @@ impl Sweep {
         }
     }
 
-    /// Returns the lowest and the highest frequency, Hz. For a sweep that begins at 0 Hz the lowest is the
-    /// frequency at the end of its first cycle, √(2 f1/T).
+    /// Returns the lowest and the highest frequency of the sweep, Hz. If the sweep begins at 0 Hz,
+    /// the lowest frequency is the frequency at the end of its first cycle, √(2 f1/T) with the
+    /// duration T.
     pub fn band(&self) -> (f64, f64) {
         if self.f0 == 0.0 {
             return ((2.0 * self.f1 / self.duration).sqrt().min(self.f1), self.f1);

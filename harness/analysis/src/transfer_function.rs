@@ -22,8 +22,12 @@ use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::statistics::mean;
 use fourier::Complex64;
 
-/// A transfer function with three stable poles and two zeros, s in rad/s: the real pole has the rate p, 1/s,
-/// and the pole pair the natural frequency ω, rad/s, and the damping ratio ζ.
+/// A transfer function with three stable poles and two zeros, with s in rad/s.
+///
+/// - `numerator`: b2, b1, b0 of b2 s² + b1 s + b0.
+/// - `real_pole`: rate of the real pole, 1/s.
+/// - `pole_omega`: natural frequency of the pair of poles, rad/s.
+/// - `pole_damping`: damping ratio of the pair of poles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TransferFunction {
     pub numerator: [f64; 3],
@@ -33,19 +37,21 @@ pub struct TransferFunction {
 }
 
 impl TransferFunction {
-    /// Returns the frequency of the zeros, Hz; `None` if they are real with opposite signs.
+    /// Returns the natural frequency of the two zeros (the antiresonance), Hz, or `None` if they
+    /// are real with opposite signs.
     pub fn zero_frequency(&self) -> Option<f64> {
         let [b2, _, b0] = self.numerator;
         (b0 / b2 >= 0.0).then(|| (b0 / b2).sqrt() / TAU)
     }
 
-    /// Returns the damping ratio of the zeros; `None` if they have no frequency.
+    /// Returns the damping ratio of the two zeros, or `None` if the zeros are real with opposite
+    /// signs or one of them is 0.
     pub fn zero_damping(&self) -> Option<f64> {
         let [b2, b1, b0] = self.numerator;
         (b0 / b2 > 0.0).then(|| b1 / b2 / (2.0 * (b0 / b2).sqrt()))
     }
 
-    /// Returns a2, a1, a0 of the denominator s³ + a2 s² + a1 s + a0.
+    /// Returns the coefficients a2, a1, a0 of the denominator s³ + a2 s² + a1 s + a0.
     pub fn denominator(&self) -> [f64; 3] {
         let (p, w, z) = (self.real_pole, self.pole_omega, self.pole_damping);
         [p + 2.0 * z * w, w * w + 2.0 * z * w * p, w * w * p]
@@ -66,8 +72,9 @@ impl TransferFunction {
         s * s + 2.0 * self.pole_damping * w * s + w * w
     }
 
-    /// Fits the transfer function to a measured response from two starts and returns the better fit. Returns
-    /// `None` without data.
+    /// Fits a transfer function to a measured frequency response. The search runs from two starts,
+    /// because one alone may miss a narrow resonance, and the better fit is returned. Returns
+    /// `None` if the response is empty.
     pub fn fit(measured: &FrequencyResponse) -> Option<Self> {
         let starts = [by_sanathanan_koerner(measured), at_the_resonance(measured)];
         let fitted = starts.into_iter().flatten().filter_map(|start| {
@@ -87,8 +94,9 @@ impl TransferFunction {
         best.map(|(_, fitted)| fitted)
     }
 
-    /// Returns the share of the measured response that the model explains in the frequency domain, %: 100 (1 − |H_meas
-    /// − H_mod| / |H_meas − mean H_meas|) (thesis 6.15).
+    /// Returns the share of the measured response that the model explains in the frequency domain,
+    /// %: 100 (1 − |H_meas − H_mod| /
+    /// |H_meas − mean H_meas|) with the measured response H_meas and the model's response H_mod (thesis, equation 6.15).
     pub fn fit_frequency(&self, measured: &FrequencyResponse) -> f64 {
         let count = measured.response.len() as f64;
         let mean = measured.response.iter().sum::<Complex64>() / count;
@@ -100,8 +108,9 @@ impl TransferFunction {
         100.0 * (1.0 - (miss / spread).sqrt())
     }
 
-    /// Simulates the response from rest to an input that is linear between samples `step` s apart. The result
-    /// is exact, because it uses the matrix exponential of the state and the input's value and slope.
+    /// Simulates the output of the model, which starts from rest, for an input that is linear
+    /// between samples `step` seconds apart. The result is exact, because it uses the matrix
+    /// exponential of the state and the input's value and slope.
     pub fn simulate(&self, step: f64, input: &[f64]) -> Vec<f64> {
         let (p, w, z) = (self.real_pole, self.pole_omega, self.pole_damping);
         let [b2, b1, b0] = self.numerator;
@@ -126,13 +135,15 @@ impl TransferFunction {
         answer
     }
 
-    /// Returns the free response of the model (without input) that is closest to a signal sampled every `step` s, in
-    /// the sense of least squares over its initial state.
+    /// Returns the free response of the model (the response without input) that is closest to
+    /// `signal`, which is sampled every `step` seconds, in the sense of least squares over the
+    /// initial state.
     ///
-    /// The initial state is needed because the measured band hardly determines the real pole, whose time constant may
-    /// be fitted as a minute or an hour. If the model started from rest, the torque's first half cycle would leave an
-    /// offset of its rate for the whole record, whereas the offset of the hub's rate decays in seconds. MATLAB's
-    /// `compare` estimates the initial state for the same reason.
+    /// The initial state is needed because the measured band hardly determines the real pole, whose
+    /// time constant may be fitted as a minute or an hour. If the model started from rest, the
+    /// torque's first half cycle would leave an offset of the model's rate for the whole record,
+    /// whereas the offset of the hub's rate decays in seconds. MATLAB's `compare` estimates the
+    /// initial state for the same reason.
     pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
         let decay = self.pole_damping * self.pole_omega;
         let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();
@@ -165,8 +176,9 @@ impl TransferFunction {
     }
 }
 
-/// Returns how well the output of a model reproduces a measured signal, %: 100 (1 − |y − ŷ| / |y −
-/// mean y|) with the measured signal y and the model's output ŷ (thesis 6.14).
+/// Returns the share of the measured signal y that the model's output ŷ reproduces, %: 100 (1 − |y
+/// − ŷ| / |y − mean y|) (thesis, equation 6.14). It is 100 for a perfect model and 0 for a
+/// constant.
 pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     let mean = mean(measured);
     let miss: f64 = measured.iter().zip(model).map(|(y, m)| (y - m).powi(2)).sum();
@@ -174,9 +186,9 @@ pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     100.0 * (1.0 - (miss / spread).sqrt())
 }
 
-/// Returns a start with lightly damped poles at the measured resonance, and the zeros that fit best with these
-/// poles. It is needed because the weights in Sanathanan and Koerner's iteration, which gives the other start, may
-/// hide a narrow resonance.
+/// Returns a start of the search with lightly damped poles at the measured resonance, and the zeros
+/// that fit best with these poles. It is needed because the weights in Sanathanan and Koerner's
+/// iteration, which gives the other start, may hide a narrow resonance.
 fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let pole_omega = TAU * Features::find(measured).f_res?;
     let (real_pole, pole_damping) = (0.01 * pole_omega, 0.01);
@@ -201,8 +213,8 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
 
 const ROUNDS: usize = 30;
 
-/// Returns start values of the transfer function by Sanathanan and Koerner's iteration, for the input spectrum U = 1
-/// and the output spectrum Y = H, the measured response.
+/// Returns a start of the search by Sanathanan and Koerner's iteration, in which the input has the
+/// constant spectrum 1 and the output has the measured response as its spectrum.
 fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let count = measured.frequency.len();
     let middle = TAU * measured.frequency.get(count / 2)?;
@@ -229,9 +241,9 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
     })
 }
 
-/// Returns the real pole, 1/s, and frequency, rad/s, and damping ratio of the pole pair of s³ + c2
-/// s² + c1 s + c0. Unstable poles are mirrored to the left half plane. `None` if the roots cannot
-/// be computed.
+/// Returns the poles of 1/(s³ + c2 s² + c1 s + c0): the real pole, 1/s, and the natural frequency,
+/// rad/s, and damping ratio of the pair. Unstable poles are mirrored to the left half plane.
+/// Returns `None` if the roots cannot be computed.
 fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     let cubic = |s: f64| ((s + c2) * s + c1) * s + c0;
     // One real root lies within Cauchy's bound; it is found by bisection.
@@ -250,8 +262,9 @@ fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     (root.is_finite() && w.is_finite()).then_some((root.abs().max(least), w, damping))
 }
 
-/// The variables of the search: b2, b1 and b0 divided by powers of `unit`, which is the ω of the start, and then ln p,
-/// ln ω and ln ζ.
+/// Conversions to and from the variables of the search: b2, b1 and b0 divided by powers of `unit`,
+/// which is the pole frequency of the start, and the logarithms of the real pole, of the pole
+/// frequency and of the damping ratio.
 impl TransferFunction {
     fn from_unknowns(x: &[f64], unit: f64) -> Self {
         TransferFunction {

@@ -17,12 +17,13 @@ use crate::response::FrequencyResponse;
 use crate::statistics;
 use fourier::Complex64;
 
-/// Number of segments of a record, which is the default of MATLAB's `mscohere`, `cpsd` and `tfestimate`.
+/// Default number of segments of a record, as in MATLAB's `mscohere`, `cpsd` and `tfestimate`.
 pub const SEGMENTS: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segments {
-    /// A length in seconds. It is reduced if the record is shorter than [`SEGMENTS`] segments of this length.
+    /// A length in seconds. It is reduced if the record is shorter than [`SEGMENTS`] segments of
+    /// this length.
     Seconds(f64),
     Longest,
 }
@@ -31,12 +32,16 @@ pub const SEGMENT: f64 = 20.0;
 
 pub const RESPONSE: Segments = Segments::Longest;
 
-/// Each segment is padded with zeros to this multiple of its length, so that several bins are
-/// between antiresonance and resonance.
+/// Factor by which each segment is extended with zeros, so that several frequency bins lie between
+/// antiresonance and resonance.
 const PADDING: usize = 4;
 
-/// Averaged auto- and cross-spectra of two signals U and Y, in an arbitrary common unit: |U|², |Y|² and
-/// conj(U) Y per bin. The bins are `resolution` Hz apart; a segment is `length` s long.
+/// Averaged spectra of an input U and an output Y, for each frequency bin.
+///
+/// - `resolution`: distance of the bins, Hz.
+/// - `length`: length of a segment, s.
+/// - `input`, `output`: averages of |U|² and |Y|², in an arbitrary common unit.
+/// - `cross`: average of conj(U) Y in this unit.
 pub struct Spectra {
     pub resolution: f64,
     pub length: f64,
@@ -90,8 +95,9 @@ impl Spectra {
         all
     }
 
-    /// Returns the magnitude-squared coherence of input and output, |S_uy|² / (S_uu S_yy), from 0 to 1, for each
-    /// frequency bin.
+    /// Returns the magnitude-squared coherence of input and output for each frequency bin, from 0
+    /// to 1: |S_uy|² / (S_uu S_yy) with the cross-spectrum S_uy and the power spectra S_uu and
+    /// S_yy.
     pub fn coherence(&self) -> Vec<f64> {
         let at = |k: usize| {
             let power = self.input[k] * self.output[k];
@@ -100,7 +106,8 @@ impl Spectra {
         (0..self.cross.len()).map(at).collect()
     }
 
-    /// Returns the mean coherence of the bins between two frequencies, Hz (thesis 6.17).
+    /// Returns the mean coherence of the frequency bins between `from` and `to`, Hz (thesis,
+    /// equation 6.17).
     pub fn mean_coherence(&self, from: f64, to: f64) -> f64 {
         let (from, to) = (from.min(to), from.max(to));
         let first = (from / self.resolution).ceil() as usize;
@@ -109,8 +116,8 @@ impl Spectra {
         statistics::mean(band)
     }
 
-    /// Returns the signal-to-noise ratio 10 log10(γ²/(1 − γ²)), dB, for each bin from the coherence γ²
-    /// (thesis 6.19).
+    /// Returns the signal-to-noise ratio for each frequency bin, dB. It follows from the coherence
+    /// γ² as 10 log10(γ²/(1 − γ²)) (thesis, equation 6.19).
     pub fn snr_db(&self) -> Vec<f64> {
         self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
     }
@@ -124,8 +131,9 @@ impl Spectra {
         bins.filter(|(f, _)| (from..=to).contains(f)).collect()
     }
 
-    /// Returns the H1 estimate of the frequency response, S_uy / S_uu (cross spectrum over input spectrum), within a
-    /// band, Hz.
+    /// Returns the H1 estimate of the frequency response within the band `from` to `to`, Hz: the
+    /// cross-spectrum divided by the power spectrum of the input. It is unbiased if only the output
+    /// has noise.
     pub fn h1(&self, (from, to): (f64, f64)) -> FrequencyResponse {
         let mut h1 = FrequencyResponse::default();
         for (k, cross) in self.cross.iter().enumerate() {
@@ -177,8 +185,6 @@ mod tests {
         assert!((mean - 20.0).abs() < 1.5, "{mean}");
     }
 
-    /// The phases of the two sweeps are unrelated. With a single segment of 267 s their coherence is high, with segments
-    /// of 20 s it is low.
     #[test]
     fn two_unrelated_sweeps_seem_coherent_only_with_too_few_segments() {
         // 1 to 2 Hz at the thesis's rate: six segments of 20 s contain each frequency, but only one segment of 267 s

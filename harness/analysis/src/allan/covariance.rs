@@ -17,19 +17,21 @@ use nalgebra::DMatrix;
 use super::Term;
 use std::f64::consts::PI;
 
-/// Number of lags per averaging time over which the sum for a covariance runs. Up to this number of
-/// samples per averaging time the sum includes every lag and is exact.
+/// Number of lags per averaging time at which the sum for a covariance is evaluated. If an
+/// averaging time has at most this many samples, the sum contains every lag and is exact.
 const PER_TIME: usize = 8;
-/// The sum for a covariance runs over lags up to this multiple of τ_m + τ_n. At lags above τ_m + τ_n only flicker noise
-/// contributes, and its terms fall as the lag to the power −2.
+/// Longest lag in the sum for a covariance, as a multiple of the sum of the two averaging times.
+/// Beyond one such sum only flicker noise contributes, and its terms fall with the square of the
+/// lag.
 const RANGE: usize = 2;
-/// Largest ratio of two averaging times at which the Allan variances are treated as correlated. At
-/// larger ratios their covariance is set to 0.
+/// Largest ratio of two averaging times whose Allan variances are treated as correlated. For larger
+/// ratios the covariance is set to 0.
 const RATIO: usize = 32;
 
-/// Tables from which the covariance of the Allan variances is computed, for all pairs of averaging times and for
-/// coefficients of 1: the number of pairs of differences at each lag divided by M_m M_n, the scale 1/(2 τ_m² τ_n²), and C_mn
-/// at each lag for each term.
+/// Precomputed sums from which the covariance matrix of Allan variances follows for any
+/// coefficients of the noise. For each pair of averaging times and each lag they contain the weight
+/// of the lag, and, for each term of the noise with the coefficient 1, the covariance C_mn of the
+/// second differences of the angle.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,
@@ -43,7 +45,8 @@ struct Pair {
     of_terms: Vec<Vec<f64>>,
 }
 
-/// Returns the generalized autocovariance of the angle at `lag` (s) for a coefficient of 1.
+/// Returns the generalized autocovariance of the gyro's angle at `lag`, s, for one term of the
+/// noise with the coefficient 1. `time` is the correlation time of the Gauss–Markov bias, s.
 fn angle(term: Term, lag: f64, time: f64) -> f64 {
     let s = lag.abs();
     match term {
@@ -56,8 +59,9 @@ fn angle(term: Term, lag: f64, time: f64) -> f64 {
 }
 
 impl Covariance {
-    /// Computes the tables for records of `count` samples `step` (s) apart, averages of `factors` samples
-    /// (ascending), and these terms. `time` is the correlation time of the Gauss–Markov bias, s.
+    /// Computes the sums for records of `count` samples that are `step` seconds apart. `factors`
+    /// are the numbers of samples per average, ascending; `terms` are the terms of the noise;
+    /// `time` is the correlation time of the Gauss–Markov bias, s.
     pub fn new(step: f64, count: usize, factors: &[usize], terms: &[Term], time: f64) -> Self {
         let mut pairs = Vec::new();
         for (i, &m) in factors.iter().enumerate() {
@@ -71,8 +75,8 @@ impl Covariance {
         Covariance { terms: terms.to_vec(), size: factors.len(), pairs }
     }
 
-    /// Returns the covariance matrix of the Allan variances at all averaging times, for noise with
-    /// these coefficients (N², B², K², …), which are in the order of the terms.
+    /// Returns the covariance matrix of the Allan variances at all averaging times. `coefficients`
+    /// are the coefficients of the noise, such as N² and B², in the order of the terms.
     pub fn matrix(&self, coefficients: &[f64]) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(self.size, self.size);
         let ramp = self.terms.iter().zip(coefficients).find(|(term, _)| **term == Term::Ramp);

@@ -15,24 +15,30 @@ use super::covariance::Covariance;
 use super::{LONGEST, Noise, Term, overlapping};
 
 const NORMAL: f64 = 1.96;
-/// Limit of the fit's χ², as a standard normal deviate, above which the fit is rejected. If the noise model is true, 1
-/// record in 1,000 exceeds it.
+/// Limit of the test of a fit: its χ², converted to a standard normal deviate. If the noise model
+/// is true, 1 record in 1,000 exceeds the limit.
 const MISFIT: f64 = 3.1;
 const ITERATIONS: usize = 12;
-/// Largest number of short averaging times that a fit may leave out, and the longest averaging
-/// time, s, that it may leave out.
+/// Largest number of short averaging times that a fit may leave out, and the longest averaging time
+/// that it may leave out, s.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
-/// Number of octaves of averaging times that a fit leaves out in addition to the octaves that it must leave out to pass
-/// its test. The effect of a filter on the variance halves with each octave, so that an octave which passes the test can
-/// still shift N by several standard deviations.
+/// Number of octaves of averaging times that a fit leaves out in addition to those that it must
+/// leave out to pass its test. A filter in the gyro reduces the variance at short averaging times.
+/// Its effect halves with each octave, so that an octave which just passes the test can still shift
+/// N by several standard deviations.
 const BEYOND: usize = 2;
-/// Shortest correlation time of a Gauss–Markov bias, relative to the shortest averaging time. A shorter one cannot be
-/// distinguished from white noise.
+/// Shortest correlation time of a Gauss–Markov bias, as a multiple of the shortest averaging time.
+/// A bias with a shorter correlation time cannot be distinguished from white noise.
 const SHORTEST: f64 = 10.0;
 
-/// Overlapping Allan variances of one record, or their means over several records, at 1, 2, 4, … samples up to a tenth of
-/// a record. `step` is the time between samples, s, `count` the number of samples per record, and `factors` the numbers
-/// of samples per average.
+/// Overlapping Allan variances of one record, or their means over several records, at averages of
+/// 1, 2, 4, … samples up to a tenth of a record.
+///
+/// - `step`: time between samples, s.
+/// - `count`: number of samples of a record.
+/// - `records`: number of records.
+/// - `factors`: number of samples in each average.
+/// - `variances`: Allan variance for each of the `factors`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octaves {
     step: f64,
@@ -45,18 +51,20 @@ pub struct Octaves {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
-    /// Lower end of the 95 % interval of the coefficient; 0 if the record does not show this noise, NaN if the test failed
-    /// for every tried value.
+    /// Lower end of the 95 % interval of the value. It is 0 if the record does not show this noise,
+    /// and NaN if the interval could not be computed.
     pub low: f64,
-    /// Upper end of the 95 % interval of the coefficient; infinite if the record is too short, NaN if the test failed
-    /// for every tried value.
+    /// Upper end of the 95 % interval of the value. It is infinite if the record is too short, and
+    /// NaN if the interval could not be computed.
     pub high: f64,
-    /// Standard error of the coefficient; NaN if its estimate is 0.
+    /// Standard error of the value; NaN if the value is 0.
     pub error: f64,
 }
 
-/// The averaging time, s, at which a fit deviates most from the record, and the Allan deviation of the record divided by
-/// the Allan deviation of the fit at this time.
+/// The averaging time at which a fit deviates most from the record.
+///
+/// - `tau`: averaging time, s.
+/// - `ratio`: Allan deviation of the record divided by the Allan deviation of the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     pub tau: f64,
@@ -70,8 +78,8 @@ pub struct Fit {
     pub bias_time: Option<Estimate>,
     pub from: f64,
     pub chi_squared: (f64, usize),
-    /// True if the noise model passes the test of the fit: at most 1 of 1,000 records with exactly
-    /// this noise would deviate more from it.
+    /// True if the noise model passes the test of the fit. If the gyro had exactly this noise, at
+    /// most 1 of 1,000 records would fail the test.
     pub fits: bool,
     pub worst: Outlier,
 }
@@ -107,15 +115,18 @@ impl Octaves {
         Some(Octaves { records: records.len(), variances, ..first.clone() })
     }
 
-    /// Fits `terms` to the octaves from number `from` on. Returns `None` if the octaves show no noise, or are
-    /// fewer than the parameters.
+    /// Fits the noise terms `terms` to the octaves. The octaves before number `from`, which have
+    /// the shortest averaging times, are left out. Returns `None` if the octaves show no noise, or
+    /// if there are fewer octaves than parameters.
     pub fn fit(&self, terms: &[Term], from: usize) -> Option<Fit> {
         Problem { octaves: self, terms, from }.fit()
     }
 
-    /// Fits N, B and K. If this fit is rejected, tries to leave out short averaging times, which a filter of the gyro
-    /// affects, or to add a ramp or a Gauss–Markov bias. If every fit is rejected, returns the fit of N, B and K to all
-    /// octaves. Returns `None` if [`Octaves::fit`] does.
+    /// Fits white noise, flicker noise and a rate random walk. If this fit fails its test, two
+    /// other explanations are tried: short averaging times are left out, because a filter in the
+    /// gyro may affect them, or a ramp or a Gauss–Markov bias is added. If every fit fails, the fit
+    /// of the three basic terms to all octaves is returned; its `fits` is then false. Returns
+    /// `None` if no fit is possible ([`Octaves::fit`]).
     pub fn describe(&self) -> Option<Fit> {
         const BASIC: [Term; 3] = [Term::White, Term::Flicker, Term::Walk];
         let first = self.fit(&BASIC, 0)?;
@@ -158,8 +169,9 @@ impl Problem<'_> {
         self.terms.iter().position(|term| *term == Term::Markov)
     }
 
-    /// Returns the derivatives of the Allan variances with respect to the coefficients, and to ln T if there
-    /// is a Gauss–Markov bias.
+    /// Returns the derivatives of the Allan variances (rows) with respect to the coefficients of
+    /// the noise (columns). If there is a Gauss–Markov bias, the last column is the derivative with
+    /// respect to the logarithm of its correlation time.
     fn jacobian(&self, state: &State) -> DMatrix<f64> {
         let taus = self.taus();
         let columns = self.terms.len() + usize::from(self.markov().is_some());
@@ -189,8 +201,8 @@ impl Problem<'_> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns the best fit of the coefficients under the assumption that every octave has the same relative error. The
-    /// iteration of the weights starts from it.
+    /// Returns first estimates of the coefficients, for which every octave has an assumed relative
+    /// error. The iteration of the weights starts from them.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
@@ -222,8 +234,10 @@ impl Problem<'_> {
         Some(((SHORTEST * first).min(*last), *last))
     }
 
-    /// Repeats the generalized least squares with weights from the last result until the weights converge. If `fixed` is
-    /// given, this coefficient and the correlation time keep their values.
+    /// Repeats the generalized least squares, each time with weights that follow from the last
+    /// result, until the coefficients converge. If `fixed` is a coefficient's index and value, this
+    /// coefficient and the correlation time are not fitted. `tables` is recomputed when the
+    /// correlation time changes.
     fn iterate_weights(
         &self,
         mut state: State,
@@ -276,8 +290,10 @@ impl Problem<'_> {
         Some(state)
     }
 
-    /// Returns the unconstrained estimates of the coefficients (and the change of ln T) with the weights of
-    /// `state`, the matrix that computes them from the measured variances, and their covariance.
+    /// Estimates the coefficients with the weights of `state`, without the condition that they are
+    /// not negative. Returns the estimates (with the change of the logarithm of the correlation
+    /// time, if there is one), the matrix that computes them from the measured variances, and their
+    /// covariance.
     fn unconstrained(
         &self,
         state: &State,
@@ -375,8 +391,10 @@ impl Problem<'_> {
         Some((chi_squared, Outlier { tau: self.taus()[worst], ratio }))
     }
 
-    /// Returns the 95 % interval of the coefficient with the index `place`: the values for which the estimate
-    /// is within its own 95 % range. Returns `None` if this range cannot be computed at one of the tried values.
+    /// Returns the 95 % interval of the coefficient with the index `place`. It consists of the
+    /// values for which the estimate lies within the central 95 % of its distribution if the value
+    /// is true. Returns `None` if this distribution cannot be computed for one of the values that
+    /// are tried.
     fn interval(&self, place: usize, state: &State, tables: &mut Covariance) -> Option<(f64, f64)> {
         // Distances of the unconstrained estimate from the ends of its 95 % range, if `value` is true.
         let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {
@@ -447,13 +465,12 @@ impl Problem<'_> {
 }
 
 const BISECTIONS: usize = 14;
-/// Ratio of each tested coefficient to the preceding one in the search for the lower end of an interval; and the smallest
-/// tested coefficient relative to the estimate.
 const DOWN: f64 = 0.7;
 const LEAST: f64 = 1e-4;
 
-/// Returns the Cholesky factors of a covariance matrix. Distant octaves count as uncorrelated, so that the
-/// matrix may be indefinite if the noise does not fit the record; the diagonal is then increased.
+/// Returns the Cholesky factors of a covariance matrix. The matrix may be indefinite if the noise
+/// does not fit the record, because distant octaves count as uncorrelated. In this case the
+/// diagonal is increased, at most to twice its value.
 fn factored(covariance: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     [0.0, 1e-3, 1e-2, 0.1, 1.0].into_iter().find_map(|more| {
         let mut matrix = covariance.clone();
@@ -464,14 +481,16 @@ fn factored(covariance: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     })
 }
 
-/// Converts the ratio of a χ² variable to its mean into a standard normal deviate (Wilson and Hilferty).
+/// Converts the ratio of a χ² variable to its mean into a standard normal deviate, by the
+/// approximation of Wilson and Hilferty. `degrees` is the number of degrees of freedom.
 fn cube_root(ratio: f64, degrees: f64) -> f64 {
     let spread = 2.0 / (9.0 * degrees);
     (ratio.cbrt() - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the quantile of Pearson's type III distribution with mean 0, variance 1 and this skewness that
-/// corresponds to the standard normal quantile `normal` (Wilson and Hilferty's frequency factor).
+/// Returns the quantile of Pearson's type III distribution with mean 0, variance 1 and this
+/// skewness. `normal` is the standard normal quantile of the same probability. The approximation is
+/// Wilson and Hilferty's frequency factor.
 fn pearson(normal: f64, skewness: f64) -> f64 {
     if skewness.abs() < 1e-3 {
         return normal;
@@ -480,8 +499,9 @@ fn pearson(normal: f64, skewness: f64) -> f64 {
     2.0 / skewness * (base.powi(3) - 1.0)
 }
 
-/// Returns the least-squares solution without negative coefficients, and its squared error. Only coefficients listed in
-/// `either` may be negative. All subsets of the columns are tried.
+/// Solves a least-squares problem by trying all subsets of `columns`, with the condition that
+/// coefficients are not negative. Coefficients with an index in `either` may have either sign.
+/// Returns the coefficients and the squared error.
 fn not_negative(
     columns: &DMatrix<f64>,
     values: &DVector<f64>,
@@ -529,10 +549,10 @@ mod tests {
 
     const STEP: f64 = 0.1;
 
-    /// Returns flicker noise of bias instability 1: white noise filtered with (1 − z⁻¹)^(−1/2), whose impulse
-    /// response is a recursion (N. J. Kasdin, *Discrete simulation of colored noise and stochastic processes
-    /// and 1/f^α power law noise generation*, Proc. IEEE 83, 1995). The first half, where the filter starts,
-    /// is dropped.
+    /// Returns samples of flicker noise with the bias instability 1. White noise is filtered with
+    /// (1 − z⁻¹)^(−1/2), whose impulse response is a recursion (N. J. Kasdin, *Discrete simulation
+    /// of colored noise and stochastic processes and 1/f^α power law noise generation*, Proc. IEEE
+    /// 83, 1995). The first half is dropped, because the filter starts there.
     fn flicker(count: usize, random: &mut Random) -> Vec<f64> {
         let length = 4 * count;
         let white = (0..2 * count).map(|_| random.normal()).chain(vec![0.0; 2 * count]).collect();
@@ -579,8 +599,9 @@ mod tests {
     };
     const COUNT: usize = 1 << 16;
 
-    /// Counts the simulated records whose interval contains the true value, separately for N, B and K, and the records
-    /// whose fit passes its test.
+    /// Fits `draws` simulated records of `noise`. Returns the number of records whose interval
+    /// contains the true value, separately for N, B and K, and the number of records whose fit
+    /// passes its test.
     fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
         let (mut held, mut described) = ([0; 3], 0);
         for seed in 0..draws {
