@@ -12,13 +12,14 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::fmi::Fmi;
 
-/// Names in the archive and their contents, in the order of the archive. modelDescription.xml comes first, because some
-/// hosts expect it there.
+/// Files of an archive in their order: name and content of each. modelDescription.xml comes first,
+/// because some hosts expect it there.
 pub type Files = Vec<(String, Vec<u8>)>;
 
 const QUICK: i64 = 9;
-/// Compression level for distributed archives. At levels above 9 the crate `zip` uses Zopfli, with one iteration for
-/// each further level. Five iterations would make a binary smaller by 0.2 % and take a third longer.
+/// Compression level for archives that are distributed. At levels above 9 the crate `zip` uses
+/// Zopfli, with one iteration for each further level. Five iterations would make a binary smaller
+/// by 0.2 % and take a third longer.
 const SMALL: i64 = 10;
 
 pub struct Packed {
@@ -37,8 +38,9 @@ impl Packed {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }
 
-    /// Returns the paths of a binary in an FMU of the version `fmi`, each with its bytes. The folder of one processor
-    /// gets only the part of a universal binary for this processor.
+    /// Returns the paths of this binary in an FMU of the version `fmi`, each with its bytes.
+    /// `identifier` is the modelIdentifier. A folder for one processor gets only the part of a
+    /// universal binary for this processor.
     pub fn files(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = (String, &[u8])> {
         fmi.folders(self.folder).iter().map(move |folder| {
             let bytes = match folder.strip_suffix("-darwin") {
@@ -51,8 +53,9 @@ impl Packed {
     }
 }
 
-/// Packs an FMU from its parts: description, binary for this platform, and every file below `extra`, under its path
-/// relative to this folder (`resources/a.txt`, `sources/b.c`).
+/// Packs an FMU for this platform to `out`. `xml` is its modelDescription.xml, `binary` the path of
+/// its library, and `identifier` the modelIdentifier. Every file below the folder `extra` is packed
+/// under its path relative to this folder, for example `resources/a.txt`.
 ///
 /// # Errors
 ///
@@ -81,13 +84,14 @@ pub fn zipped(files: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     Ok(out.into_inner())
 }
 
-/// Packs files into the archive `out`, which is either written completely or not at all.
+/// Packs files into the archive `out`, which is either written completely or not at all. It
+/// compresses quickly, for archives that are not distributed.
 pub fn write(files: &Files, out: &Path) -> Result<()> {
     write_at(files, out, QUICK)
 }
 
-/// Packs files for distribution. Like [`write`], but compresses with Zopfli, which makes binaries smaller by 3.6 % and
-/// takes 1.5 s of CPU time per megabyte.
+/// Packs files into the archive `out` for distribution. It compresses with Zopfli, which makes
+/// binaries smaller by 3.6 % than [`write`] does, and takes 1.5 s of CPU time per megabyte.
 pub fn write_small(files: &Files, out: &Path) -> Result<()> {
     write_at(files, out, SMALL)
 }
@@ -124,8 +128,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
 }
 
-/// Writes the zip archive to `out`. The order of the files, their times and their attributes are
-/// fixed, so that the same files give the same bytes.
+/// Writes a zip archive of `files` to `out` with the compression level `level`. The order of the
+/// files, their times and their attributes are fixed, so that equal files give equal archives.
 fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)], level: i64) -> Result<()> {
     let mut archive = ZipWriter::new(out);
     for (name, bytes) in files {

@@ -17,12 +17,14 @@ pub fn address() -> String {
     format!("{REPOSITORY}/blob/v{VERSION}/book/index.md")
 }
 
-/// Builds the book and writes its files to `out`. The first call installs Sphinx into a separate environment.
+/// Builds the book and writes its files to the folder `out`. The first call installs Sphinx into a
+/// separate environment.
 ///
 /// # Errors
 ///
-/// If the source, Python or a package is missing, and at every warning of Sphinx: links and figures that do not exist,
-/// pages that no list contains, equations that are not LaTeX, docstrings that are not reStructuredText.
+/// If the source, Python or a package is missing, and at every warning of Sphinx: links and figures
+/// that do not exist, pages that no list contains, equations that are not LaTeX, docstrings that
+/// are not reStructuredText.
 pub fn write(out: &Path) -> Result<()> {
     needs_source("the book")?;
     let root = root();

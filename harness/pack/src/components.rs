@@ -24,19 +24,19 @@ pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
     pub name: String,
-    /// Version of the component. `None` if the component has the version of the tool that linked it.
+    /// Version of the component. `None` if the component has the version of the tool that linked
+    /// it.
     pub version: Option<String>,
     pub licence: String,
     pub texts: Vec<String>,
     pub purl: String,
-    /// SHA-256 of the package, if Cargo.lock has it.
     pub sha256: Option<String>,
     pub origin: String,
     pub platforms: BTreeSet<&'static str>,
 }
 
-/// Crates of Rust's standard library, each with its licence. A binary contains the paths, with versions, of those
-/// crates whose code is linked and can panic.
+/// Crates of Rust's standard library with their licences. A binary contains the path and version of
+/// each of these crates whose code is linked and can panic, so that they can be recognised in it.
 const STANDARD: [(&str, &str); 10] = [
     ("addr2line", "Apache-2.0 OR MIT"),
     ("adler2", "0BSD OR MIT OR Apache-2.0"),
@@ -59,8 +59,9 @@ struct RunTime {
     origin: &'static str,
 }
 
-/// Reverses a text at compile time. The texts identify components in a wheel, and this program, which is itself in the
-/// wheel, must not contain them.
+/// Reverses a text at compile time. The texts are marks by which components are found in the files
+/// of a wheel. This program is itself in the wheel and must therefore not contain the marks, but
+/// only the reversed texts.
 const fn backwards<const N: usize>(text: [u8; N]) -> [u8; N] {
     let (mut reversed, mut place) = ([0; N], 0);
     while place < N {
@@ -104,7 +105,8 @@ const RUN_TIME: [RunTime; 4] = [
     },
 ];
 
-/// Lists the third-party components that are linked into the `binaries` of a package.
+/// Lists the third-party components that are linked into the `binaries` of the crate `package`, for
+/// its SBOM.
 ///
 /// # Errors
 /// If the licence of a component is not known to this program.
@@ -230,8 +232,8 @@ fn contains_backwards(bytes: &[u8], text: &[u8]) -> bool {
     bytes.windows(text.len()).any(|window| window.iter().rev().eq(text))
 }
 
-/// Lists the crates of the standard library that a binary names, with their versions, from paths such as
-/// "/rust/deps/gimli-0.32.3/src".
+/// Lists the crates of the standard library whose paths are in a binary, such as
+/// "/rust/deps/gimli-0.32.3/src", with their versions.
 fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     const BEFORE: &[u8] = b"/rust/deps";
     let mut all = BTreeSet::new();
@@ -295,8 +297,9 @@ fn linked_in_wheel(command: Packed) -> Result<Vec<Component>> {
     Ok(all)
 }
 
-/// Returns the licences of everything that is linked into a wheel's binaries for one platform, with all
-/// texts; texts of crates are read from the crates.
+/// Returns the notice of a wheel for one platform: the licences of all components that are linked
+/// into its binaries, with their full texts. `binary` is the command `hubslosh`, and `folder` names
+/// the platform. The texts of crates are read from the sources of the crates.
 pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     let binary = Packed { folder, ending: "", bytes: binary.to_vec() };
     let metadata = MetadataCommand::new()
@@ -376,8 +379,9 @@ pub fn sbom(
     product.sbom(components)
 }
 
-/// Returns the SBOM of a wheel: the components of its command and its library for one platform. `files` are
-/// the names and SHA-256 of its binaries and FMUs.
+/// Returns the SBOM of a wheel for one platform, as JSON. It lists the components of the command,
+/// whose bytes are `command`, and of the library. `folder` names the platform, and `files` has the
+/// names and SHA-256 of the wheel's binaries and FMUs.
 ///
 /// # Errors
 ///
@@ -407,7 +411,8 @@ struct Product<'a> {
 }
 
 impl Product<'_> {
-    /// Returns the SBOM. It contains neither a time nor a random number, so that equal binaries have equal SBOMs.
+    /// Returns the SBOM of a product with the linked `components`, as JSON. It contains neither a
+    /// time nor a random number, so that equal binaries have equal SBOMs.
     fn sbom(&self, components: &[Component]) -> String {
         let Product { kind, name, version, description, files } = self;
         let this = format!("{name}@{version}");
@@ -466,7 +471,6 @@ mod tests {
     use super::*;
     use crate::models::MODELS;
 
-    /// The SBOM lists those crates of the Rust standard library whose paths are in the binary.
     #[test]
     fn crates_of_std_are_found_by_name_and_version() {
         let found = standard_crates(
@@ -479,8 +483,6 @@ mod tests {
         assert!(error.contains("new-thing-1.0.0"), "{error}");
     }
 
-    /// This program contains the beginnings of the paths for which it searches binaries. It must not
-    /// find them in itself.
     #[test]
     fn the_search_for_linked_crates_does_not_find_its_own_list_of_names() {
         for words in [
@@ -494,8 +496,6 @@ mod tests {
         }
     }
 
-    /// This program searches binaries for marks of run-time libraries, and contains these marks only reversed, so that
-    /// it does not find them in itself.
     #[test]
     fn this_program_is_not_mistaken_for_one_that_links_a_run_time_library() {
         let this = crate::archive::read(&std::env::current_exe().unwrap()).unwrap();

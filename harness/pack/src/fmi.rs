@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// A kind of FMU: the binary is the same, but the description and the names in the archive differ.
+/// A form in which an FMU is packed. The binary is the same in all forms, but the description and
+/// the names in the archive differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fmi {
     V2,
@@ -14,8 +15,8 @@ pub enum Fmi {
 impl Fmi {
     pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
 
-    /// Returns the folders under `binaries/` for a platform that is given by its folder in FMI 2.0. For the universal
-    /// binary of macOS FMI 3.0 has two folders.
+    /// Returns the folders in `binaries/` for a platform, which is given by its folder in FMI 2.0.
+    /// FMI 3.0 has two folders for the universal binary of macOS, one for each processor.
     pub fn folders(self, platform: &'static str) -> &'static [&'static str] {
         match (self, platform) {
             (Fmi::V3 | Fmi::V3Arrays, "linux64") => &["x86_64-linux"],
@@ -46,8 +47,9 @@ impl Fmi {
         }
     }
 
-    /// Returns the path of an FMU in a folder: `NAME.fmu`, and for FMI 3.0 `NAME-fmi3.fmu` and `NAME-fmi3-arrays.fmu`.
-    /// The file name may differ from the library's, because hosts take the library's name from the description.
+    /// Returns the path of an FMU in `folder`: `NAME.fmu`, for FMI 3.0 `NAME-fmi3.fmu` and
+    /// `NAME-fmi3-arrays.fmu`. The file name may differ from the name of the library, because hosts
+    /// take the library's name from the description.
     pub fn path(self, folder: &Path, name: &str) -> PathBuf {
         folder.join(format!("{name}{}.fmu", self.suffix()))
     }

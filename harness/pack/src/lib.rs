@@ -28,7 +28,8 @@ pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, model, named};
 pub use crate::platforms::Built;
 pub use crate::project::{build, build_native, has_source, needs_source, root};
 
-/// Builds the binary of an FMU for the platform on which this program runs and packs the FMU to `out`.
+/// Builds the binary of an FMU for the platform on which this program runs, and packs the FMU in
+/// the form `fmi` to `out`.
 pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     let binary = Packed::native(&build(model.package, false)?)?;
     archive::write(&files(model, fmi, &[binary])?, out)
@@ -48,7 +49,7 @@ fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> 
     archive::write_small(&files(model, fmi, &binaries)?, out)
 }
 
-/// Returns the packed HubSlosh for tests; see [`packed_model_for_tests`].
+/// Returns the path of the packed FMU HubSlosh for tests; see [`packed_model_for_tests`].
 ///
 /// # Panics
 ///
@@ -57,8 +58,9 @@ pub fn packed_for_tests() -> &'static Path {
     packed_model_for_tests(HUBSLOSH)
 }
 
-/// Returns a packed FMU for tests. It is built and packed once in each process, to `test-fmu/<name>.fmu` in the target
-/// directory. Several processes may do this at the same time, because each renames a complete file, and all files are equal.
+/// Returns the path of a packed FMU 2.0 for tests. It is built and packed once in each process, to
+/// `test-fmu/<name>.fmu` in the target directory. Several processes may do this at the same time,
+/// because each renames a complete file, and all files are equal.
 ///
 /// # Panics
 ///
@@ -67,8 +69,9 @@ pub fn packed_model_for_tests(model: &Model) -> &'static Path {
     packed_version_for_tests(model, Fmi::V2)
 }
 
-/// Returns a packed FMU of one FMI version for tests, like [`packed_model_for_tests`]:
-/// `test-fmu/<name>-fmi3.fmu` for 3.0, with arrays `test-fmu/<name>-fmi3-arrays.fmu`.
+/// Returns the path of a packed FMU in the form `fmi` for tests, as [`packed_model_for_tests`] does
+/// for FMI 2.0. Its name is `test-fmu/<name>-fmi3.fmu` for FMI 3.0, and
+/// `test-fmu/<name>-fmi3-arrays.fmu` with array variables.
 ///
 /// # Panics
 ///
@@ -91,7 +94,8 @@ fn pack_for_tests(model: &Model, fmi: Fmi) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// Returns the list of related files for the FMU: the inputs of the example and its result (FMI-LS-REF, 1.0.0-beta.1).
+/// Returns the list of related files that the layered standard FMI-LS-REF (1.0.0-beta.1) places in
+/// an FMU: the inputs of the example and its result.
 fn references(model: &Model) -> String {
     let name = model.name;
     format!(

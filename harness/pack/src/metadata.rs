@@ -14,7 +14,8 @@ pub const PACKAGE: &str = "hubslosh";
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 pub const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
-/// File with the licences and notices of all components that are linked into the command of a wheel.
+/// Name of the file in a wheel with the licences and notices of all components that are linked into
+/// its command.
 pub const NOTICES: &str = "THIRD-PARTY.txt";
 
 pub fn text() -> Result<String> {
@@ -69,8 +70,8 @@ fn compose(pyproject: &Table, readme: &str) -> Result<String> {
     Ok(format!("{}\n\n{}", lines.join("\n"), published(readme)))
 }
 
-/// Rewrites the links of a Markdown page so that they work outside the project: links to files of the project lead to
-/// the repository at this version.
+/// Rewrites the links of a Markdown page so that they also work outside the project, for example on
+/// a package index: links to files of the project lead to the repository at this version.
 fn published(page: &str) -> String {
     let mut changes: Vec<(Range<usize>, String)> = Vec::new();
     for (event, range) in Parser::new_ext(page, Options::ENABLE_TABLES).into_offset_iter() {

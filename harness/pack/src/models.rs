@@ -13,8 +13,9 @@ pub const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Model {
-    /// The `modelIdentifier`. The folder `modelDescription/<name>` contains everything that is packed with the binary:
-    /// `modelDescription.xml`, `documentation/` and, if it exists, `extra/`.
+    /// The `modelIdentifier`. The folder `modelDescription/<name>` contains everything that is
+    /// packed with the binary: `modelDescription.xml`, `documentation/` and, if it exists,
+    /// `extra/`.
     pub name: &'static str,
     pub package: &'static str,
 }
@@ -27,7 +28,7 @@ pub const MODELS: [Model; 3] = [
 
 pub const HUBSLOSH: &Model = &MODELS[0];
 
-/// Finds an FMU by its name.
+/// Finds an FMU of this project by its name, for example `Spacecraft`.
 ///
 /// # Errors
 ///
@@ -41,7 +42,8 @@ pub fn model(name: &str) -> Result<&'static Model> {
     })
 }
 
-/// Finds an FMU by its file name: `Spacecraft`, or `Spacecraft-fmi3` and `Spacecraft-fmi3-arrays` for FMI 3.0.
+/// Finds an FMU and its form by its file name without ending: `Spacecraft`, or `Spacecraft-fmi3`
+/// and `Spacecraft-fmi3-arrays` for FMI 3.0. Returns `None` for any other name.
 pub fn named(name: &str) -> Option<(Model, Fmi)> {
     let fmi = Fmi::ALL.into_iter().rev().find(|fmi| name.ends_with(fmi.suffix()))?;
     let model = model(name.strip_suffix(fmi.suffix())?).ok()?;
@@ -62,9 +64,10 @@ impl Model {
         root().join("modelDescription").join(self.name)
     }
 
-    /// Returns the folder with the example and its reference result, in the FMU as well as in the model's folder. The
-    /// layered standard FMI-LS-REF requires this folder. (Other folders in `extra` would need reversed domain names,
-    /// and the project has no domain.)
+    /// Returns the folder with the example and its reference result. It has the same path in the
+    /// FMU and in the folder of the model. The layered standard FMI-LS-REF prescribes its name,
+    /// whereas other folders in `extra` would need the reversed name of a domain, which the project
+    /// does not have.
     pub fn example(&self) -> PathBuf {
         self.folder().join(REFERENCES)
     }

@@ -9,8 +9,9 @@ use host::part::{Limit, START_VALUES, describe};
 
 use crate::archive::{self, Files};
 
-/// Packs an FMU with those variables of `fmu` that are within the limits, and writes it to `out`. `starts` has start
-/// values by name that replace the values in the description.
+/// Packs a reduced FMU to `out`, which has only those variables of `fmu` that are within `limits`,
+/// for example for one tank. The binary stays the same. `starts` has start values by name that
+/// replace the values in the description.
 ///
 /// # Errors
 ///

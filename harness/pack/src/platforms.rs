@@ -19,7 +19,7 @@ use crate::project;
 
 #[derive(Debug)]
 pub struct Platform {
-    /// Folder under `binaries/` of the FMU for this platform (FMI 2.0.5, section 2.3).
+    /// Folder for this platform in `binaries/` of an FMU 2.0 (FMI 2.0.5, section 2.3).
     pub folder: &'static str,
     pub ending: &'static str,
     /// Targets of Rust's compiler for this platform. If there are several, their binaries are
@@ -111,7 +111,7 @@ pub const PLATFORMS: [Platform; 4] = [
     },
 ];
 
-/// Finds a platform by its folder.
+/// Finds a platform by its folder in `binaries/` of an FMU 2.0, for example `linux64`.
 ///
 /// # Errors
 ///
@@ -177,8 +177,8 @@ pub struct Toolchain {
     root: PathBuf,
     path: OsString,
     sysroot: PathBuf,
-    /// Path of the source of the standard library, from which it is compiled for targets whose compiled
-    /// library is not installed.
+    /// Path of the source of the standard library, from which it is compiled for targets whose
+    /// compiled library is not installed.
     source: Option<PathBuf>,
     home: String,
 }
@@ -232,7 +232,8 @@ impl Toolchain {
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     }
 
-    /// Lists the faults of a binary: those in `found`, and paths of this machine that the binary contains.
+    /// Lists the faults of a binary as parts of sentences: the faults `found` by the caller, and
+    /// paths of this machine in the bytes of the binary, which must not be distributed.
     pub fn faults(&self, platform: &Platform, bytes: &[u8], found: Vec<String>) -> Vec<String> {
         let private = self.private().into_iter();
         let named = private
@@ -359,8 +360,7 @@ mod tests {
     use super::*;
     use crate::fmi::Fmi;
 
-    /// Every platform for which binaries are built has a folder in the FMU. A binary without a folder would be missing
-    /// in the archive without any error.
+    /// A binary without a folder would be missing in the archive without any error.
     #[test]
     fn every_platform_has_its_folder_in_an_fmu() {
         for platform in &PLATFORMS {

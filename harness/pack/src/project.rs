@@ -7,13 +7,15 @@ use anyhow::{Context, Result, bail, ensure};
 use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Message, TargetKind};
 
-/// Returns the project's root: the current folder, because this program was built on another machine.
+/// Returns the root of the project's source. It is the current folder, because this program was
+/// built on another machine.
 #[cfg(feature = "shipped")]
 pub fn root() -> PathBuf {
     std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))
 }
 
-/// Returns the project's root: two folders above this crate at the time of compilation.
+/// Returns the root of the project's source: two folders above this crate at the time of
+/// compilation.
 #[cfg(not(feature = "shipped"))]
 pub fn root() -> PathBuf {
     let crate_root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -24,7 +26,8 @@ pub fn has_source() -> bool {
     root().join("Cargo.toml").is_file()
 }
 
-/// Returns an error if the project's source, from which `what` is built, is missing.
+/// Returns an error if the project's source is missing. `what` names the product that is built from
+/// it, for the message.
 pub fn needs_source(what: &str) -> Result<()> {
     ensure!(
         has_source(),
@@ -36,8 +39,9 @@ pub fn needs_source(what: &str) -> Result<()> {
 
 const PROFILE: &str = "fmu";
 
-/// Builds the cdylib of a package of this workspace, with the profile of FMUs, for the platform on which this
-/// program runs, and returns its path. `quiet` suppresses Cargo's progress.
+/// Builds the library (cdylib) of the crate `package` of this workspace, with the profile of FMUs,
+/// for the platform on which this program runs, and returns its path. `quiet` suppresses Cargo's
+/// progress.
 ///
 /// # Errors
 ///
@@ -49,25 +53,28 @@ pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
-/// Returns a command that runs Cargo. If this program was started by Cargo, the command is the same Cargo.
+/// Returns a command that runs Cargo. If this program was started by Cargo, the command is the same
+/// Cargo, so that toolchains are not mixed.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Adds the arguments of `cargo rustc` for the FMU's binary; arguments that follow go to the compiler. `cargo build` would
-/// also build the rlib in the same call and then silently omit the link-time optimisation, which would give 70 % more code.
+/// Adds the arguments of `cargo rustc` for the binary of the FMU in the crate `package`. Arguments
+/// that follow go to the compiler. `cargo build` would also build the rlib in the same call and
+/// then silently omit the link-time optimisation, which would give 70 % more code.
 ///
-/// The compiler may process two numbers at once (SLP vectorisation) only where this saves much, as for vectors.
-/// Otherwise it costs time, because the processor waits when a pair is loaded directly after its halves were stored
-/// separately: a step of the linear model would take a fifth longer.
+/// The compiler may process two numbers at once (SLP vectorisation) only where this saves much, as
+/// for vectors. Otherwise it costs time, because the processor waits when a pair is loaded directly
+/// after its halves were stored separately: a step of the linear model would take a fifth longer.
 pub(crate) fn arguments(command: &mut Command, package: &str) {
     command.args(["--profile", PROFILE, "--package", package, "--lib", "--crate-type", "cdylib"]);
     command.args(["--message-format", "json-render-diagnostics"]);
     command.args(["--", "-Cllvm-args=-slp-threshold=10"]);
 }
 
-/// Makes a distributed build optimise for size those packages that the profile `release` does not optimise. (It does
-/// not optimise them, so that `cargo run` compiles them faster.)
+/// Adds options with which Cargo optimises for size those packages that the profile `release` does
+/// not optimise. The profile leaves them out so that `cargo run` compiles faster, but a distributed
+/// program should be small.
 fn optimise_for_size(command: &mut Command) -> Result<()> {
     let manifest = std::fs::read_to_string(root().join("Cargo.toml")).context("Cargo.toml")?;
     let manifest: toml::Table = manifest.parse().context("Cargo.toml cannot be understood")?;
@@ -81,8 +88,8 @@ fn optimise_for_size(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Adds the arguments of `cargo rustc` for the command `hubslosh` as it is distributed; arguments that follow
-/// go to the compiler.
+/// Adds the arguments of `cargo rustc` for the distributed command `hubslosh`. Arguments that
+/// follow go to the compiler.
 pub(crate) fn program_arguments(command: &mut Command) -> Result<()> {
     command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
     optimise_for_size(command)?;
@@ -93,8 +100,8 @@ pub(crate) fn program_arguments(command: &mut Command) -> Result<()> {
 
 pub(crate) const NATIVE: &str = "hubslosh-native";
 
-/// Adds the arguments of `cargo rustc` for the compiled half of the Python package as it is distributed; arguments that
-/// follow go to the compiler.
+/// Adds the arguments of `cargo rustc` for the distributed library of the Python package. Arguments
+/// that follow go to the compiler.
 pub(crate) fn native_arguments(command: &mut Command) -> Result<()> {
     command.args(["--release", "--package", NATIVE, "--lib", "--crate-type", "cdylib"]);
     optimise_for_size(command)?;
@@ -102,11 +109,11 @@ pub(crate) fn native_arguments(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Builds the compiled half of the Python package for the platform on which this program runs, and returns its path, at
-/// which the package finds it in the source tree.
+/// Builds the library of the Python package for the platform on which this program runs. Returns
+/// its path, at which the package finds it in the source tree.
 ///
-/// It is built with the features of the whole program, because with the features of only one package Cargo would
-/// compile `host`, `signals`, `parquet` and 16 other crates a second time.
+/// It is built with the features of the whole program, because with the features of only one
+/// package Cargo would compile `host`, `signals`, `parquet` and 16 other crates a second time.
 ///
 /// # Errors
 ///

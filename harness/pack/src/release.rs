@@ -12,17 +12,18 @@ use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
 
-/// Name of the list of the files in the folder, which all have one version, with their SHA-256 in the format of
+/// Name of the list of the files in the folder of the release with their SHA-256, in the format of
 /// `sha256sum --check`.
 pub const PRESENT: &str = "SHA256SUMS";
 
-/// Name of the list of all files of all releases with their SHA-256: the files in [`PRESENT`], files of older versions,
-/// and wheels that the folder does not keep.
+/// Name of the list of all files of all releases with their SHA-256: the files in [`PRESENT`],
+/// files of older versions, and wheels that are published, but not kept in the folder.
 pub const MANIFEST: &str = "SHA256SUMS.all";
 
-/// Largest wheel for Linux that is kept in the release, bytes. It is limited because the wheel stays in the project's
-/// history forever. Of 17.0 MB the command has 6.6, the nine FMUs 7.7, and the compiled half of the package 2.3. The
-/// two FMUs 3.0 of a model repeat the binary of its FMU 2.0, because a zip archive cannot share it.
+/// Largest wheel for Linux that is kept in the folder of the release, bytes. It is limited because
+/// the wheel stays in the project's history forever. Of 17.0 MB the command has 6.6, the nine FMUs
+/// 7.7, and the library of the package 2.3. The two FMUs 3.0 of a model repeat the binary of its
+/// FMU 2.0, because a zip archive cannot share it.
 pub const LARGEST_WHEEL: u64 = 20_000_000;
 
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
@@ -40,10 +41,10 @@ pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
     fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds an FMU for all platforms, checks it, and writes its files to `folder`: for each version of FMI the
-/// FMU, its SBOM (`.cdx.json`) and the report (`.check.txt`) that `check` returns. Updates [`MANIFEST`] and
-/// removes the files of older versions. Returns the paths of the written files. If `check` refuses the FMU of
-/// one version, nothing is written.
+/// Builds an FMU for all platforms, checks it with `check`, and writes its files to `folder`. For
+/// each version of FMI these are the FMU, its SBOM (`.cdx.json`) and the report (`.check.txt`) that
+/// `check` returns. Also updates [`MANIFEST`], removes the files of older versions, and returns the
+/// paths of the written files. If `check` refuses the FMU of one version, nothing is written.
 pub fn write(
     model: &Model,
     folder: &Path,
@@ -67,7 +68,7 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns true if a file in the release's folder belongs to this version of `name`: its name is
+/// Returns `true` if `file` belongs to this version of the product `name`: its name is
 /// `NAME-VERSION` followed by `-` or `.`.
 fn belongs_to(file: &str, name: &str, version: &str) -> bool {
     let rest = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-'));
@@ -75,9 +76,10 @@ fn belongs_to(file: &str, name: &str, version: &str) -> bool {
         .is_some_and(|rest| rest.starts_with(['-', '.']))
 }
 
-/// Writes files of the present version of `name` to `folder`, and updates the entries of this version in [`MANIFEST`]
-/// with these files and with `elsewhere`, the names and SHA-256 of files that the folder does not keep. Removes listed
-/// files of `name` that are no longer kept. Returns the paths of the written files.
+/// Writes `files` of the present version of the product `name` to `folder`. Also updates the
+/// entries of this version in [`MANIFEST`], with these files and with `elsewhere`, the names and
+/// SHA-256 of files that the folder does not keep. Removes files of `name` that are no longer kept,
+/// and returns the paths of the written files.
 ///
 /// # Errors
 ///
@@ -142,9 +144,10 @@ fn version_files(
     Ok([("fmu", bytes), ("cdx.json", sbom), ("check.txt", report.into_bytes())])
 }
 
-/// Builds the wheels of all platforms in the folder `made` and lists them in [`MANIFEST`] of `folder`. Writes
-/// their SBOM to `folder`, and the wheel for Linux on x86-64 unless it is larger than [`LARGEST_WHEEL`].
-/// Removes an older version's wheel. Returns the paths of the files written to `folder`.
+/// Builds the wheels of all platforms in the folder `made` and lists them in [`MANIFEST`] of
+/// `folder`. To `folder` it writes their SBOM, and the wheel for Linux on x86-64 unless it is
+/// larger than [`LARGEST_WHEEL`]. It removes the wheel of an older version, and returns the paths
+/// of the files in `folder`.
 pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut wheels = wheel::write_for(&PLATFORMS.each_ref(), made)?;
     wheels.sort();
@@ -179,8 +182,6 @@ pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
 mod tests {
     use super::*;
 
-    /// A release of version n removes the files of version n − 1 from the folder. SHA256SUMS.all keeps the hashes of
-    /// files that are published elsewhere.
     #[test]
     fn a_release_replaces_the_files_of_the_last_one_and_keeps_their_hashes() {
         let folder = tempfile::tempdir().unwrap();

@@ -14,11 +14,11 @@ use crate::archive::{Files, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::root;
 
-/// Line of pyproject.toml with the path of the build backend: relative to the folder of this file in the project, and
-/// relative to the root of the sdist.
+/// Line of pyproject.toml with the path of the build backend: relative to the folder of this file
+/// in the project, and relative to the root of the source distribution (sdist).
 const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
 
-/// Writes the sdist to `folder` and returns its path.
+/// Writes the source distribution of the Python package (sdist) to `folder` and returns its path.
 ///
 /// # Errors
 ///
@@ -45,7 +45,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 }
 
 /// Reads the project's files under version control, except releases and files that only a checkout
-/// needs. pyproject.toml and the metadata are placed at the root of the sdist.
+/// needs. pyproject.toml and the metadata are placed at the root of the source distribution, as pip
+/// expects.
 fn files() -> Result<Files> {
     let said = Command::new("git")
         .current_dir(root())

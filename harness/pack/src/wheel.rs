@@ -31,8 +31,8 @@ struct Binaries {
     read: Vec<Binary>,
 }
 
-/// Builds every FMU of this project, and the wheel that contains them, for the platform of this machine. Returns the
-/// path of the wheel in `folder`.
+/// Builds every FMU of this project, and the wheel that contains the FMUs, for the platform of this
+/// machine. Returns the path of the wheel in `folder`.
 ///
 /// # Errors
 ///
@@ -46,8 +46,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 ///
 /// # Errors
 ///
-/// If a file cannot be built, read or written, or a binary would not run on every machine of its platform. In this case
-/// no wheel is written.
+/// If a file cannot be built, read or written, or a binary would not run on every machine of its
+/// platform. In this case no wheel is written.
 pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
     check_folder(folder)?;
     let write = |binaries| write_one(folder, binaries, archive::write_small);
@@ -64,8 +64,8 @@ fn check_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes a wheel with these FMUs and without the command to the folder of the first FMU, for tests. Returns
-/// its path.
+/// Writes a wheel for tests, which has the FMUs `fmus` but not the command, to the folder of the
+/// first FMU. Returns the path of the wheel.
 ///
 /// # Panics
 ///
@@ -183,8 +183,9 @@ fn write_one(
     Ok(out)
 }
 
-/// Returns the tags of the platforms on which all these binaries run ("Platform compatibility tags"). For glibc 2.17
-/// the older name of the tag is added.
+/// Returns the tags of the platforms on which all these binaries run, which become part of the
+/// wheel's name (Python packaging, "Platform compatibility tags"). For glibc 2.17 the older name of
+/// the tag is added.
 fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     let Some(Binary { kind, architectures, .. }) = binaries.first() else {
         bail!("a wheel without binaries has no platform")
@@ -256,7 +257,8 @@ fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     Ok(files)
 }
 
-/// Reads the Python scripts and pages of the examples, without tests, and without pictures, which the scripts draw.
+/// Reads the Python scripts and pages of the examples in `folder`. Tests are left out, and so are
+/// pictures, which the scripts draw.
 ///
 /// # Errors
 ///
@@ -279,7 +281,8 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Formats `name,sha256=…,size`: the hash in URL-safe base64 without padding.
+/// Formats the line of a file in the list of a wheel (RECORD): `name,sha256=…,size`. The hash is in
+/// URL-safe base64 without padding.
 fn record_line(name: &str, bytes: &[u8]) -> String {
     let hash = Base64UrlUnpadded::encode_string(&Sha256::digest(bytes));
     format!("{name},sha256={hash},{}\n", bytes.len())

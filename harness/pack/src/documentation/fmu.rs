@@ -14,7 +14,8 @@ pub struct Documentation {
     pub figures: BTreeMap<String, Vec<u8>>,
 }
 
-/// Renders an introduction, and the pages in its lists, under one title. Paths are relative to `root`.
+/// Renders the page `introduction`, and the pages in its lists, as one page of HTML with the title
+/// `title`. Paths are relative to `root`.
 ///
 /// # Errors
 ///

@@ -12,7 +12,7 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 #[derive(Debug)]
 pub struct Page {
     pub path: String,
-    /// Name of the page for its anchors, for example `hubslosh-model` for
+    /// Short name of the page, with which its anchors begin, for example `hubslosh-model` for
     /// `modelDescription/HubSlosh/documentation/model.md`.
     pub name: String,
     pub title: String,
@@ -34,7 +34,7 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Returns the figures of all pages, by file name.
+    /// Returns the figures of all pages by file name, after the pages have been rendered.
     ///
     /// # Errors
     /// All faults that were found while the pages were rendered, if there are any.
@@ -49,12 +49,14 @@ impl Gathered {
 }
 
 impl Page {
-    /// Returns the `id` of a heading of this page in the file with all pages; if `slug` is empty, the `id` of the page itself.
+    /// Returns the `id` of the heading `slug` of this page in the file with all pages. If `slug` is
+    /// empty, it is the `id` of the page itself.
     pub fn id(&self, slug: &str) -> String {
         if slug.is_empty() { self.name.clone() } else { format!("{}--{slug}", self.name) }
     }
 
-    /// Returns the address of a heading of this page, as in a link; if `slug` is empty, the address of the page itself.
+    /// Returns the address by which a link leads to the heading `slug` of this page. If `slug` is
+    /// empty, it leads to the page itself.
     pub fn address(&self, slug: &str) -> String {
         format!("#{}", self.id(slug))
     }
@@ -73,7 +75,8 @@ impl Page {
         Ok(page)
     }
 
-    /// Returns the paths of the pages that this page lists, relative to the project's root, in their order.
+    /// Returns the paths of the pages that this page lists, relative to the project's root, in the
+    /// order of the list.
     pub fn listed(&self) -> Vec<String> {
         let (mut items, mut paths) = (0, Vec::new());
         for event in events(&self.text) {
@@ -95,8 +98,9 @@ impl Page {
         self.headings.iter().filter(|heading| heading.level == 2)
     }
 
-    /// Renders the page as HTML. A link to one of `pages` leads to this page in the file. Of a link to another file of
-    /// the project only the text is kept.
+    /// Renders the page as HTML for a file with all `pages`. Links to other pages lead to their
+    /// places in this file. Of a link to another file of the project only the text is kept, because
+    /// the reader may not have that file. `all` collects figures and faults.
     pub fn html(&self, root: &Path, pages: &[Page], all: &mut Gathered) -> Markup {
         let mut headings = self.headings.iter();
         let mut dropped = false; // inside a link that leads out of the documentation
@@ -145,8 +149,8 @@ impl Page {
         PreEscaped(page)
     }
 
-    /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error means that the
-    /// target does not exist.
+    /// Returns the target of the link `link` in the file with all `pages`, or `None` if it leads
+    /// out of the documentation. The inner error means that the target does not exist.
     fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>> {
         if link.contains("://") {
             return Ok(None);

@@ -9,8 +9,8 @@ use host::binary::Binary;
 use pack::platforms::{PLATFORMS, Platform};
 use pack::{Fmi, MODELS, Model, release};
 
-/// Returns the committed FMUs of this version. After the version in Cargo.toml has changed and before the release is made,
-/// there are none; then the files of an older version must exist.
+/// Returns the committed FMUs of this version. The list is empty after the version in Cargo.toml
+/// has changed and before the release is made; files of an older version must exist then.
 fn committed_fmus() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
     let of = |model| Fmi::ALL.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
