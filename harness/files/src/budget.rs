@@ -3,33 +3,39 @@
 
 use anyhow::{Result, ensure};
 
-/// Largest number of rows of a table, and of steps of a run. At 50 Hz they are 111 hours.
+/// Largest number of rows of a table, and of steps of a run. At 50 Hz this is a recording of 111
+/// hours.
 pub const ROWS: usize = 20_000_000;
-/// Largest memory for numbers that a command uses at the same time, bytes. It is twice the memory for the bench's
-/// columns in the longest run.
+/// Largest memory that a command may use for numbers at the same time, bytes. It is twice the
+/// memory that the longest allowed run of the bench needs for its columns.
 pub const BYTES: u64 = 4 << 30;
-/// Largest text that is read as a whole, bytes: plans, parameter sets, results. Tables are limited by [`ROWS`] instead.
+/// Largest text file that is read as a whole, bytes, for example a plan or a parameter set. Tables
+/// are read in parts, so that they are limited by [`ROWS`] instead.
 pub const TEXT: u64 = 64 << 20;
-/// Largest size of the numbers that are read from one recording, bytes: three signals in [`ROWS`] rows.
+/// Number of bytes of numbers that any recording may contain: three signals in [`ROWS`] rows.
 pub const RECORDING: u64 = 512 << 20;
-/// Number of bytes of numbers that a file may contain for each byte of its size, in addition to
-/// [`RECORDING`]. Compressed tables of runs contain up to 10.
+/// Number of bytes of numbers that a file may contain for each byte of its size, if this is more
+/// than [`RECORDING`]. Compressed tables of runs contain up to 10.
 pub const PER_BYTE: u64 = 32;
 /// Largest size of one file while it is decompressed, bytes, including the parts that are skipped.
 pub const INFLATED: u64 = 2 << 30;
 pub const RUNS: usize = 100_000;
 pub const JOBS: usize = 512;
 pub const LINES: usize = 20_000;
-/// Largest number of sines that are evaluated for a multisine, frequencies times rows. They take half a minute.
+/// Largest number of sines that are evaluated for a multisine: the number of frequencies times the
+/// number of rows. This takes half a minute.
 pub const SINES: u64 = 2_000_000_000;
-/// Largest number of products for the frequency responses of one run, rows times frequencies. They take about ten seconds.
+/// Largest number of products for the frequency responses of one run: the number of rows times the
+/// number of frequencies. This takes about ten seconds.
 pub const PRODUCTS: f64 = 4e9;
-/// Largest frequency of a torque, Hz. Its inverse is the smallest frequency, Hz.
+/// Highest frequency that a torque may have, Hz. The lowest frequency is the inverse of this
+/// number, Hz.
 pub const FREQUENCY: f64 = 1e9;
-/// Largest length of a run's name, bytes, because file systems allow 255 with an ending.
+/// Longest name of a run, bytes. File systems allow names of 255 bytes including the ending.
 pub const NAME: usize = 200;
 
-/// Returns the number of steps of length `step`, s, in `span`, s; the last step may be shorter.
+/// Returns the number of steps of `step` seconds in `span` seconds. The last step may be shorter
+/// than the others.
 ///
 /// # Errors
 /// If there are more than [`ROWS`] steps, or a length is not positive and finite.
@@ -52,7 +58,8 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
     Ok(if whole { exact.round() } else { exact.ceil() } as usize)
 }
 
-/// Returns the size of a table of numbers, bytes.
+/// Returns the memory that a table of numbers takes, bytes, so that the caller can refuse it before
+/// it allocates.
 ///
 /// # Errors
 /// If the table has more than [`ROWS`] rows, or takes more than [`BYTES`].
@@ -69,11 +76,12 @@ pub fn table(rows: usize, columns: usize) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Returns the size of the numbers that are read from a file of `size` bytes. A small file that claims to contain many
-/// numbers is damaged or malicious.
+/// Returns the memory for a table of numbers that is read from a file of `size` bytes, in bytes. A
+/// small file that claims to contain many numbers is damaged or malicious.
 ///
 /// # Errors
-/// If [`table`] fails, or the numbers take more than [`RECORDING`] and also more than [`PER_BYTE`] times the size of the file.
+/// If [`table`] fails, or the numbers take more than [`RECORDING`] and also more than [`PER_BYTE`]
+/// times the size of the file.
 pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     let bytes = table(rows, columns)?;
     let most = RECORDING.max(size.saturating_mul(PER_BYTE));
@@ -88,8 +96,9 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Returns the number of threads for `wanted` jobs at the same time, each of which uses `bytes` of memory. If `wanted`
-/// is 0, returns the number of the processor's cores.
+/// Returns the number of threads for jobs that each use `bytes` of memory. The user wants `wanted`
+/// jobs at the same time, or as many as the processor has cores if `wanted` is 0. If they would not
+/// fit into [`BYTES`], fewer threads are returned.
 ///
 /// # Errors
 /// If more than [`JOBS`] jobs are wanted.

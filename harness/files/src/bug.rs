@@ -9,8 +9,11 @@ use crate::input;
 
 static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
 
-/// Functions that are called when this process panics: `panics` receives the report before the panic unwinds, because a
-/// panic that cannot unwind ends the process; `catches` is called when [`catch_panic`] has caught the panic.
+/// Functions that are called when this process panics.
+///
+/// - `panics`: receives the report before the panic unwinds, because a panic that cannot unwind
+///   ends the process.
+/// - `catches`: is called when [`catch_panic`] has caught the panic.
 pub struct Listener {
     pub panics: fn(&str),
     pub catches: fn(),
@@ -22,7 +25,8 @@ pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }
 
-/// Stores the messages of panics of this process for [`catch_panic`] instead of printing them.
+/// From now on stores the messages of panics of this process, from which [`catch_panic`] takes
+/// them, and does not print them.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));
@@ -45,8 +49,9 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[error("{0}")]
 pub struct Panicked(pub String);
 
-/// Runs `work`, and returns the message of its panic if it panics. Of several panics it returns the message of the
-/// first, because a panic of a thread also makes the thread that waits for it panic.
+/// Runs `work` and returns its result, or the message of its panic if it panics. If several threads
+/// panic, the message of the first panic is returned, because a panic of a thread also makes the
+/// thread that waits for it panic.
 pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
@@ -67,8 +72,8 @@ pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     })
 }
 
-/// Formats the message of a panic for the user: the panic itself, the files that had been read, and the
-/// request to report it as a bug.
+/// Formats the message of a panic for the user: the panic itself, the files that had been read, and
+/// the request to report it as a bug.
 pub fn report(panic: &str) -> String {
     let read = input::read_so_far();
     let files = match read.is_empty() {

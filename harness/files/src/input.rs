@@ -12,10 +12,11 @@ use anyhow::{Result, bail, ensure};
 
 use crate::budget;
 
-/// Opens a regular file for reading, also through a symbolic link.
+/// Opens a regular file for reading. A symbolic link is followed.
 ///
 /// # Errors
-/// If the file cannot be opened or is not a regular file. The message does not repeat the path.
+/// If the file cannot be opened or is not a regular file, for example a named pipe, at which
+/// reading could wait forever. The message does not repeat the path, because the callers add it.
 pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
     // The kind of the file is checked before `File::open`, which would wait until somebody writes to a named pipe.
@@ -34,13 +35,13 @@ const MOST_NAMED: usize = 20;
 
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Lists the first files that this process has opened here, for reports of bugs.
+/// Lists the first files that this process has opened with [`open`], for reports of bugs.
 pub fn read_so_far() -> Vec<String> {
     let all = READ.lock().unwrap_or_else(PoisonError::into_inner);
     all.iter().map(|path| path.display().to_string()).collect()
 }
 
-/// Reads a file of at most [`budget::TEXT`] bytes.
+/// Reads the file at `path`, which may have at most [`budget::TEXT`] bytes.
 ///
 /// # Errors
 /// If the file cannot be read, is not a regular file or is too large.
@@ -55,10 +56,10 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text of at most [`budget::TEXT`] bytes in UTF-8.
+/// Reads a text in UTF-8 from the file at `path`, which may have at most [`budget::TEXT`] bytes.
 ///
 /// # Errors
-/// If [`bytes`] fails, or the text is not UTF-8.
+/// If the file cannot be read or is too large, or if it is not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
@@ -66,7 +67,8 @@ pub fn text(path: &Path) -> Result<String> {
     })
 }
 
-/// Removes the numbers of system errors, such as `(os error 2)`, from a message, because the words before them say the same.
+/// Removes the numbers of system errors, such as `(os error 2)`, from a message, because the words
+/// before a number say the same and the number helps no user.
 pub fn without_error_numbers(message: &str) -> String {
     let mut parts = message.split(" (os error ");
     let mut text = parts.next().unwrap_or_default().to_string();
@@ -99,8 +101,8 @@ fn file_kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() { "a directory" } else { "a special file" }
 }
 
-/// Identity of a file, by which two paths that lead to one file are recognised. On systems other than Unix, two hard
-/// links count as different files.
+/// Identity of a file, by which two paths that lead to one file are recognised. On systems other
+/// than Unix it is the full path, so that two hard links count as different files.
 #[derive(PartialEq)]
 struct Identity(#[cfg(unix)] (u64, u64), #[cfg(not(unix))] PathBuf);
 
@@ -115,8 +117,8 @@ fn identity(path: &Path) -> Option<Identity> {
     path.canonicalize().ok().map(Identity)
 }
 
-/// An input file that no output may replace. The file stays open, because otherwise a new file
-/// could get the number of an input that was deleted.
+/// An input file that no output may replace. The file stays open, because otherwise the system
+/// could give the number of a deleted input to a new file.
 struct Protected {
     identity: Identity,
     path: PathBuf,
@@ -125,7 +127,8 @@ struct Protected {
 
 static PROTECTED: Mutex<Vec<Protected>> = Mutex::new(Vec::new());
 
-/// Protects an input: from now on no output of this process replaces the file. A path at which there is no file is ignored.
+/// Protects an input: from now on no output of this process replaces the file at `path`. If there
+/// is no file, nothing happens.
 pub fn protect(path: &Path) {
     if !path.is_file() {
         return;
@@ -139,7 +142,8 @@ pub fn protect(path: &Path) {
     }
 }
 
-/// Checks that `path` does not lead to a protected input: by the same name, a relative path, a symbolic link or a hard link.
+/// Checks that `path` does not lead to a protected input, for example by a relative path, a
+/// symbolic link or a hard link.
 ///
 /// # Errors
 /// If it does; the message names both paths.
@@ -160,8 +164,6 @@ pub fn check_replaceable(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// The file system may give the file number of a deleted input to a new file. This new file is not the input,
-    /// and may be overwritten.
     #[cfg(unix)]
     #[test]
     fn a_new_file_is_never_taken_for_a_deleted_input() {

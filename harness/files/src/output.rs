@@ -14,13 +14,15 @@ use crate::{input, temporary};
 pub enum Destination {
     /// A regular file at this path, which may not exist yet. The output replaces the whole file.
     File(PathBuf),
-    /// A device, a named pipe or an open descriptor such as `/dev/stdout`. The output is written to it.
+    /// A device, a named pipe or an open descriptor such as `/dev/stdout`. The output is written to
+    /// it and replaces nothing.
     Stream,
 }
 
 const LINKS: usize = 40;
 
-/// Finds the destination of an output. Symbolic links are followed, also to a file that does not exist yet.
+/// Finds the destination of an output with the path `path`. Symbolic links are followed, also to a
+/// file that does not exist yet.
 ///
 /// # Errors
 /// If the path leads to a directory, or its links form a circle.
@@ -55,9 +57,10 @@ fn containing_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Writes an output through `write`, completely or not at all. A regular file is replaced only when the new file is on
-/// the disk, so that an error or a power failure does not leave an incomplete file. A device or a pipe receives the
-/// bytes when all of them exist. A protected input ([`input::protect`]) is never overwritten.
+/// Calls `write` to write the output `path`, completely or not at all. A regular file is replaced
+/// only when the new file is on the disk, so that an error or a power failure does not leave an
+/// incomplete file. A device or a pipe receives the bytes when all of them exist. A protected input
+/// ([`input::protect`]) is never overwritten.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
     input::check_replaceable(path)?;
     let cannot = || format!("{} cannot be written", path.display());
@@ -83,10 +86,11 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
     Ok(result)
 }
 
-/// Moves a complete file to the destination of an output: replaces a regular file, or copies the bytes to a device or a pipe.
+/// Moves the complete file `draft` to the output `path`: a regular file is replaced, whereas a
+/// device or a pipe receives a copy of the bytes.
 ///
 /// # Errors
-/// If that fails; the message names `path`.
+/// If the output cannot be written; the message names `path`.
 pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     let move_or_pour = || -> Result<()> {
         match destination(path)? {
@@ -124,7 +128,7 @@ pub fn sha256(bytes: &[u8]) -> String {
     base16ct::lower::encode_string(&Sha256::digest(bytes))
 }
 
-/// Returns the SHA-256 of everything that can be read from `from`, which need not fit into memory.
+/// Returns the SHA-256 of all bytes that can be read from `from`, which need not fit into memory.
 pub fn hash_reader(mut from: impl Read) -> Result<String> {
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {

@@ -32,10 +32,14 @@ const LOCK: &str = ".lock";
 const UNFINISHED: &str = ".unfinished";
 const TABLE: &str = "runs.csv";
 
-/// Kind of folder: a campaign, or a study of `monte_carlo`. Messages contain `name`, `noun` (the name with its article,
-/// for readers who do not know the kind) and `elsewhere` (the advice if another program uses the folder). The file
-/// `definition` determines the runs. `is_published` is true for names of files that are published with the last run; other
-/// files are never removed, even if the manifest lists them.
+/// Kind of a folder with stored runs: a campaign, or a study of `monte_carlo`.
+///
+/// - `name`, `noun`: the name without and with its article, for messages.
+/// - `definition`: file that determines the runs.
+/// - `ending`: ending of the files of the runs.
+/// - `elsewhere`: advice in messages if another program uses the folder.
+/// - `is_published`: true for names of files that are published with the last run. Other files are
+///   never removed, even if the manifest lists them.
 #[derive(Debug)]
 pub struct Kind {
     name: &'static str,
@@ -96,16 +100,20 @@ pub enum Damage {
     Unreadable(anyhow::Error),
 }
 
-/// The text of a definition, and a function that compares it with the text in the folder. The function fails if that
-/// text defines other runs.
+/// Definition of the runs in a folder, which a folder with stored runs must have too.
+///
+/// - `text`: content of the file with the definition.
+/// - `compare`: fails if the text in the folder, which it receives, defines other runs.
 #[derive(Clone, Copy)]
 pub struct Definition<'a> {
     pub text: &'a str,
     pub compare: &'a dyn Fn(&str) -> Result<()>,
 }
 
-/// A locked folder; it is unlocked when this value is dropped. `lost` are files that are in the manifest but not in the
-/// folder. `is_new` is true if the folder had no manifest, so that all of its runs come from other programs.
+/// A locked folder with stored runs; it is unlocked when this value is dropped.
+///
+/// - `lost`: files that are in the manifest but not in the folder.
+/// - `is_new`: true if the folder had no manifest, so that its runs come from other programs.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
@@ -119,8 +127,11 @@ pub struct Store {
     _lock: File,
 }
 
-/// The hashes of the stored files, by name, and the file of the manifest. The file is `None` after publication, and
-/// after a line that could not be written.
+/// The list of the stored files.
+///
+/// - `file`: the open file of the list. It is `None` after publication, and after a line could not
+///   be written.
+/// - `sums`: SHA-256 of each file by its name.
 #[derive(Debug)]
 struct Manifest {
     file: Option<File>,
@@ -131,8 +142,9 @@ fn lines(sums: &BTreeMap<String, String>) -> String {
     sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
 }
 
-/// Returns the SHA-256 in the last line for each file name, from the text of a manifest. An incomplete last line, which
-/// a killed program leaves, does not count.
+/// Parses the text of a manifest and returns the SHA-256 of each file by its name. If a name has
+/// several lines, the last line counts. An incomplete last line, which a killed program leaves, is
+/// ignored.
 ///
 /// # Errors
 /// If another line is not in the format of a manifest.
@@ -161,10 +173,12 @@ fn has_no_runs(path: &Path) -> bool {
     }
 }
 
-/// Reads the manifest of a folder. `is_used` is true if a program has locked the folder before.
+/// Reads the manifest of the folder `path`. `is_used` is true if a program has locked the folder
+/// before.
 ///
 /// # Errors
-/// If the manifest is damaged, or if it is missing although the folder was used, so that nothing verifies the stored runs.
+/// If the folder contains runs and the manifest is damaged, or is missing although the folder was
+/// used. Nothing would then verify the stored runs.
 fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
     let place = path.join(MANIFEST);
     let read = || -> Result<BTreeMap<String, String>> {
@@ -208,12 +222,14 @@ impl Definition<'_> {
 }
 
 impl Store {
-    /// Creates the folder if it does not exist, and locks it. `about` tells other programs why it is locked. The
-    /// definition of a campaign is not passed, because it is published with the tables.
+    /// Locks the folder `path` for stored runs of this kind, and creates it if it does not exist.
+    /// `about` tells other programs why the folder is locked. A study passes its `definition`; a
+    /// campaign passes none, because it is published with the tables.
     ///
     /// # Errors
-    /// If another program has locked the folder, the folder contains runs of another kind or of another definition, or
-    /// its manifest is damaged. After an error nothing in the folder has changed, except for the lock.
+    /// If another program has locked the folder, the folder contains runs of another kind or of
+    /// another definition, or its manifest is damaged. After an error nothing in the folder has
+    /// changed, except for the lock.
     pub fn take(
         path: &Path,
         kind: &'static Kind,
@@ -289,8 +305,9 @@ impl Store {
         self.manifest().sums.contains_key(&self.kind.run_file(run))
     }
 
-    /// Returns the SHA-256 of a stored run, or `None` if the run was never stored. A run without a line in the manifest
-    /// is accepted if the folder is new, or if `is_ours` returns false, because another program has written its file.
+    /// Returns the SHA-256 of the stored run `run`, or `None` if the run was never stored. A run
+    /// without a line in the manifest is accepted if the folder is new, or if `is_ours` returns
+    /// false for its file, because another program has written it.
     ///
     /// # Errors
     /// If the file differs from the file that was stored.
@@ -306,7 +323,9 @@ impl Store {
         Ok(sum)
     }
 
-    /// Returns the bytes of a stored run of a kind that only HubSlosh writes, or `None` if the run was never stored.
+    /// Returns the content of the stored run `run`, or `None` if the run was never stored. It is
+    /// for kinds of folders to which only HubSlosh writes, so that each run must have a line in the
+    /// manifest.
     ///
     /// # Errors
     /// If the file differs from the file that was stored.
@@ -318,8 +337,9 @@ impl Store {
         self.read_checked(run, |_| true, read)
     }
 
-    /// Returns the value that `read` extracts from the file of a stored run. `read` also returns the SHA-256 of the
-    /// file, which must be the stored one.
+    /// Reads the file of a stored run with `read`, and returns the value that `read` has extracted.
+    /// `read` also returns the SHA-256 of the file, which must be the SHA-256 in the manifest. For
+    /// `is_ours` see [`Store::check`].
     fn read_checked<T>(
         &self,
         run: &str,
@@ -343,15 +363,16 @@ impl Store {
         self.add_to_manifest(&self.kind.run_file(run), sum)
     }
 
-    /// Stores a run in the folder. `write` receives a path and writes the run's file there. When this function returns,
-    /// the run is on the disk.
+    /// Stores a run in the folder. `write` receives a path and writes the file of the run there.
+    /// When this function returns, the run is on the disk.
     pub fn add(&self, run: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let stored = self.write(&self.kind.run_file(run), write);
         stored.with_context(|| format!("{} cannot be stored", self.run(run).display()))
     }
 
-    /// Writes a file of the folder: first its line in the manifest, then the file, which gets its final name
-    /// when it is complete.
+    /// Writes `file` into the folder with `write`. The line in the manifest comes first; then the
+    /// complete file gets its name. A program that is killed in between leaves no file without a
+    /// line.
     fn write(&self, file: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let place = self.path.join(file);
         input::check_replaceable(&place)?;
@@ -674,8 +695,8 @@ mod tests {
         assert_eq!(names, [".lock", MANIFEST, "plan.toml", "runs", "runs.csv"]);
     }
 
-    /// A forged manifest lists files outside the campaign's directory, and files whose names a campaign does not use.
-    /// The campaign does not remove them.
+    /// A forged manifest lists files outside the campaign's directory, and a file with a name that
+    /// no campaign uses.
     #[test]
     fn files_of_others_are_not_removed_even_if_the_manifest_lists_them() {
         let directory = tempfile::tempdir().unwrap();

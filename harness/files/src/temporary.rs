@@ -30,8 +30,8 @@ impl Drop for Registered {
     }
 }
 
-/// Removes all registered files and folders before a signal ends the program. The registry stays locked, so that a
-/// thread that registers another file waits until the program has ended.
+/// Removes all registered files and folders before a signal ends the program. The registry stays
+/// locked, so that a thread that registers another file waits until the program has ended.
 pub fn remove_all() {
     let paths = paths();
     for path in paths.iter() {
@@ -43,15 +43,16 @@ pub fn remove_all() {
     std::mem::forget(paths);
 }
 
-/// Runs `work`, and delays signals that would end the program until `work` returns. `work` must not register a file.
+/// Runs `work`, and delays signals that would end the program until `work` returns. `work` must not
+/// register a temporary file, because it would wait for itself.
 pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     let _held = paths();
     work()
 }
 
 pub const PREFIX: &str = "hubslosh-";
-/// Name of a file in each temporary folder that the program locks as long as it runs. The lock shows other programs
-/// that the folder is in use.
+/// Name of a file in each temporary folder that the program locks as long as it runs. The lock
+/// shows other programs that the folder is in use.
 const ALIVE: &str = "alive";
 const FILES: &str = "files";
 
@@ -65,7 +66,8 @@ pub struct Folder {
     process: u32,
 }
 
-/// Removes the folder, except in a forked process, because the folder belongs to the process that created it.
+/// Removes the folder. A forked process does not, because the folder belongs to the process that
+/// created it.
 impl Drop for Folder {
     fn drop(&mut self) {
         if std::process::id() != self.process {
@@ -75,16 +77,16 @@ impl Drop for Folder {
 }
 
 impl Folder {
-    /// Creates a temporary folder in the system's folder for temporary files. The first call in a program also removes
-    /// folders left by programs that were killed.
+    /// Creates a temporary folder in the system's folder for temporary files. The first call in a
+    /// program also removes folders that killed programs have left.
     pub fn new() -> Result<Folder> {
         static SWEPT: Once = Once::new();
         SWEPT.call_once(|| sweep(&std::env::temp_dir(), PREFIX));
         Folder::make(&std::env::temp_dir(), PREFIX)
     }
 
-    /// Creates a temporary folder in `parent` with a name that begins with `prefix`. Also removes folders with such
-    /// names that killed programs have left.
+    /// Creates a temporary folder in `parent` with a name that begins with `prefix`. It also
+    /// removes folders with this prefix that killed programs have left.
     pub fn new_in(parent: &Path, prefix: &str) -> Result<Folder> {
         sweep(parent, prefix);
         Folder::make(parent, prefix)
