@@ -133,8 +133,8 @@ fn entry<M: Model>(name: &str) -> Option<&'static Variable<M>> {
     M::table().variables.iter().find(|v| v.name == name)
 }
 
-/// Returns the elements that an array of the table has with the start values of the structural parameters, as row-major indices
-/// in the largest possible array.
+/// Returns which elements of the largest possible array exist if all structural parameters have
+/// their start values. The elements are indices in row-major order.
 fn elements<M: Model>(v: &Variable<M>) -> Vec<usize> {
     let all = Arrays::new::<M>(&M::table().starts());
     let scalars = all.scalars(arrays::reference(v)).unwrap_or_default().iter();
@@ -212,8 +212,9 @@ fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
     }
 }
 
-/// Returns the event indicators as elements of ModelStructure. They are declared to depend on all inputs and states, because
-/// their real dependencies change with the contact and with the limits that apply.
+/// Returns the event indicators as elements of ModelStructure. Each is declared to depend on all
+/// inputs and states, because the real dependencies change with the contacts and with the limits of
+/// the model that apply.
 fn event_indicators<M: Model>(layout: Layout) -> impl Iterator<Item = Element> {
     let is_known = |s: &&'static Scalar<M>| {
         s.variable.causality == Causality::Input || s.variable.state.is_some()

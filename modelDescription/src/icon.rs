@@ -6,7 +6,8 @@
 
 use sha2::{Digest, Sha256};
 
-/// Folder of the drawing (`icon.svg`), the picture (`icon.png`, which becomes each FMU's `model.png`) and their hashes.
+/// Folder with the drawing of the FMUs' icon (`icon.svg`), the picture (`icon.png`, which becomes
+/// `model.png` of each FMU) and their hashes.
 pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon");
 pub const SIZE: u32 = 512;
 

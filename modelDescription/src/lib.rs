@@ -31,10 +31,12 @@ pub fn path<M: Model>() -> PathBuf {
     folder::<M>().join("modelDescription.xml")
 }
 
-/// Date of the release. It is not the date of the build, because builds of the same commit must give the same bytes.
+/// Date of the release. It is not the date of the build, because builds of one commit must give the
+/// same bytes.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
-/// Default stop time, s. A simulation of 20 s has 1000 samples of the gyro at 50 Hz.
+/// Default stop time of a simulation, s. A simulation of 20 s has 1000 samples of the gyro at 50
+/// Hz.
 const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
@@ -188,7 +190,8 @@ fn variability<M: Model>(v: &Variable<M>) -> &'static str {
 
 struct Own {
     start: Option<String>,
-    /// The index (FMI 2.0) or value reference (FMI 3.0) of the state whose derivative the variable is.
+    /// The index (FMI 2.0) or value reference (FMI 3.0) of the state if the variable is the
+    /// derivative of a state.
     derivative: Option<u32>,
 }
 
@@ -222,7 +225,6 @@ fn real(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// Returns the state that belongs to an element if the entry is a derivative.
 fn state_of<M: Model>(v: &Variable<M>, element: usize) -> Option<&'static Scalar<M>> {
     match v.access {
         Access::Derivative(place) => M::table().state_at(place(element)),
@@ -257,24 +259,27 @@ impl List {
     }
 }
 
-/// Largest number of dependencies of an initial value that are written. Values that depend on accelerations depend on nearly
-/// all parameters, and their lists would be the largest part of the file.
+/// Largest number of dependencies of an initial value that are written. Values that depend on
+/// accelerations depend on nearly all parameters, and their lists would be the largest part of the
+/// file.
 const LONGEST: usize = 100;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Long {
-    /// No dependencies are written, so that an importer assumes that the value depends on everything. The list of an output is
-    /// nevertheless written if the output does not depend on all inputs, because otherwise an importer would find an algebraic
-    /// loop that does not exist.
+    /// Long lists are left out, so that an importer assumes that the value depends on everything.
+    /// However, the list of an output is written if the output does not depend on all inputs,
+    /// because otherwise an importer would find an algebraic loop that does not exist.
     Nothing,
-    /// The dependencies without their kinds, so that an importer assumes the kind `dependent`, which is correct.
+    /// Long lists are written without the kinds of the dependencies, so that an importer assumes
+    /// the kind `dependent`, which is correct.
     Dependencies,
 }
 
-/// Returns the elements of one list of ModelStructure, such as Output or InitialUnknown, in the order of their numbers, each
-/// with the numbers of the scalars on which it depends. An array depends on everything on which one of its elements depends.
-/// `element` and `attribute` are the XML names in this version of FMI, and `long` determines if long lists of dependencies of
-/// initial values are written.
+/// Returns the elements of one list of ModelStructure, such as Outputs or InitialUnknowns, in
+/// ascending order of `number`. Each states the numbers of the scalars on which the variable
+/// depends; an array depends on everything on which one of its elements depends. `element` and
+/// `attribute` are the XML names in this version of FMI, `number` returns the index or value
+/// reference of a scalar, and `long` determines if long lists of initial values are written.
 fn unknowns<M: Model>(
     list: List,
     element: &'static str,

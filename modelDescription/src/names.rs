@@ -43,8 +43,9 @@ impl Module {
     }
 }
 
-/// Returns the text of the module: a constant for each variable except derivatives. Each part of a variable's
-/// name is a submodule.
+/// Returns the source text of a module of `harness/names` with the names of an FMU's variables: a
+/// constant for each variable except derivatives. Each part of a variable's name before a full stop
+/// becomes a submodule.
 pub fn module<M: Model>() -> String {
     let table = M::table();
     let mut root = Module::default();
@@ -81,8 +82,9 @@ pub fn module<M: Model>() -> String {
     text
 }
 
-/// Returns the largest value of an integer parameter if it is the length of an array. Returns `None` for integer twins
-/// of enumerations and Booleans.
+/// Returns the largest value of `variable` if it is an integer parameter that is the length of an
+/// array. Returns `None` for the integer variables that have the same meaning as an enumeration or
+/// a Boolean.
 fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     let Kind::Integer { max: Some(max), .. } = variable.kind else { return None };
     let lengths = |v: &Variable<M>| v.shape.iter().any(|d| i32::try_from(d.most()) == Ok(max));
@@ -116,7 +118,7 @@ fn sizes<M: Model>() -> String {
         text += &format!("{line}\n        ],\n    }},\n");
     }
     format!(
-        "\n/// Parameters that size arrays.\n#[rustfmt::skip]\npub const SIZES: &[crate::Size] = &[\n{text}];\n"
+        "\n/// Parameters that determine the sizes of arrays.\n#[rustfmt::skip]\npub const SIZES: &[crate::Size] = &[\n{text}];\n"
     )
 }
 

@@ -108,8 +108,9 @@ fn has_slosh_model<M: Model>() -> bool {
     M::table().variables.iter().any(|v| v.name == "slosh.model")
 }
 
-/// Returns the start values of all elements. If all elements have the same value, returns this value; if all blocks along
-/// the first index are equal, returns the first block.
+/// Returns the start values of a variable for the page of variables. If all elements have the same
+/// value, only this value is returned; if all blocks along the first index are equal, only the
+/// first block is returned.
 fn start<M: Model>(variable: &Variable<M>) -> String {
     let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
     let starts: Vec<_> = (0..variable.len())
@@ -153,7 +154,8 @@ fn range<M: Model>(variable: &Variable<M>) -> (String, String) {
     }
 }
 
-/// Formats a number: without an exponent if it is 0 or its magnitude is 1e-4 to 1e5, otherwise with a power of ten.
+/// Formats a number for the page of variables: without an exponent if it is 0 or its magnitude is
+/// 1e-4 to 1e5, otherwise with a power of ten.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use host::fmi2::{Fmu, Instance};
 
-/// Communication step, s, and number of steps.
+/// Communication step of the two FMUs, s.
 const STEP: f64 = 0.02;
 const STEPS: usize = 3000;
 
@@ -43,8 +43,10 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Steps both FMUs together. At each communication point all outputs are read before any input is
-/// set (a Jacobi master). Returns the rows of time, tau and the recorded variables.
+/// Simulates the closed loop of plant and controller. In each step both FMUs use the values that
+/// were exchanged at its beginning (a Jacobi master). If `slopes` is true, the inputs change
+/// linearly during a step; otherwise they are held. Returns the rows of time, tau and the recorded
+/// variables.
 fn closed_loop(plant: &Fmu, controller: &Fmu, slopes: bool) -> Result<Vec<Vec<f64>>> {
     let mut plant = started(plant, &PLANT)?;
     let mut controller = started(controller, &[])?;

@@ -12,8 +12,8 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 pub use realfft::num_complex::Complex64;
 
-/// Returns the planner of transforms. It caches the tables for each length, because preparing a transform
-/// takes longer than computing it.
+/// Returns the planner of the Fourier transforms of this process. It caches its tables, because
+/// preparing a transform takes longer than computing it.
 fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
     static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Default::default);
     PLANNER.lock().unwrap_or_else(PoisonError::into_inner)
@@ -26,7 +26,8 @@ impl Forward {
         Forward(planner().plan_fft_forward(length))
     }
 
-    /// Returns the spectrum of a signal, N/2 + 1 lines.
+    /// Returns the spectrum of a real signal of N samples, which has N/2 + 1 lines from frequency 0
+    /// to half the sampling frequency.
     ///
     /// # Panics
     /// If the signal has another length than the transform.
@@ -37,7 +38,8 @@ impl Forward {
     }
 }
 
-/// Inverse transform, which returns N times the signal whose spectrum it receives.
+/// Inverse transform of a fixed length N. Its result is N times the signal that belongs to a
+/// spectrum.
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
 impl Inverse {
@@ -45,8 +47,9 @@ impl Inverse {
         Inverse(planner().plan_fft_inverse(length))
     }
 
-    /// Returns N times the signal of a spectrum of N/2 + 1 lines. Imaginary parts of line 0 and, if N is
-    /// even, of the last line are ignored, because a real signal has none.
+    /// Returns N times the real signal of N samples that belongs to `spectrum`, which has N/2 + 1
+    /// lines. Imaginary parts of line 0 and, if N is even, of the last line are ignored, because
+    /// the spectrum of a real signal has none.
     ///
     /// # Panics
     /// If the spectrum has another length.

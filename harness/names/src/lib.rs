@@ -6,7 +6,8 @@
 pub struct Array<const D: usize>(&'static str);
 
 impl<const D: usize> Array<D> {
-    /// Returns the name of the element at these indices, which count from 1, for example `tank[2].p[1,3]`.
+    /// Returns the name of an array element, for example `tank[2].p[1,3]`. The indices count from
+    /// 1.
     pub fn element(self, indices: [usize; D]) -> String {
         let (mut name, mut left) = (self.0.to_string(), &indices[..]);
         while let (Some(place), [index, rest @ ..]) = (name.find("[]"), left) {
@@ -21,9 +22,13 @@ impl<const D: usize> Array<D> {
     }
 }
 
-/// A parameter that determines how many elements of arrays are in use. `most` is its largest value.
-/// `has_indicators` is true if each element has its own event indicators. `arrays` lists these arrays, each with
-/// the position of this dimension among the array's indices.
+/// A parameter of an FMU that determines how many elements of its arrays are in use, for example
+/// the number of tanks.
+///
+/// - `most`: largest value of the parameter.
+/// - `has_indicators`: true if each element has its own event indicators.
+/// - `arrays`: names of these arrays, each with the position, among the indices of the array, of
+///   the index that counts up to the parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub parameter: &'static str,

@@ -5,15 +5,15 @@ use formulas::limits::LimitedBy;
 
 use crate::{hubslosh, sloshtank, spacecraft};
 
-/// Output variables that give the reason why a tank is out of the range of its model. Each entry has the name of the
-/// variable, and the words that precede the reason in messages.
+/// Output variables that tell why a tank is out of the range of its model. Each entry has the name
+/// of the variable, and the words that precede the reason in messages.
 pub struct Limits {
     tanks: Vec<(String, String)>,
 }
 
 impl Limits {
-    /// Finds the variables of an FMU that give the reason why a tank is out of the range of its model. `has` returns
-    /// true for names of variables of the FMU.
+    /// Finds the output variables of an FMU that tell why a tank is out of the range of its model.
+    /// `has` returns true for the names of variables of the FMU.
     pub fn find(has: impl Fn(&str) -> bool) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
             .map(|i| (spacecraft::tank::LIMITED_BY_KIND.element([i]), format!("tank {i}: ")));
@@ -26,9 +26,10 @@ impl Limits {
         self.tanks.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Returns a sentence for each tank that was out of range. It lists the reasons with their shares of the time, the
-    /// largest first, and the time at which each reason first occurred. `column` returns a column of a run's table by
-    /// name. A row counts until the next row.
+    /// Returns a sentence for each tank that was out of the range of its model in a run. The
+    /// sentence lists the reasons with their shares of the time, the largest first, and the time at
+    /// which each reason first occurred. `column` returns the column of the run's table with a
+    /// given name. A row counts until the next row.
     pub fn describe<'t>(&self, column: impl Fn(&str) -> Option<&'t [f64]>) -> Vec<String> {
         let of_tank = |(name, tank): &(String, String)| {
             let found = reasons(column("time")?, column(name)?);
@@ -87,8 +88,6 @@ fn percent(share: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The test computes the share of the time and the time of the first occurrence of each reason from the values of
-    /// the reason's variable over time.
     #[test]
     fn each_reason_for_leaving_the_range_has_its_share_of_the_time_and_its_first_time() {
         let time = [0.0, 1.0, 3.0, 4.0, 10.0];

@@ -176,7 +176,7 @@ pub mod solver {
     pub const MAX_STEPS: &str = "solver.max_steps";
 }
 
-/// Parameters that size arrays.
+/// Parameters that determine the sizes of arrays.
 #[rustfmt::skip]
 pub const SIZES: &[crate::Size] = &[
     crate::Size {

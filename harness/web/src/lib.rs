@@ -1,19 +1,20 @@
 //! JavaScript that several pages of the project contain, as text to be put between `<script>` and `</script>`. Data for
 //! it must be escaped by [`json_in_script`].
 
-/// The part of three.js that [`SCENE`] uses, as the global `THREE` (MIT: [`THREE_LICENSE`] goes with it).
+/// The parts of the library three.js that [`SCENE`] uses, as a script that defines the global
+/// `THREE`. Its licence (MIT) requires [`THREE_LICENSE`] in each page.
 pub static THREE: &str = include_str!("../three/three.min.js");
 
-/// The licence of [`THREE`], which every page that contains the library also contains.
 pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 
-/// The scene, as the global `HubSloshScene`: it draws a bench or a spacecraft with its liquid
-/// (`scene/README.md`), and needs [`THREE`].
+/// The 3-D scene as a script that defines the global `HubSloshScene`. It draws a bench or a
+/// spacecraft with its liquid (`scene/README.md`), and needs [`THREE`].
 pub static SCENE: &str = include_str!("../scene/scene.js");
 
-/// Escapes JSON so that it can be put into a script element of any page, or into a script. No text in the escaped JSON
-/// ends the element (`</script`), hides its end (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of
-/// JavaScript. The value stays the same, because JSON has these characters only in strings.
+/// Escapes JSON so that it can be embedded in a script element of any page, or in a script. No text
+/// in the escaped JSON ends the element (`</script`), hides its end (`<!--<script`: HTML,
+/// 13.2.5.20), becomes an entity, or ends a line of JavaScript. The value stays the same, because
+/// JSON has these characters only in strings.
 pub fn json_in_script(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for c in json.chars() {
@@ -53,7 +54,8 @@ mod tests {
         );
     }
 
-    /// esbuild includes only the names in `used.js`. A name that is missing there causes an error only in the browser.
+    /// The bundle of three.js contains only the names in `used.js`. A missing name would cause an
+    /// error only in the browser.
     #[test]
     fn the_bundle_has_every_name_that_the_scene_uses() {
         let exported = include_str!("../three/used.js");

@@ -7,7 +7,8 @@ use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
-/// Parameters: gains (N m/rad, N m s/rad) and time constant of the filter (s).
+/// Parameters of the controller: gains of angle (N m/rad) and rate (N m s/rad), and time constant
+/// of the filter (s).
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
     k_p: f64,
@@ -22,7 +23,7 @@ impl Default for Parameters {
     }
 }
 
-/// Errors of angle (rad) and rate (rad/s), each with its time derivative.
+/// Inputs of the controller: errors of angle (rad) and rate (rad/s), each with its time derivative.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     theta: [f64; 2],
@@ -66,7 +67,8 @@ static TABLE: Table<Controller> = Table::new(
 );
 
 impl Controller {
-    /// Returns the unfiltered torque, N m, which tau approaches.
+    /// Returns the torque of the control law, N m, before the filter. The output tau follows it
+    /// with the filter's time constant.
     fn unfiltered(&self, theta: f64, omega: f64) -> f64 {
         -self.p.k_p * theta - self.p.k_d * omega
     }
@@ -97,8 +99,12 @@ impl Dynamics for Controller {
         tau[0].is_finite().then_some(Controller { p: *p, tau })
     }
 
-    /// Steps exactly: for inputs that change linearly, v = v0 + v1 t, the solution is
-    /// tau(h) = v(h) - t_f v1 + (tau(0) - v0 + t_f v1) exp(-h/t_f).
+    /// Advances the filter by h seconds. The result is exact for inputs that change linearly: with
+    /// the unfiltered torque v(t) = v0 + v1 t and the filter's time constant t_f, the output is
+    ///
+    /// ```text
+    /// tau(h) = v(h) - t_f v1 + (tau(0) - v0 + t_f v1) exp(-h/t_f)
+    /// ```
     fn step(&mut self, Inputs { theta, omega }: &Inputs, h: f64) -> Result<(), StepFailure> {
         let [v0, v1] = [0, 1].map(|k| self.unfiltered(theta[k], omega[k]));
         let lag = self.p.t_f * v1;
