@@ -27,7 +27,8 @@ use formulas::energy_terms::EnergyTerms;
 use hubslosh_tank::forced::{Forced, ForcedWave, PHASES, Space, Walls, first_harmonic};
 use hubslosh_tank::{Tank, finite_amplitude};
 
-/// Steady motion of a slosh mass: q and its momentum, in units of its length and frequency (m = g = l = 1).
+/// Slosh mass in steady motion. Its displacement q and its momentum are in units in which mass,
+/// length and specific force are 1.
 #[derive(Clone, Copy)]
 struct Bob {
     terms: EnergyTerms,
@@ -59,7 +60,8 @@ impl Bob {
         ]
     }
 
-    /// Integrates `periods` periods from the state of the wave, and returns the last period.
+    /// Integrates the motion of the slosh mass over `periods` periods, starting from the state of
+    /// `wave` and with the same forcing, and returns the last period.
     fn steady(&self, wave: &ForcedWave, periods: usize) -> Option<ForcedWave> {
         let steps = 2 * PHASES;
         let h = TAU / wave.ratio / steps as f64;
@@ -110,7 +112,8 @@ fn largest(q: &[Vec<f64>; 2]) -> f64 {
     (0..PHASES).map(|i| q[0][i].hypot(q[1][i])).fold(0.0, f64::max)
 }
 
-/// Returns the amplitude and the phase, degrees, of the first harmonic of q relative to the acceleration along x.
+/// Returns the amplitude of the first harmonic of the displacement along `axis`, and its phase
+/// relative to the acceleration along x, degrees.
 fn phase(wave: &ForcedWave, axis: usize) -> [f64; 2] {
     let [c, s] = first_harmonic(&wave.q[axis]);
     let [a, b] = wave.push[0];
@@ -153,7 +156,8 @@ fn main() {
 
 const ZETA: f64 = 0.01;
 
-/// A tank at a fill, with its third-order slosh mass and its slosh mass with the wave's energy.
+/// A tank at one fill, with two slosh masses that represent its liquid: one with third-order
+/// coefficients, and one with the coefficients that also give the energy of the wave.
 struct Filled {
     fill: f64,
     share: f64,
@@ -191,7 +195,9 @@ impl Filled {
         }
     }
 
-    /// Prints waves of 2 to 14 degrees at the frequency of free waves of 9 degrees, and at frequencies 1 % from it.
+    /// Computes steady waves of 2 to 14 degrees at the frequency of free waves of 9 degrees and at
+    /// frequencies 1 % from it, and prints them beside the motion of the slosh masses. The waves
+    /// move on a circle if `is_circle` is true, otherwise in a plane.
     fn steady(&self, is_circle: bool, resolution: [usize; 2]) {
         let space = if is_circle { Space::Circle } else { Space::Plane };
         let peak = 1.0 + 0.5 * self.shifts[usize::from(is_circle)] * 9f64.to_radians().powi(2);
@@ -220,8 +226,9 @@ impl Filled {
         }
     }
 
-    /// Prints the rotary wave for each forcing: frequency ratio, acceleration over g, and damping ratio. Newton's method starts
-    /// from the amplitudes and phases of the last slosh mass in rotary motion.
+    /// Prints the rotary wave for each forcing, which is a frequency ratio, an acceleration over g,
+    /// and a damping ratio. Newton's method starts from the amplitudes and phases of the last slosh
+    /// mass in rotary motion.
     fn swirl(&self, resolution: [usize; 2], forcings: &[[f64; 3]]) {
         for &[ratio, push, zeta] in forcings {
             let bob = Bob { zeta, ..self.bobs[self.bobs.len() - 1] };

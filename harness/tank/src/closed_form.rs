@@ -10,14 +10,15 @@ use crate::curve::Segment;
 use crate::gauss::Gauss;
 use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
 
-/// Number of terms in the sums over all modes; [`tail`] estimates the rest of the sum.
 const TERMS: usize = 400;
-/// Relative error of the closed forms, from rounding and from the terms after the first [`TERMS`], which are left out.
+/// Relative error of the closed forms, which comes from rounding and from the terms that are left
+/// out after the first [`TERMS`].
 const ERROR: f64 = 1e-11;
 
-/// Returns the sum of tanh(k h/2)/k^5 over all wave numbers k above `last`, which are `step` apart: the remainder of a
-/// series. The sum is replaced by the integral (1/step) int dk (midpoint rule in reverse), with u = 1/k. The terms fall
-/// as k^-5 for large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
+/// Returns the remainder of the series sum tanh(k h/2)/k^5 after the wave number `last`. The
+/// remaining wave numbers k are `step` apart, and `h` is the depth. The sum is replaced by the
+/// integral (1/step) int dk (midpoint rule in reverse), with u = 1/k. The terms fall as k^-5 for
+/// large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
 fn series_remainder(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
@@ -33,7 +34,9 @@ fn y1_slope(x: f64) -> f64 {
     libm::y0(x) - libm::y1(x) / x
 }
 
-/// Returns the first `count` zeros xi_n of J1', by Newton's method with J1'' = -J1'/x - (1 - 1/x^2) J1.
+/// Returns the first `count` positive zeros xi_n of the derivative J1' of the Bessel function J1,
+/// which are the wave numbers of a cylinder of radius 1. They are found by Newton's method with
+/// J1'' = -J1'/x - (1 - 1/x^2) J1.
 pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     let zero = |n: usize| {
         // McMahon: b - 7/(8 b), b = (n - 1/4) pi (DLMF 10.21.20)
@@ -48,8 +51,10 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     (1..=count).map(zero).collect()
 }
 
-/// Returns the slosh mode with the wave number k (1/m) of a tank with vertical walls and a flat bottom, filled to the
-/// height h. Its eigenvalue is lambda = k tanh(k h), and its slosh mass is at the height h - (2/k) tanh(k h/2).
+/// Returns slosh mode number `n` of a tank with vertical walls and a flat bottom, whose wave number
+/// is `k`, 1/m, at the fill `h`, m. `m` is the slosh mass and `m_liq` the mass of the liquid, kg.
+/// The eigenvalue is lambda = k tanh(k h), and the slosh mass is at the height h - (2/k) tanh(k
+/// h/2).
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();
@@ -64,8 +69,8 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
     )
 }
 
-/// Returns the elevation of a mode with the wave number `k`, 1/m, sampled over the free surface
-/// between the radii `inner` and `outer`, m.
+/// Samples the elevation of a mode with the wave number `k`, 1/m, over the free surface between the
+/// radii `inner` and `outer`, m. `elevation` is a function of the radius.
 fn sample_surface([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
@@ -78,7 +83,8 @@ fn sample_surface([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f
     }
 }
 
-/// Ratios such as sinh(x)/cosh(y) for 0 <= x <= 2 y, all divided by cosh(kh)^2 so that nothing overflows.
+/// Ratios of hyperbolic functions such as sinh(x)/cosh(y) for 0 <= x <= 2 y. All are divided by
+/// cosh(kh)^2, so that nothing overflows in deep liquid.
 struct Hyperbolic {
     floor: f64,
     half_tanh: f64,
@@ -93,7 +99,9 @@ impl Hyperbolic {
     }
 }
 
-/// Solves an upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m³.
+/// Returns the modal data of an upright circular cylinder in closed form. `radius` and the fill `h`
+/// are in m, `rho` is the density in kg/m³. With the zeros xi of J1', k = xi/R and beta the laminar
+/// damping per length:
 ///
 /// ```text
 /// m_n/m_liq = 2 R tanh(kh)/(xi (xi^2 - 1) h), k = xi/R, wave 2 R/(xi^2 - 1)
@@ -126,7 +134,9 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     upright([0.0, r], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Returns the first `count` zeros k, 1/m, of C'(R_i) with C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R).
+/// Returns the first `count` wave numbers k, 1/m, of an annulus with the radii `inner` and `outer`,
+/// m. At a wave number the slope of C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R) is zero at the inner
+/// wall, too.
 pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     let slope = |k: f64| {
         j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)
@@ -147,7 +157,9 @@ pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     found
 }
 
-/// Solves an upright annular cylinder between the radii `inner` and `outer`, filled to `h`, m.
+/// Returns the modal data of an upright annular cylinder in closed form. The radii `inner` and
+/// `outer` and the fill `h` are in m, `rho` is the density in kg/m³. With the radial elevation C(r)
+/// of a mode, its wave number k and its eigenvalue lambda:
 ///
 /// ```text
 /// A = [r C]/k^2, N = [(r^2 - 1/k^2) C^2]/2 (from R_i to R), m_n = rho pi lambda A^2/N
@@ -214,8 +226,9 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
     upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Returns the modal data of a tank with vertical walls and a flat bottom. `inertias` are, in this order, the inertia
-/// of the rigid liquid across the axis, the inertia of the rigid liquid about the axis, and the effective inertia.
+/// Returns the modal data of a body of revolution with vertical walls and a flat bottom. `inertias`
+/// are, in this order, the inertia of the rigid liquid across the axis, the inertia of the rigid
+/// liquid about the axis, and the effective inertia.
 fn upright(
     [r_inner, r_outer]: [f64; 2],
     h: f64,
@@ -234,7 +247,9 @@ fn upright(
     data
 }
 
-/// Solves for the modes of a box along its side of length `length`, m, with the other side `width`, m, filled to `h`, m.
+/// Returns the modes of a box along its side of the length a = `length`, m, in closed form. The
+/// other side has the length w = `width`, m, and `h` is the fill, m. For the n-th mode with the
+/// wave number k and the laminar damping beta:
 ///
 /// ```text
 /// k = (2 n - 1) pi/a, m_n/m_liq = 8 tanh(kh)/(a^2 h k^3), wave 4/(a k^2)
@@ -267,8 +282,9 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
     }
 }
 
-/// Returns the effective inertia per mass of a full rectangle a x b that rotates in its plane about its
-/// centre: b^2/12 - a^2/4 + (64/(a^2 b)) sum tanh(k b/2)/k^5, k = (2 n - 1) pi/a. It is symmetric in a and b.
+/// Returns the effective inertia per mass, m², of liquid that completely fills a rectangle of `a`
+/// by `b`, m, which rotates in its plane about its centre. It is b^2/12 - a^2/4 + (64/(a^2 b)) sum
+/// tanh(k b/2)/k^5 with k = (2 n - 1) pi/a, and symmetric in a and b.
 fn effective(a: f64, b: f64) -> f64 {
     let sum: f64 = (0..TERMS)
         .map(|n| {
@@ -280,8 +296,9 @@ fn effective(a: f64, b: f64) -> f64 {
     b * b / 12.0 - 0.25 * a * a + 64.0 / (a * a * b) * sum
 }
 
-/// Returns the inertia of the liquid that rotates with a box of `length_x` x `length_y` about its vertical
-/// axis, filled to `h`, kg·m²: `tank.I_own` in HubSlosh. The twisting modes of the surface count as rigid.
+/// Returns the inertia about the vertical axis, kg·m², of the liquid that rotates with a box:
+/// `tank.I_own` in HubSlosh. The sides `length_x` and `length_y` and the fill `h` are in m.
+/// Twisting modes of the surface count as rigid.
 pub fn box_yaw_inertia(length_x: f64, length_y: f64, h: f64, rho: f64) -> f64 {
     rho * length_x * length_y * h * effective(length_x, length_y)
 }

@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
-/// Amplitude dependence of the first mode: its coefficients along the direction of motion or, for a box, along the
-/// first and the second length; `None` if the coefficients are not known. `pendulum_limit` is the slosh angle, rad,
-/// above which a pendulum (s = kappa = 1) is out of range as a model of this mode, one for each direction. `warnings`
-/// state the limits of the coefficients, and the reasons for missing coefficients.
+/// Amplitude dependence of the first mode of a tank.
+///
+/// - `mode`, `mode_y`: its coefficients, for a box along the first and along the second length;
+///   `None` if not known.
+/// - `pendulum_limit`, `pendulum_limit_y`: slosh angle, rad, above which a pendulum (s = kappa = 1)
+///   is out of range as a model of this mode.
+/// - `warnings`: limits of the coefficients, and the reasons why coefficients are missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FiniteAmplitude {
     pub mode: Option<Coefficients>,
@@ -19,14 +22,16 @@ pub struct FiniteAmplitude {
 
 /// Third-order coefficients of a mode.
 ///
-/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa, as in the FMUs, 1 for a pendulum; `error` is the
-///   estimated error of both, relative to 1 + |s| and 1 + |kappa|.
-/// - `planar`, `circular`: relative shift of omega^2 per squared slosh angle; a mode along one length of a box
-///   has no circular motion.
-/// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At a slosh angle A the crest
-///   is wave A + wave_second A^2 high and the trough wave A - wave_second A^2 deep.
-/// - `bridged`: true if the third-order theory has a pole near this fill, so that the coefficients are interpolated
-///   over the fill across it.
+/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa as in the FMUs; both are 1 for a
+///   pendulum.
+/// - `error`: estimated error of both, relative to 1 + |s| and 1 + |kappa|.
+/// - `planar`, `circular`: relative shift of the squared frequency per squared slosh angle; a mode
+///   along one length of a box has no circular motion.
+/// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At a slosh
+///   angle A the crest is wave A + wave_second A^2 high and the trough wave A - wave_second A^2
+///   deep.
+/// - `bridged`: true if the third-order theory has a pole near this fill, so that the coefficients
+///   are interpolated over the fill across the pole.
 /// - `energy`: coefficients that also give the wave's energy, for a tank that keeps its liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Coefficients {
@@ -36,28 +41,36 @@ pub struct Coefficients {
     pub planar: f64,
     pub circular: Option<f64>,
     pub wave_second: f64,
-    /// Slosh angle, rad, up to which the equivalent mass represents the mode: the smaller of two angles. At one the
-    /// error of the mass's frequency reaches 0.3 %, at the other the error of a forced response reaches 3 %.
+    /// Slosh angle up to which the equivalent mass represents the mode, rad. It is the smaller of
+    /// two angles: the angle at which the error of the mass's frequency reaches 0.3 %, and the
+    /// angle at which the error of a forced response reaches 3 %.
     pub angle_limit: f64,
     pub angle_limit_from: LimitSource,
     pub frequency_limit: Option<f64>,
-    /// Slosh angle, rad, above which rotary motion is out of range, because the error of a forced response reaches 3 %
-    /// or because a secondary resonance folds the branch of rotary motion. `None` if `angle_limit` is smaller, or if
-    /// rotary motion was not compared with potential flow.
+    /// Slosh angle above which rotary motion is out of range, rad. There the error of a forced
+    /// response reaches 3 %, or a secondary resonance folds the branch of rotary motion. `None` if
+    /// `angle_limit` is smaller, or if rotary motion was not compared with potential flow.
     pub swirl_limit: Option<f64>,
-    /// Slosh angle, rad, at which the second-order wave is half of the first-order wave, at most 30 degrees. Above this
-    /// angle the series is not valid; below it, the error of the series is not known.
+    /// Slosh angle at which the second-order wave is half of the first-order wave, rad, but at most
+    /// 30 degrees. Above this angle the series is not valid; below it, the error of the series is
+    /// not known.
     pub series_limit: f64,
     pub bridged: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Energy>,
 }
 
-/// Coefficients of a mode that also give the wave's energy (`formulas::energy_terms`), used instead of the third-order
-/// coefficients: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. The mode is out of range above the
-/// slosh angle `angle_limit`, rad, and in rotary motion already above `swirl_limit` if that is smaller. Up to the angle
-/// `frequency_limit` the slosh mass was compared with potential flow: its frequencies in planar and in rotary motion,
-/// and its energy in planar motion, have at most the relative errors given here.
+/// Coefficients of a mode that also give the energy of the wave (`formulas::energy_terms`), and are
+/// then used instead of the third-order coefficients. The first six fields are s, kappa, s_2,
+/// kappa_2, t and t_2 under the names of the FMUs.
+///
+/// - `angle_limit`: slosh angle above which the mode is out of range, rad.
+/// - `swirl_limit`: slosh angle above which rotary motion is out of range, rad, if this angle is
+///   smaller.
+/// - `frequency_limit`: slosh angle up to which the slosh mass was compared with potential flow,
+///   rad.
+/// - `frequency_error`, `energy_error`: largest relative error, up to `frequency_limit`, of the
+///   frequencies in planar and rotary motion, and of the energy in planar motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Energy {
     pub nonlinear_inertia: f64,
@@ -75,7 +88,7 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// Returns the coefficients s, kappa, s_2, kappa_2, t and t_2, each with the name of its
+    /// Returns the six coefficients s, kappa, s_2, kappa_2, t and t_2, each with the name of its
     /// parameter in the FMUs.
     pub fn parameters(&self) -> [(&'static str, f64); 6] {
         [
@@ -89,7 +102,8 @@ impl Energy {
     }
 }
 
-/// Method by which the coefficients that give the wave's energy were computed, each from fully nonlinear potential flow.
+/// Origin of the coefficients that give the wave's energy. All of them come from fully nonlinear
+/// potential flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EnergySource {
@@ -112,11 +126,13 @@ impl EnergySource {
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
     PotentialFlow,
-    /// The frequency of the equivalent mass was compared with free waves of fully nonlinear potential flow in this tank.
+    /// Comparison of the equivalent mass's frequency with free waves of fully nonlinear potential
+    /// flow in this tank.
     FreeWaves,
-    /// No computed waves were available for comparison. The limit is a fraction of the slosh angle at which the
-    /// second-order wave is half of the first-order wave: the smallest fraction found in upright cylinders and spheres.
-    /// The limit is at most the largest one found in upright cylinders.
+    /// Estimate, because no computed waves were available for a comparison. It is a fraction of the
+    /// slosh angle at which the second-order wave is half of the first-order wave: the smallest
+    /// fraction that was found in upright cylinders and spheres. The limit is never above the
+    /// largest limit found in upright cylinders.
     Estimate,
 }
 

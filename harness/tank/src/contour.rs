@@ -12,8 +12,9 @@ pub struct Problems(pub Vec<String>);
 
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// Reads a text file. It must be a regular file, because a named pipe could block and a device may
-/// never end. Errors do not name the file.
+/// Reads a text file, which must be a regular file, because reading a named pipe could wait forever
+/// and a device may have no end. The messages do not name the file, because the callers add its
+/// name.
 pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
     let problem = |why: String| Problems::from(format!("the file cannot be read: {why}"));
     let about = std::fs::metadata(path).map_err(|error| problem(error.to_string()))?;
@@ -48,14 +49,13 @@ impl From<&str> for Problems {
 
 /// Largest height or diameter of a tank, m. A larger tank was probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
-/// Largest gap between the end of a segment and the start of the next one, relative to the tank's size, at which both
-/// points count as equal.
+/// Largest gap between two successive segments that counts as closed, relative to the tank's size.
 const JOINED: f64 = 1e-6;
 const LEVEL: f64 = 1e-9;
 
-/// The generating curve of a whole tank in the half plane (r, z), lengths in m. It runs from the axis, or
-/// from the top of an inner wall, along the bottom and up the outer wall to its top, with r to the right and
-/// z up, counter-clockwise around the liquid.
+/// Generating curve of a whole tank of revolution in the half plane (r, z), m. It runs from the
+/// axis, or from the top of an inner wall, along the bottom and up the outer wall to its top,
+/// counter-clockwise around the liquid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
     segments: Vec<Segment>,
@@ -64,9 +64,12 @@ pub struct Contour {
     size: f64,
 }
 
-/// The wetted part of a contour: its segments from the axis or the inner contact line to the outer contact
-/// line, the outer and inner radius of the free surface, m (the inner one is 0 if the surface reaches the
-/// axis), and the height of the surface, m, from the contour's own zero.
+/// Wetted part of a tank's contour at one fill.
+///
+/// - `segments`: from the axis or the inner contact line to the outer contact line.
+/// - `r_outer`, `r_inner`: outer and inner radius of the free surface, m; the inner radius is 0 if
+///   the surface reaches the axis.
+/// - `z_surface`: height of the free surface, m from the zero of the contour.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wall {
     pub segments: Vec<Segment>,
@@ -75,8 +78,8 @@ pub struct Wall {
     pub z_surface: f64,
 }
 
-/// Smallest distance between the free surface and a horizontal part of the wall, relative to the tank's size; a fill
-/// closer to the horizontal part is refused, because the modes are not defined there.
+/// Smallest distance of the free surface from a horizontal part of the wall, relative to the tank's
+/// size. A closer fill is refused, because the modes are not defined at a horizontal wall.
 const SHOULDER: f64 = 1e-6;
 const STEEP: f64 = 1e-3;
 
@@ -91,8 +94,8 @@ impl Contour {
     /// Creates a contour from its segments.
     ///
     /// # Errors
-    /// Lists all defects: values that are not finite, radii below 0, segments without length, gaps, self-crossing,
-    /// clockwise order, a size above 100 m.
+    /// Lists all defects: values that are not finite, radii below 0, segments without length, gaps,
+    /// self-crossing, clockwise order, a size above 100 m.
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
         if segments.is_empty() {
@@ -173,8 +176,8 @@ impl Contour {
         self.bottom
     }
 
-    /// Returns the height of the lowest point of the tank and its smallest distance from the axis,
-    /// both in m.
+    /// Returns the height of the lowest point of the tank, and the smallest distance from the axis
+    /// at this height, both in m.
     pub(crate) fn lowest(&self) -> (f64, f64) {
         let outline = Outline::new(&self.segments);
         let points = || outline.points.iter().flatten();
@@ -188,7 +191,8 @@ impl Contour {
         outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)
     }
 
-    /// Returns the largest fill, m above the lowest point: the height at which the outer wall ends.
+    /// Returns the largest possible fill, m above the lowest point: the height at which the outer
+    /// wall, or a lower inner wall, ends.
     pub fn depth(&self) -> f64 {
         let end = self.segments[self.segments.len() - 1].end();
         let start = self.segments[0].start();
@@ -197,8 +201,8 @@ impl Contour {
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
-    /// Returns the volume of the liquid, m3, if the free surface is at `fill`, m above the lowest point. If the liquid
-    /// forms several pools, the result is the sum of their volumes.
+    /// Returns the volume of the liquid, m³, if the free surface is at `fill`, m above the lowest
+    /// point. If the liquid forms several pools, the result is the sum of their volumes.
     fn volume_below(&self, fill: f64) -> f64 {
         let z = self.bottom + fill;
         let surface = |height: f64| if height < z { 0.0 } else { f64::INFINITY };
@@ -206,11 +210,11 @@ impl Contour {
         core::f64::consts::PI * volume
     }
 
-    /// Returns the integral of `density` dz along the wetted wall, up the outer wall and down the inner one.
-    ///
-    /// At the height z the liquid reaches inwards to the radius sqrt(`surface(z)`), m: `surface` returns infinity above
-    /// a level surface and 0 below it. `density` receives the point (r, z) of the wall and `surface(z)`, m2. `kinks`
-    /// are heights at which the slope of `surface` jumps.
+    /// Returns the integral of `density` dz along the wetted wall, up the outer wall and down the
+    /// inner wall. The free surface may be level, or curved by a spin: at the height z the liquid
+    /// reaches inwards to the radius sqrt(`surface(z)`), m, so that `surface` returns infinity
+    /// above a level surface and 0 below it. `density` receives the point (r, z) of the wall and
+    /// `surface(z)`, m². `kinks` are heights at which the slope of `surface` jumps.
     pub(crate) fn integrate_wetted<const N: usize>(
         &self,
         surface: impl Fn(f64) -> f64,
@@ -233,8 +237,9 @@ impl Contour {
         sum
     }
 
-    /// Returns the height, m from the contour's own zero, of the highest wet point of the wall; if no point is wet, the
-    /// height of the lowest point of the tank. For `surface` see [`Contour::integrate_wetted`].
+    /// Returns the height of the highest wet point of the wall, m from the zero of the contour. If
+    /// no point is wet, it is the height of the lowest point of the tank. For `surface` see
+    /// [`Contour::integrate_wetted`].
     pub(crate) fn highest_wetted(&self, surface: impl Fn(f64) -> f64) -> f64 {
         let pieces = self.wetted_pieces(&surface, &[]);
         let ends =
@@ -253,8 +258,8 @@ impl Contour {
         pools
     }
 
-    /// Returns the wet pieces of the wall in the order of the contour. Each piece is a part of a segment, given by the
-    /// segment and the range of its parameter.
+    /// Returns the wet parts of the wall in the order of the contour, each as a segment and the
+    /// range of its parameter. For the arguments see [`Contour::integrate_wetted`].
     fn wetted_pieces(
         &self,
         surface: impl Fn(f64) -> f64,
@@ -295,8 +300,8 @@ impl Contour {
         self.volume_below(self.depth())
     }
 
-    /// Returns the fill, m above the lowest point, below which the tank has this volume, m3. Returns 0 for no
-    /// volume, and the largest fill for the tank's whole volume and more.
+    /// Returns the fill, m above the lowest point, at which the liquid has the volume `volume`, m³.
+    /// It is 0 for no volume, and the largest fill for the whole volume of the tank and more.
     pub(crate) fn fill_from_volume(&self, volume: f64) -> f64 {
         let depth = self.depth();
         if volume <= 0.0 {
@@ -308,8 +313,8 @@ impl Contour {
         bisect(0.0, depth, |fill| self.volume_below(fill) < volume)
     }
 
-    /// Returns the contour as a wall that is wet everywhere. `None` if the tank cannot be full, because the contour
-    /// ends neither at the axis nor at its start.
+    /// Returns the whole contour as a wetted wall, for a full tank. The result is `None` if the
+    /// tank cannot be full, because its contour ends neither on the axis nor at its start.
     pub(crate) fn closed(&self) -> Option<Wall> {
         let (start, end) = (self.segments[0].start(), self.segments[self.segments.len() - 1].end());
         let on_axis = start[0] <= LEVEL * self.size && end[0] <= LEVEL * self.size;
@@ -422,8 +427,8 @@ impl Contour {
         }
     }
 
-    /// Returns all positions at which the contour passes through the height z, in the order of the contour. A point
-    /// exactly at the height z counts as above z.
+    /// Returns all places at which the contour passes through the height `z`, m, in the order of
+    /// the contour. A point exactly at this height counts as above it.
     fn crossings(&self, z: f64) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
         let level = LEVEL * self.size;
@@ -497,8 +502,8 @@ fn defect(segment: &Segment) -> Option<String> {
     None
 }
 
-/// Rotates the list of segments of a closed contour away from the axis (a torus) so that it begins at the contour's
-/// highest point. Other contours are returned unchanged.
+/// Lets the list of segments of a torus, which is closed away from the axis, begin at the highest
+/// point. Other contours are returned unchanged. `size` is the size of the tank, m.
 fn start_at_highest_point(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     let (start, end) = (segments[0].start(), segments[segments.len() - 1].end());
     if norm(sub(start, end)) > JOINED * size || start[0] <= JOINED * size {
@@ -525,14 +530,16 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Returns, by bisection, the position between `first` and `second` at which the value of `holds` changes.
+/// Returns the position between `first` and `second` at which the value of `holds` changes, by
+/// bisection.
 pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let here = holds(first);
     bisect_change([first, second], |at| holds(at) == here)[0]
 }
 
-/// Bisects between the positions `near` and `far`, until both are as close as possible to the position at which
-/// `is_near` changes from true (at `near`) to false (at `far`), and returns both.
+/// Narrows the interval between `near` and `far` by bisection to the position at which `is_near`
+/// changes from true (at `near`) to false (at `far`). Returns the positions on both sides of the
+/// change.
 fn bisect_change([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..80 {
         let middle = 0.5 * (near + far);
@@ -541,8 +548,9 @@ fn bisect_change([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -
     [near, far]
 }
 
-/// Narrows the interval from `a` to `b` by golden-section search to a short interval around its best position, and
-/// returns the ends. `better` compares two positions.
+/// Narrows the interval from `a` to `b` around its best position by golden-section search, and
+/// returns the ends of the narrow interval. `better` returns true if its first argument is better
+/// than its second.
 pub(crate) fn golden(
     [mut a, mut b]: [f64; 2],
     steps: usize,
@@ -560,8 +568,8 @@ pub(crate) fn golden(
     [a, b]
 }
 
-/// Returns the minimum of `sign` z on a segment, and the fraction of the segment's parameter at which it lies, by
-/// golden-section search around the lowest sample.
+/// Returns the lowest value of `sign` z on a segment, so that `sign` = -1 gives the highest point,
+/// and the fraction of the segment's parameter at which it lies.
 fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
     let height = |s: f64| sign * segment.point_at(s.clamp(0.0, 1.0))[1];
@@ -597,8 +605,9 @@ impl Outline {
         r.1.max(z.1 - z.0)
     }
 
-    /// Returns the area to the left of the contour, which is closed along the axis or by a straight line from its end
-    /// to its start. The area is negative for clockwise order.
+    /// Returns the area to the left of the contour, m², after the contour was closed along the
+    /// axis, or by a straight line from its end to its start. The area is negative for a clockwise
+    /// contour.
     fn area(&self) -> f64 {
         let all: Vec<Point> = self.points.iter().flatten().copied().collect();
         let (first, last) = (all[0], all[all.len() - 1]);
@@ -649,9 +658,12 @@ impl Outline {
     }
 }
 
-/// Volume integrals of the liquid: its volume, m3, the height of its centre, m, from the contour's own zero,
-/// and the rigid inertias per density, m5, across the axis, int (x^2 + (z - z_cg)^2) dV, and about it, int
-/// r^2 dV.
+/// Volume integrals of the liquid.
+///
+/// - `volume`: m³.
+/// - `z_cg`: height of the centre of volume, m from the zero of the contour.
+/// - `across`, `axial`: inertia of the rigid liquid divided by the density, m⁵, across the axis
+///   about the centre of volume, and about the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
     pub volume: f64,
@@ -661,8 +673,8 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Computes the volume integrals of the liquid below the free surface by Gauss's theorem, as integrals along the wall.
-    /// For example, the volume is pi int r^2 dz.
+    /// Computes the volume integrals of the liquid in a wetted wall below its level surface. By
+    /// Gauss's theorem they are integrals along the wall; for example, the volume is pi int r^2 dz.
     pub fn from_wall(wall: &Wall) -> Volume {
         let rule = Gauss::new(20);
         let base = wall.z_surface;
@@ -710,9 +722,8 @@ mod tests {
         }
     }
 
-    /// In a tank of 1.5 m the narrowest free surface that is accepted is 1.5 micrometres wide. The test has two
-    /// narrower surfaces: between two walls that lean towards each other and are a micrometre apart at the brim, and in
-    /// the tip of a cone.
+    /// In a tank of 1.5 m the narrowest accepted surface is 1.5 micrometres wide. The test cuts two
+    /// narrower surfaces: between two leaning walls, and in the tip of a cone.
     #[test]
     fn a_free_surface_without_width_is_refused_with_its_width() {
         let gap = |width: f64| {
@@ -733,8 +744,6 @@ mod tests {
         assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
     }
 
-    /// A ring-shaped contour is closed if its ends agree to 1e-6 of its size, whatever the size is. A closed contour
-    /// begins at its highest point. A point counts as on the axis if its distance from the axis is below 1e-9 of the size.
     #[test]
     fn a_contour_with_a_gap_below_1e_6_of_its_size_counts_as_closed() {
         for size in [1.0 / 64.0, 1.0, 16.0] {

@@ -40,19 +40,24 @@ use crate::contour::{Wall, bisect};
 use crate::gauss::Gauss;
 use crate::third_order::circle_basis;
 
-/// Depth below the surface, relative to the largest radius, below which the liquid is taken as at rest: the first mode
-/// of a cylinder has 2e-5 of its motion at this depth.
+/// Depth below the surface, relative to the largest radius, below which the liquid is treated as at
+/// rest. The first mode of a cylinder has 2e-5 of its motion at this depth.
 const DEEP: f64 = 3.0;
 
-/// Smallest eigenvalue of the matrix of kinetic energy, relative to its largest one, at which the eigenvector (a
-/// combination of harmonics) is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
+/// Smallest eigenvalue of the matrix of kinetic energy, relative to the largest eigenvalue, whose
+/// eigenvector is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
 const NOISE: f64 = 1e-13;
 
-/// Periodic waves of the first mode, with lengths divided by the radius of the surface. The fields are, in this
-/// order: lambda_1 = omega_1^2/g; the relative shifts of omega^2 per squared slosh angle in planar and in circular
-/// motion; the second-order elevation at the wall per squared slosh angle, at the instant of largest elevation in
-/// planar motion; and the modes that the square of the first mode excites, each with its azimuthal number, its number
-/// from 1, and its lambda.
+/// Periodic waves of the first mode up to third order, with lengths divided by the radius of the
+/// free surface.
+///
+/// - `lambda`: omega_1^2/g of small waves.
+/// - `shifts`: relative shift of omega_1^2 per squared slosh angle, in planar and in circular
+///   motion.
+/// - `second_wave`: second-order elevation at the wall per squared slosh angle, at the instant of
+///   largest elevation in planar motion.
+/// - `excited`: modes that the square of the first mode excites: azimuthal number, number from 1,
+///   and omega^2/g.
 #[derive(Clone, Debug)]
 pub(crate) struct Waves {
     pub lambda: f64,
@@ -70,8 +75,9 @@ pub(crate) struct Fields {
 }
 
 impl Fields {
-    /// Computes the harmonic functions u_n = s^-n |x|^n P_n^m (solid harmonics of the azimuthal number m, scaled by the
-    /// length s) at the points (r, z), for n from m (from 1 for m = 0) to `degree`.
+    /// Computes solid harmonics of the azimuthal number `m`, and their derivatives, at `points` (r,
+    /// z). These are the harmonic functions |x|^n P_n^m/`scale`^n for n from m (from 1 for m = 0)
+    /// to `degree`.
     pub fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
         let first = m.max(1);
         let count = degree + 1 - first;
@@ -123,9 +129,15 @@ struct Boundary {
     weights: Vec<f64>,
 }
 
-/// The liquid at rest, with lengths divided by the radius of the surface, and z counted from the surface. The
-/// harmonics are centred half way to the bottom. `wall` holds the slope dR/dz and the curvature d^2R/dz^2 of the wall
-/// at the contact line.
+/// The liquid at rest, with lengths divided by the radius of the free surface, and heights z
+/// counted from the surface.
+///
+/// - `boundary`: wetted wall and free surface.
+/// - `centre`: height of the point about which the solid harmonics are defined, half way to the
+///   bottom.
+/// - `size`: length by which the harmonics are scaled.
+/// - `wall`: slope dR/dz and curvature d^2R/dz^2 of the wall at the contact line.
+/// - `rho`, `weights`: points of the quadrature over the surface.
 pub(crate) struct Liquid {
     boundary: Boundary,
     pub centre: f64,
@@ -206,7 +218,9 @@ impl Liquid {
         self.weights.iter().enumerate().map(|(i, w)| w * f(i)).sum()
     }
 
-    /// Returns combinations of harmonics whose kinetic energies are orthonormal, by the boundary integral of u du/dn.
+    /// Returns combinations of solid harmonics of the azimuthal number `m` up to `degree` whose
+    /// kinetic energies are orthonormal. The energies are boundary integrals of u du/dn, with a
+    /// harmonic u.
     pub fn harmonics(&self, m: usize, degree: usize) -> Harmonics {
         let Boundary { points, normals, weights } = &self.boundary;
         let fields = Fields::new(m, degree, self.size, points);
@@ -233,7 +247,8 @@ impl Liquid {
         Harmonics { e, surface }
     }
 
-    /// Returns the values of orthonormal polynomials at the points of the surface and, in the last row, at the wall.
+    /// Returns the values of `count` orthonormal polynomials in the radius, for elevations of the
+    /// azimuthal number `m`. The rows are the points of the surface and, last, the wall.
     pub fn elevations(&self, m: usize, count: usize) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.rho.len() + 1, count);
         for (i, rho) in self.rho.iter().chain(&[1.0]).enumerate() {
@@ -245,8 +260,9 @@ impl Liquid {
         all
     }
 
-    /// Returns the matrix of the integrals of f_i u_k over the free surface, int f_i u_k rho drho, for all pairs of the
-    /// functions f_i and u_k.
+    /// Returns the integrals int f_i u_k rho drho over the free surface for all pairs of the
+    /// elevations `f` and the potentials `u`, which are given by their values at the points of the
+    /// surface.
     pub fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(f.ncols(), u.ncols(), |i, k| self.integral(|q| f[(q, i)] * u[(q, k)]))
     }
@@ -254,17 +270,21 @@ impl Liquid {
 
 type Wave = fn(f64, f64) -> f64;
 
-/// Second-order shapes of a motion as functions of azimuth and phase, for one azimuthal number `m`; `None` for a shape
-/// that the motion does not excite. `double` holds three functions at the frequency 2 omega: the elevation, the
-/// potential, and the potential's derivative with respect to theta.
+/// Second-order parts of a motion as functions of azimuth and phase, for one azimuthal number.
+///
+/// - `m`: the azimuthal number.
+/// - `mean`: the constant elevation; `None` if the motion has none.
+/// - `double`: at twice the frequency: elevation, potential, and the derivative of the potential
+///   with respect to the azimuth.
 struct Shape {
     m: usize,
     mean: Option<Wave>,
     double: Option<[Wave; 3]>,
 }
 
-/// Elevation E of a motion, its potential S and the derivative of S with respect to the azimuth theta, and the shapes
-/// of second order that the motion excites.
+/// First-order motion as functions of azimuth and phase: its elevation, its potential, the
+/// derivative of the potential with respect to the azimuth, and the second-order parts that the
+/// motion causes.
 struct Motion {
     first: [Wave; 3],
     second: Vec<Shape>,
@@ -308,15 +328,22 @@ fn motions() -> [Motion; 2] {
     [planar, circular]
 }
 
-/// Returns the mean of `f` over azimuth and phase. It is exact for trigonometric polynomials up to degree 11.
+/// Returns the mean of `f(azimuth, phase)` over azimuth and phase. It is exact for trigonometric
+/// polynomials up to degree 11.
 fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     let angle = |i: i32| TAU * f64::from(i) / 12.0;
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
 }
 
-/// Values at the points of the surface that the equations of higher order need. Of the first mode these are its
-/// elevation f with int f^2 rho drho = 1; (U w)_z and (U w)_zz along the lines; U_r, U_z and U/r; ((U_r^2 + U_z^2) w)_z
-/// and (U^2/r^2 w)_z along the lines; of the coordinates, w_z and w_zz, and the slope dr/dz of the lines.
+/// Values of the first mode and of the coordinates at the points of the surface, which the
+/// equations of higher order need. The first mode has the elevation f, with int f^2 rho drho = 1,
+/// and the potential U; `along` the lines of the coordinates, w is the volume element.
+///
+/// - `along`: first and second derivative of U w along the lines.
+/// - `gradient`: U_r, U_z and U/r.
+/// - `energy`: derivatives along the lines of (U_r^2 + U_z^2) w and of (U^2/r^2) w.
+/// - `w`: first and second derivative of w along the lines.
+/// - `slope`: dr/dz of the lines.
 struct First {
     lambda: f64,
     f: Vec<f64>,
@@ -327,8 +354,9 @@ struct First {
     slope: Vec<f64>,
 }
 
-/// A field of the second order in the amplitude: the coefficients p and r of its elevation and d of its potential, and
-/// its contribution `l_4` to L_4.
+/// A second-order field: the coefficients `p` and `r` of its elevation, constant and at twice the
+/// frequency, the coefficients `d` of its potential, and its contribution `l_4` to the functional
+/// in the fourth order of the amplitude.
 struct Second {
     l_4: f64,
     p: DVector<f64>,
@@ -342,16 +370,18 @@ impl Second {
     }
 }
 
-/// Combinations of harmonics with orthonormal kinetic energies, whose coefficients are the columns of `e`, and the
-/// values of the combinations at the surface.
+/// Combinations of solid harmonics with orthonormal kinetic energies: their coefficients are the
+/// columns of `e`, and `surface` has their values at the surface.
 pub(crate) struct Harmonics {
     pub e: DMatrix<f64>,
     pub surface: Fields,
 }
 
-/// Computes the waves with solid harmonics up to `degree`. The slope of the lines is proportional to the radius to the
-/// power `lines`, an odd number. The response of the second order is computed at the frequency 2 omega (1 +
-/// `detuning`), see `third_order.rs`. Returns `None` for a liquid with a hole.
+/// Computes the waves of the first mode to third order with solid harmonics up to `degree`. The
+/// slope of the coordinate lines is proportional to the radius to the power `lines`, an odd number;
+/// the result must not depend on it. The second-order response is computed at the frequency 2 omega
+/// (1 + `detuning`), so that the influence of a nearby resonance can be seen. Returns `None` for a
+/// liquid with a hole, such as a ring.
 pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Option<Waves> {
     let liquid = Liquid::new(wall, degree)?;
     let count = degree / 2;
@@ -557,8 +587,8 @@ mod tests {
         wall(vec![Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)], fill)
     }
 
-    /// The tolerance of 1e-5 covers the harmonics above degree 24, which are left out, and the depth below which the
-    /// liquid is taken as at rest.
+    /// The tolerance of 1e-5 covers the harmonics above degree 24, which are left out, and the
+    /// liquid at large depth, which is treated as at rest.
     #[test]
     fn the_contour_method_equals_the_method_for_vertical_walls_in_cylinders() {
         let overlaps = crate::third_order::Overlaps::round(0.0, 0.5, 20);
@@ -589,9 +619,9 @@ mod tests {
         }
     }
 
-    /// Shallow liquid in a paraboloid oscillates as a whole with a frequency that does not depend on its
-    /// amplitude, planar or circular (Thacker, J. Fluid Mech. 107 (1981) 499), to the leading order in
-    /// 1/depth. In a cylinder of this depth the shifts are 1e6.
+    /// Shallow liquid in a paraboloid oscillates as a whole with a frequency that does not depend
+    /// on its amplitude (Thacker, J. Fluid Mech. 107 (1981) 499), to leading order in 1/depth. In a
+    /// cylinder of this depth the shifts are 1e6.
     #[test]
     fn shallow_liquid_in_a_bowl_keeps_its_frequency() {
         for fill in [1e-3, 1e-2] {
@@ -600,9 +630,9 @@ mod tests {
         }
     }
 
-    /// Luke's functional of the first and the second order is evaluated without any expansion: the integrals over
-    /// the liquid run along the lines up to the surface, with the true wall of the sphere. The coefficient of a^4 in
-    /// the functional is L_4.
+    /// Luke's functional of the first and the second order is evaluated without any expansion: the
+    /// integrals over the liquid run up to the surface, with the true wall of the sphere. The test
+    /// compares its coefficient of the fourth power of the amplitude.
     #[test]
     fn fourth_order_terms_equal_those_of_the_functional() {
         let (fill, degree, count) = (0.7, 14, 7);

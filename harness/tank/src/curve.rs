@@ -24,12 +24,14 @@ pub(crate) fn cross(a: Point, b: Point) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Shapes of a segment, lengths in m. Each shape has its own parameter t.
+/// Shapes of a segment of a contour, lengths in m. Each shape has its own parameter t.
 ///
 /// - `Line`: straight from one point to the other, t = 0..1.
-/// - `Ellipse`: center + (a_r cos t, a_z sin t), t the eccentric angle in rad; a circle has a_r = a_z.
-/// - `Cassini`: oval about (0, zc), a > c, with the foci at the distance c from its centre. At the polar angle t,
-///   rad, the distance rho from the centre follows from rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2 2t).
+/// - `Ellipse`: center + (a_r cos t, a_z sin t) with the eccentric angle t, rad; a circle has a_r =
+///   a_z.
+/// - `Cassini`: oval about (0, zc), a > c, with the foci at the distance c from its centre. At the
+///   polar angle t, rad, the distance rho from the centre follows from rho^2 = c^2 cos 2t +
+///   sqrt(a^4 - c^4 sin^2 2t).
 /// - `Cosine`: r = r0 + r1 cos(pi p); p and z are linear in t = 0..1.
 /// - `Cubic`: c_0 + c_1 t + c_2 t^2 + c_3 t^3, t = 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +43,8 @@ pub enum Curve {
     Cubic { c: [Point; 4] },
 }
 
-/// Nodes and weights of the Gauss rule of 8 points on -1..1, positive half (DLMF 3.5.15).
+/// Nodes and weights of Gauss quadrature with 8 points on -1..1; the list has the positive nodes
+/// (DLMF 3.5.15).
 const GAUSS8: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_29),
@@ -92,9 +95,9 @@ impl Curve {
         }
     }
 
-    /// Returns the vector from the point at t to the point at t + dt, to full relative accuracy for any dt.
-    /// Both kernels of the integral equation need it, because differences of coordinates lose all digits near
-    /// a corner.
+    /// Returns the vector from the point at the parameter `t` to the point at `t + dt`, to full
+    /// relative accuracy for any `dt`. The kernels of the integral equation need it, because
+    /// differences of coordinates lose all digits near a corner.
     pub fn chord(&self, t: f64, dt: f64) -> Point {
         match *self {
             Curve::Line { from, to } => [dt * (to[0] - from[0]), dt * (to[1] - from[1])],
@@ -134,8 +137,8 @@ fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
     (rho, slope / (2.0 * rho))
 }
 
-/// A curve between two values `from` and `to` of its parameter, in the direction from the first to the second. `to` may
-/// be less than `from`.
+/// Part of a curve between the values `from` and `to` of its parameter, in the direction from
+/// `from` to `to`. `to` may be smaller than `from`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     pub curve: Curve,
@@ -148,7 +151,8 @@ impl Segment {
         Segment { curve: Curve::Line { from, to }, from: 0.0, to: 1.0 }
     }
 
-    /// Creates the arc of an ellipse between two eccentric angles in degrees; a_r = a_z is a circle.
+    /// Creates an arc of an ellipse with the semi-axes `a_r` and `a_z`, m, from the eccentric angle
+    /// `deg0` to `deg1`, degrees. With equal semi-axes it is an arc of a circle.
     pub fn ellipse(center: Point, a_r: f64, a_z: f64, deg0: f64, deg1: f64) -> Segment {
         let (from, to) = (deg0.to_radians(), deg1.to_radians());
         Segment { curve: Curve::Ellipse { center, a_r, a_z }, from, to }
@@ -158,8 +162,8 @@ impl Segment {
         Segment::ellipse(center, radius, radius, deg0, deg1)
     }
 
-    /// Returns the first point of the curve. If it is within rounding errors of the axis, it is put exactly on the
-    /// axis, because cos(pi/2) is not 0 in floating point.
+    /// Returns the first point of the segment. If it is within rounding errors of the axis, it is
+    /// put exactly on the axis, because cos(pi/2) is not 0 in floating point.
     pub fn start(&self) -> Point {
         self.settle(self.curve.point_at(self.from))
     }
@@ -183,7 +187,8 @@ impl Segment {
         }
     }
 
-    /// Returns the unit tangent in the direction of travel at the fraction `s` = 0..1 of the parameter.
+    /// Returns the unit tangent in the direction of travel at the fraction `s` (0..1) of the
+    /// segment's parameter.
     pub fn tangent(&self, s: f64) -> Point {
         let sign = if self.to > self.from { 1.0 } else { -1.0 };
         let slope = self.curve.slope(self.from + s * (self.to - self.from));
@@ -195,8 +200,8 @@ impl Segment {
         self.curve.point_at(self.from + s * (self.to - self.from))
     }
 
-    /// Returns the angle, rad, through which the tangent turns along the segment; for an ellipse, an upper
-    /// bound of this angle.
+    /// Returns the angle through which the tangent turns along the segment, rad. For an ellipse it
+    /// is an upper bound.
     pub(crate) fn turn(&self) -> f64 {
         let count = 32;
         let mut total = 0.0;

@@ -14,14 +14,16 @@ use crate::tank::{Geometry, Shape, Tank};
 
 const ENDS: &str = "use the low end for stability margins, check both ends for settling times";
 
-/// Computes the damping of a tank whose modes were solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at
-/// the specific force `gravity`, m/s². `springs` are the centring stiffnesses of the modes, N/m, for each axis of a
-/// box; empty for none. `sigma`, N/m, if known, widens the interval at low Bond numbers.
+/// Computes the damping of the modes `data` of a tank. The liquid has the kinematic viscosity `nu`,
+/// m²/s, at the specific force `gravity`, m/s². `springs` are the centring stiffnesses of the
+/// modes, N/m, for each axis of a box; they are empty without surface tension. The surface tension
+/// `sigma`, N/m, if known, widens the interval at low Bond numbers.
 ///
-/// If the wetted wall is a sphere, an upright cylinder, a cone or a torus to 1e-6 of its size, the damping is
-/// computed by the correlation measured for this shape. If only a part of the wall has such a shape, the factor by
-/// which the correlation exceeds the damping of a laminar boundary layer is averaged by area, so that the damping
-/// ratio is a continuous function of the fill and of the shape of the tank.
+/// If the wetted wall is a sphere, an upright cylinder, a cone or a torus to 1e-6 of its size, the
+/// correlation that was measured for this shape gives the damping. If only a part of the wall has
+/// such a shape, the factor by which the correlation exceeds the damping of a laminar boundary
+/// layer is averaged by area, so that the damping ratio is a continuous function of the fill and of
+/// the shape of the tank.
 ///
 /// # Errors
 /// If there is neither gravity nor centring stiffness, because there is no natural frequency then.
@@ -142,8 +144,8 @@ pub fn tank_damping(
     })
 }
 
-/// The measured shape of the wetted wall, or of a part of it. If the depth of the tank was not measured, the shape has
-/// the nearest measured depth, and `at_depth` is false.
+/// The measured shape of the wetted wall, or of a part of it. If the depth of liquid was not
+/// measured for this shape, the shape has the nearest measured depth, and `at_depth` is false.
 struct Nearest {
     shape: formula::Shape,
     at_depth: bool,
@@ -159,8 +161,10 @@ impl Nearest {
         Nearest::new(shape, 1.0, nu, g, first.laminar(nu))
     }
 
-    /// Compares the correlation of a measured shape with the laminar layer at its wall. `share` is the shape's share of
-    /// the tank's wetted wall, `nu` the kinematic viscosity, m2/s, and `g` the specific force, m/s2.
+    /// Compares the damping by the correlation of a measured shape with the damping of the laminar
+    /// layer at its wall. `share` is the part of the tank's wetted wall that has this shape, `nu`
+    /// the kinematic viscosity, m²/s, and `g` the specific force, m/s². Returns `None` if the shape
+    /// has no correlation or cannot be solved.
     fn solve(found: Recognised, share: f64, nu: f64, g: f64) -> Option<Nearest> {
         let shape = found.measured().at_measured_depth();
         let fill = match shape {
@@ -191,8 +195,10 @@ impl Nearest {
         DampingPart { shape: shape_name(self.shape), share, factor }
     }
 
-    /// Returns a sentence about the basis of the damping ratio of a wall that has this shape. `correlation` is the
-    /// damping ratio by the shape's correlation, and `layers` is 1.45 times the damping ratio by the laminar layer.
+    /// Returns a sentence that explains to the user how the damping ratio follows from this shape.
+    /// `factor` is the ratio of the damping to the laminar layer, `correlation` the damping ratio
+    /// by the shape's correlation, and `layers` is 1.45 times the damping ratio of the laminar
+    /// layer.
     fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
         let (name, unmeasured) = (shape_name(self.shape), formula::UNMEASURED);
         let formula::Part { weight, .. } = self.part;
@@ -309,7 +315,8 @@ fn shape_source(shape: formula::Shape) -> &'static str {
     }
 }
 
-/// Returns one sentence for each range of a shape's correlation that the tank is outside of.
+/// Returns a sentence for each measured range of a shape's correlation that the tank is outside of.
+/// `nu` is the kinematic viscosity, m²/s, and `g` the specific force, m/s².
 fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
     let ranges = match shape {
         formula::Shape::Sphere { radius, depth } => {

@@ -10,11 +10,12 @@ use crate::modal::ModalData;
 use crate::parameters::ParameterSet;
 use crate::table::{format_length, significant};
 
-/// Largest interpolation error between two points of a fill table, of s relative to 1 + |s| or of kappa relative to 1 +
-/// |kappa|. A larger error gives a warning.
+/// Largest interpolation error of s (relative to 1 + |s|) or of kappa (relative to 1 + |kappa|)
+/// between two points of a fill table that is accepted without a warning.
 const LARGEST: f64 = 0.05;
 
-/// A fill, m above the lowest point, with its mass of liquid, kg, and the parameters of the tank there.
+/// Parameters `set` of the tank at the fill `fill`, m above the lowest point, and the mass `liquid`
+/// of the liquid there, kg.
 pub(crate) struct AtFill<'a> {
     pub fill: f64,
     pub liquid: f64,
@@ -44,7 +45,7 @@ impl<'a> AtFill<'a> {
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
 /// Columns of s and kappa of one mode in a fill table, with notes about their source, their errors
-/// and the fills without known values.
+/// and the fills at which they are not known.
 pub(crate) struct Columns {
     pub values: [Vec<f64>; 2],
     pub notes: Vec<String>,
@@ -71,8 +72,9 @@ pub(crate) struct TooFewFills {
     why: String,
 }
 
-/// Returns the columns of mode `n`, counted from 1, for a table with the ascending fills `points`, or an error if the
-/// coefficients are known at fewer than two fills. At the fills `between` the interpolation error of the table is measured.
+/// Returns the columns of s and kappa of mode `n`, counted from 1, for a table with the ascending
+/// fills `points`. The interpolation error of the table is measured at the fills `between`. The
+/// result is an error if the coefficients are known at fewer than two fills.
 pub(crate) fn columns(
     n: usize,
     points: &[AtFill],

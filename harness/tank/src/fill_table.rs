@@ -25,28 +25,29 @@ use crate::tank::Tank;
 
 const CANDIDATES: usize = 97;
 
-/// Unit in which the interpolation errors of a fill table are given: 0.5 % of a frequency, of a
-/// mass, or of the largest radius of the surface.
+/// Largest acceptable interpolation error of a fill table: 0.5 % of a frequency, of a mass, or of
+/// the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
-/// The rows of a fill table, and its interpolation errors between the rows.
+/// A fill table at fills that were chosen for small interpolation errors, with these errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     pub sweep: Sweep,
     pub between: Between,
 }
 
-/// Solutions `rows` near the middle of every two neighbouring points of a table, and the largest interpolation `error`
-/// of the first mode: relative error of the frequency, relative error of the mass, and error of the hinge over the
-/// largest radius of the surface.
+/// Solutions `rows` near the middle between every two neighbouring points of a table, and the
+/// largest interpolation `error` of the first mode there: of its frequency (relative), of its mass
+/// (relative), and of its hinge (divided by the largest radius of the surface).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Between {
     pub error: [f64; 3],
     pub rows: Vec<ModalData>,
 }
 
-/// Quantities of the modes at many fills, from which the points of a table are chosen: mass of the liquid, kg; and for
-/// each mode omega^2/g, 1/m, height of the slosh mass at rest, m, and slosh mass over the mass of the liquid.
+/// Quantities of the modes at many fills, from which the points of a table are chosen: the mass of
+/// the liquid, kg, and for each mode omega^2/g, 1/m, the height of the slosh mass at rest, m, and
+/// the slosh mass divided by the mass of the liquid.
 struct Curves {
     liquid: Vec<f64>,
     modes: Vec<[Vec<f64>; 3]>,
@@ -90,8 +91,9 @@ impl Curves {
         worst
     }
 
-    /// Returns the cost of a choice of points: the largest interpolation error of all modes, where the errors of a mode that
-    /// is lighter than the first one are weighted with the ratio of the two masses.
+    /// Returns the largest interpolation error of a table with the points `points`, which are
+    /// indices of fills. The errors of a mode that is lighter than the first mode are weighted with
+    /// the ratio of the masses.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
         let weighted = |n: usize| {
@@ -102,8 +104,8 @@ impl Curves {
     }
 }
 
-/// Returns the height of the slosh mass of mode number `n` at rest, m. For a mode without mass,
-/// whose height is not defined, it is the height of the liquid's centre of mass.
+/// Returns the height of slosh mass number `n` at rest, m. A mode without mass has no height; for
+/// such a mode the height of the liquid's centre of mass is returned.
 fn bob_height(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
@@ -114,7 +116,8 @@ fn count_carrying_modes(rows: &[ModalData]) -> usize {
     (1..most.min(MODES)).take_while(carries).last().map_or(1, |n| n + 1)
 }
 
-/// Chooses [`POINTS`] fills from `low` to `high`, m above the lowest point, including both ends.
+/// Chooses [`POINTS`] fills from `low` to `high`, m above the lowest point, including both ends, so
+/// that interpolation between them has small errors. `modes` is the number of modes.
 ///
 /// # Errors
 /// The errors of [`Tank::solve`]; also if there is no free surface at an end.
@@ -174,12 +177,13 @@ fn check_surfaces(rows: &[ModalData]) -> Result<(), Problems> {
     Ok(())
 }
 
-/// Returns the parameters of a tank that can drain: its parameters at the largest of the fills `rows`, where it starts,
-/// and its fill table.
+/// Returns the parameters of a tank that can drain: its parameters at the largest fill of `sweep`,
+/// where it starts, and its fill table. `between` has the interpolation errors of the table, if
+/// they are known.
 ///
 /// # Errors
-/// The errors of [`ParameterSet::new`]; also if the target is HubSlosh, whose tank does not drain, or if there are
-/// fewer than two fills or more than [`POINTS`].
+/// The errors of [`ParameterSet::new`]; also if the target is HubSlosh, whose tank does not drain,
+/// or if there are fewer than two fills or more than [`POINTS`].
 pub fn parameters(
     tank: &Tank,
     sweep: &Sweep,

@@ -28,44 +28,50 @@ use crate::tank::{Geometry, Shape, Tank};
 use crate::third_order::{DETUNING, Overlaps};
 
 const WORST: f64 = 0.05;
-/// Largest distance of the tank's contour from vertical walls with a flat bottom, relative to the tank's size, at which
-/// the method for vertical walls is used.
+/// Largest distance of a contour from vertical walls with a flat bottom, relative to the tank's
+/// size, at which the method for vertical walls is used.
 const SAME: f64 = 1e-6;
 const ROUNDING: f64 = 1e-7;
 const COUNTS: [usize; 2] = [10, 20];
 const DEGREES: [usize; 2] = [18, 24];
-/// Relative difference of a box's two lengths below which the first modes along both directions exchange energy, so that
-/// coefficients for motion in one direction are not valid.
+/// Relative difference of the two lengths of a box below which the first modes along both lengths
+/// exchange energy. Coefficients for motion in one direction are then not valid.
 const NEARLY_SQUARE: f64 = 0.1;
-/// Largest ratio tanh kh of lambda to the wave number k from which the depth h of a ring of liquid between vertical walls is
-/// computed. A deeper ring gets the depth of this ratio.
+/// Largest value of tanh(k h) from which the depth h of a ring of liquid is computed, because tanh
+/// is too flat for larger values. A deeper ring gets the depth of this value.
 const DEEP: f64 = 0.999;
-/// Largest slosh angle, rad, at which the third order counts as valid. At 26 degrees the frequency of the circular wave
-/// in a cylinder with h/R = 0.613 differs by 4 % from fully nonlinear flow.
+/// Largest slosh angle at which the third order counts as valid, rad. For example, at 26 degrees
+/// the frequency of the circular wave in a cylinder with h/R = 0.613 differs by 4 % from fully
+/// nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
-/// Ratio of the estimated angle limit of a mode to the slosh angle at which the second-order wave is [`STEEPEST`] of the
-/// first-order wave, for tanks that nobody has compared with fully nonlinear flow. It is the smallest ratio found in upright
-/// cylinders and in a sphere filled to h/R = 1.5, where the error of a forced response reaches 3 % at 2.6 degrees.
+/// Estimated angle limit of a mode, divided by the slosh angle at which the second-order wave is
+/// [`STEEPEST`] of the first-order wave, for tanks that nobody has compared with fully nonlinear
+/// flow. It is the smallest ratio in upright cylinders and in a sphere filled to h/R = 1.5, where
+/// the error of a forced response reaches 3 % at 2.6 degrees.
 const ESTIMATED_SHARE: f64 = 0.12;
-/// Largest second-order wave at the wall, relative to the first-order wave, at which the third order counts as valid.
+/// Largest second-order wave at the wall, relative to the first-order wave, at which the third
+/// order counts as valid.
 const STEEPEST: f64 = 0.5;
 
-/// Largest relative error of the frequency of a slosh mass that also gives the wave's energy.
+/// Largest relative error of the frequency that is accepted for a slosh mass that also gives the
+/// wave's energy.
 const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
-/// Largest difference between the shift of omega^2 of the smallest computed waves and the shift by third-order theory,
-/// both per squared slosh angle. At 10 degrees this difference changes the frequency by 0.03 %.
+/// Largest accepted difference between two shifts of omega^2 per squared slosh angle: of the
+/// smallest computed waves, and by third-order theory. At 10 degrees this difference changes the
+/// frequency by 0.03 %.
 const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
 const ASSUMED: &str = "without them the FMUs model a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
 
-/// Smallest slosh angle, rad, up to which the third order has to be valid. If it is not valid up to this angle, a warning
-/// says so, and files for the FMUs leave its coefficients out.
+/// Smallest slosh angle up to which the third order has to be valid, rad. Otherwise a warning says
+/// so, and files for the FMUs leave its coefficients out.
 pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 impl Coefficients {
-    /// Combines the results of two computations, of which the second uses more functions; their difference gives the
-    /// error. `wave` is the elevation at the wall per slosh angle, m/rad.
+    /// Combines the results of two computations, of which the second uses more functions; the
+    /// difference between them gives the error. `wave` is the elevation at the wall per slosh
+    /// angle, m/rad.
     fn new([rough, fine]: [Found; 2], wave: f64) -> Coefficients {
         let [s, kappa] = fine.equivalent;
         let differ = |i: usize| {
@@ -90,8 +96,10 @@ impl Coefficients {
         }
     }
 
-    /// Returns these coefficients with the limits of an upright cylinder filled to h/R = `fill`. Near the poles of the
-    /// third-order theory, s, kappa and the second-order wave are interpolated over the fill.
+    /// Returns these coefficients with the limits of an upright cylinder filled to h/R = `fill`.
+    /// Near the poles of the third-order theory, s, kappa and the second-order wave are
+    /// interpolated over the fill; `second` returns this wave at a fill. `wave` is the elevation at
+    /// the wall per slosh angle, m/rad.
     fn cylinder_coefficients(
         self,
         fill: f64,
@@ -128,8 +136,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns these coefficients with the limits of a sphere filled to h/R = `fill`, and with its coefficients for
-    /// large waves.
+    /// Returns these coefficients with the limits of a sphere filled to h/R = `fill`, and with its
+    /// coefficients for large waves.
     fn sphere_coefficients(self, fill: f64) -> Coefficients {
         let tables = (sphere_waves::energy_terms(fill), sphere_waves::forced_limits(fill));
         let (Some(terms), Some([third, planar, rotary])) = tables else { return self };
@@ -147,8 +155,9 @@ impl Coefficients {
         }
     }
 
-    /// Adds coefficients that give the energy of large waves in this tank. These waves also limit the third-order
-    /// coefficients.
+    /// Adds the coefficients `terms`, which give the energy of large waves in this tank. `errors`
+    /// are the largest relative errors of frequency and energy. The large waves also limit the
+    /// range of the third-order coefficients.
     fn with_large_waves(
         self,
         terms: &EnergyTerms,
@@ -172,9 +181,10 @@ impl Coefficients {
         }
     }
 
-    /// Returns the slosh angle, rad, above which a pendulum in place of these coefficients is out of range, because the shift
-    /// of omega^2 of the pendulum differs too much from the shift by these coefficients. The error of s and kappa counts as
-    /// part of the difference.
+    /// Returns the slosh angle above which a pendulum is out of range in place of these
+    /// coefficients, rad. The range ends where the pendulum's shift of omega^2 differs too much
+    /// from the shift by these coefficients; the error of s and kappa counts as part of the
+    /// difference.
     fn pendulum_limit(&self) -> f64 {
         let [s, kappa] = [self.nonlinear_inertia, self.nonlinear_stiffness]
             .map(|x| self.error * (1.0 + x.abs()));
@@ -189,8 +199,8 @@ impl Coefficients {
 }
 
 impl Energy {
-    /// Combines the coefficients with their relative errors of frequency and energy, and with the slosh angle, rad,
-    /// above which the mode is out of range.
+    /// Combines the coefficients `known` with their largest relative errors of frequency and
+    /// energy, and with the slosh angle `angle_limit`, rad, above which the mode is out of range.
     fn new(
         known: &EnergyTerms,
         [frequency_error, energy_error]: [f64; 2],
@@ -236,9 +246,10 @@ fn sphere_radius(contour: &Contour, wall: &Wall, depth: f64) -> Option<f64> {
     points.all(is_on).then_some(radius)
 }
 
-/// Computes coefficients that give the wave's energy, from fully nonlinear potential flow in this tank at this fill, and adds
-/// them to `data`, which already has the third-order coefficients. Does nothing if `data` already has such coefficients from
-/// the tables of upright cylinders and spheres. If the computation is not possible, a warning says why. It takes about 10 s.
+/// Adds coefficients that give the wave's energy to `data`, which already has third-order
+/// coefficients. They come from fully nonlinear potential flow in this tank at this fill, which
+/// takes about 10 s. Nothing happens if `data` already has such coefficients from the tables of
+/// upright cylinders and spheres. If the computation is not possible, a warning says why.
 pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
     let Some(mut found) = data.finite_amplitude.clone() else { return };
     match &mut found.mode {
@@ -328,12 +339,12 @@ impl Found {
     }
 }
 
-/// Coefficients of a mode; `Err` if their error is too large for a slosh mass. Coefficients in `Err` serve only to
-/// compute how far a pendulum is from the liquid.
+/// Coefficients of a mode, or `Err` if their error is too large for a slosh mass. The coefficients
+/// in `Err` only serve to compute how far a pendulum is from the liquid.
 type Judged = Result<Coefficients, Box<Coefficients>>;
 
-/// Returns the amplitude dependence of the first mode of a tank whose modes were solved as `data`. The coefficients do
-/// not depend on the specific force, and they hold only without surface tension.
+/// Returns the amplitude dependence of the first mode of a tank whose modes are `data`. The
+/// coefficients do not depend on the specific force, and they hold only without surface tension.
 pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     let (Some(mode), depth) = (data.modes.first(), data.fill) else {
         return FiniteAmplitude::default();
@@ -394,8 +405,9 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     FiniteAmplitude { mode, mode_y, pendulum_limit, pendulum_limit_y, warnings }
 }
 
-/// Computes the coefficients of a tank with a flat bottom and vertical walls with these inner and outer radii, m. The
-/// inner radius is 0 without an inner wall.
+/// Computes the coefficients of a tank with vertical walls and a flat bottom. The radii `inner` (0
+/// without an inner wall) and `outer` and the depth are in m; `wave` is the elevation at the wall
+/// per slosh angle, m/rad.
 fn upright_coefficients(
     [inner, outer]: [f64; 2],
     depth: f64,
@@ -451,8 +463,10 @@ fn cylinder_coefficients(
 }
 
 impl Coefficients {
-    /// If another mode has nearly twice the frequency of mode 1, adds this mode's contribution to the error. Returns `Err`
-    /// if the contribution is too large. `detuned` returns s and kappa for a relative change of the second-order frequency.
+    /// Checks if another mode has nearly twice the frequency of the first mode. If `excited` is
+    /// such a mode, its contribution is added to the error, and the result is `Err` if the
+    /// contribution is too large. `detuned` returns s and kappa for a relative change of the
+    /// second-order frequency.
     fn judge_near_resonance(
         mut self,
         excited: Option<[usize; 2]>,
@@ -481,8 +495,8 @@ impl Coefficients {
     }
 }
 
-/// Returns the inner and outer radius of a tank with vertical walls and a flat bottom; the inner one is 0
-/// without an inner wall.
+/// Returns the inner and outer radius, m, of a tank with vertical walls and a flat bottom, or
+/// `None` for another tank. The inner radius is 0 without an inner wall.
 fn ring(data: &ModalData) -> Option<[f64; 2]> {
     let wall = data.wall.as_ref()?;
     let (inner, outer, bottom) = (wall.r_inner, wall.r_outer, wall.z_surface - data.fill);
@@ -530,9 +544,10 @@ fn box_coefficients(
     known
 }
 
-/// Computes the coefficients of a body of revolution with any wall. `lambda`, 1/m, is the eigenvalue of the first mode from
-/// the boundary integral equation. For a ring, returns `Err` with the coefficients of a ring between vertical walls that has
-/// the same radii and the same lambda.
+/// Computes the coefficients of a body of revolution with any wall. `wave` is the elevation at the
+/// wall per slosh angle, m/rad, and `lambda`, 1/m, is the eigenvalue of the first mode from the
+/// boundary integral equation. For a ring of liquid the result is `Err` with the coefficients of a
+/// ring between vertical walls that has the same radii and the same lambda.
 fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<String>) -> Judged {
     let [Some(rough), Some(fine)] =
         DEGREES.map(|degree| contour_waves::waves(wall, degree, 1, 0.0))

@@ -1,6 +1,7 @@
 //! Gauss-Legendre quadrature and Legendre polynomials on 0..1.
 
-/// Computes the Legendre polynomials P_0..P_(n-1) at 2 v - 1, with v in 0..1.
+/// Computes the Legendre polynomials P_0, P_1, … at 2 v - 1, with `v` from 0 to 1, and writes them
+/// to `values`, one to each element.
 pub(crate) fn legendre(v: f64, values: &mut [f64]) {
     let x = 2.0 * v - 1.0;
     let (mut p0, mut p1) = (1.0, x);

@@ -2,8 +2,9 @@
 
 use formulas::interpolation::{derivatives, quintic};
 
-/// Piecewise quintic through (x_i, y_i), twice continuously differentiable ([`formulas::interpolation`]). At a turning
-/// point of the data it may exceed the data, because the true maximum lies between the points.
+/// Interpolation by a piecewise polynomial of fifth degree through points (x_i, y_i), which is
+/// twice continuously differentiable ([`formulas::interpolation`]). At a turning point of the data
+/// it may exceed the data, because the true maximum lies between the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monotone {
     x: Vec<f64>,
@@ -13,7 +14,7 @@ pub struct Monotone {
 }
 
 impl Monotone {
-    /// Interpolates points with ascending `x`; one point gives a constant.
+    /// Interpolates points with ascending `x`. A single point gives a constant.
     ///
     /// # Panics
     /// If there is no point, or `x` is not ascending.
@@ -21,11 +22,12 @@ impl Monotone {
         Monotone::interpolate(x, y, false)
     }
 
-    /// Interpolates like [`Monotone::new`], but never exceeds the values of the two neighbouring points, so that it
-    /// turns exactly where the data turn. The FMUs interpolate their tables in this way.
+    /// Interpolates as [`Monotone::new`] does, but never exceeds the values of the two neighbouring
+    /// points, so that the result turns exactly where the data turn. The FMUs interpolate their
+    /// tables in this way.
     ///
     /// # Panics
-    /// The same as for [`Monotone::new`].
+    /// As for [`Monotone::new`].
     pub fn bounded(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::interpolate(x, y, true)
     }

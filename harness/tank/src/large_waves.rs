@@ -29,10 +29,13 @@ use crate::gauss::Gauss;
 #[cfg(feature = "studies")]
 pub mod forced;
 
-/// A periodic wave. `angle` is the slosh angle, rad, whose sine is m_liq x_cm/(m_1 l), where x_cm is the largest
-/// distance of the liquid's centre of mass from the axis. `frequency` is relative to the frequency of small waves.
-/// `rise` is m_liq z_cm/(m_1 l), where z_cm is the height of the centre of mass at the phase 0 above its height at
-/// rest. In planar motion the liquid is momentarily at rest at the phase 0.
+/// A periodic wave of large amplitude.
+///
+/// - `angle`: slosh angle, rad. Its sine is m_liq x_cm/(m_1 l) with the largest distance x_cm of
+///   the liquid's centre of mass from the axis, and mass m_1 and length l of the first mode.
+/// - `frequency`: frequency divided by the frequency of small waves.
+/// - `rise`: m_liq z_cm/(m_1 l), where z_cm is the height of the centre of mass above its height at
+///   rest at the phase 0, at which the liquid of a planar wave is momentarily at rest.
 #[derive(Clone, Copy, Debug)]
 struct LargeWave {
     angle: f64,
@@ -48,8 +51,11 @@ enum Motion {
     Forced(forced::Function),
 }
 
-/// Resolution of an expansion, which has a finite number of terms: degree of the solid harmonics, number of polynomials of the
-/// elevation for each azimuthal number, and the largest azimuthal number, which is also the largest multiple of the frequency.
+/// Resolution of an expansion.
+///
+/// - `degree`: largest degree of the solid harmonics of the potential.
+/// - `polynomials`: number of polynomials of the elevation for each azimuthal number.
+/// - `order`: largest azimuthal number, which is also the largest multiple of the frequency.
 #[derive(Clone, Copy, Debug)]
 struct Resolution {
     degree: usize,
@@ -57,21 +63,23 @@ struct Resolution {
     order: usize,
 }
 
-/// Number of Gauss points over the height between the surface at rest and the wave.
+/// Number of Gauss points between the surface at rest and the wave at each point of the surface.
 const DEPTHS: usize = 4;
 const STEPS: usize = 12;
-/// Largest change of the unknowns in a Newton step, relative to the amplitude, at which a wave counts as converged.
+/// Largest change of the unknowns in a Newton step, relative to the amplitude, at which a wave
+/// counts as converged.
 const CONVERGED: f64 = 1e-9;
-/// Largest elevation of a wave above or below the contact line that is computed, as a fraction of the distance from the
-/// contact line to the upper or lower end of the [`Side`].
+/// Largest elevation of a wave that is computed, above or below the contact line, as a fraction of
+/// the distance from the contact line to the upper or lower end of the [`Side`].
 const ROOM: f64 = 0.8;
-/// Largest sine of the angle between two segments of the wall at which their joint counts as smooth, so that a side
-/// goes on over it.
+/// Largest sine of the angle between two segments of the wall at which their joint counts as
+/// smooth, so that the side continues beyond the joint.
 const SMOOTH: f64 = 1e-3;
 
-/// The smooth part of the wall around the contact line: the wall's radius, divided by the radius of the surface at
-/// rest, as a function of the height above the surface. The function is defined from `low` to `high`, between which the
-/// wall has no corner and rises.
+/// The smooth part of the wall around the contact line, where the radius of the wall is a function
+/// of the height. Between the heights `low` and `high` above the surface at rest the wall has no
+/// corner and rises. Heights and radii are divided by `radius`, the radius of the surface at rest;
+/// `surface` is its height, m.
 pub(crate) struct Side {
     pieces: Vec<Piece>,
     radius: f64,
@@ -80,7 +88,8 @@ pub(crate) struct Side {
     high: f64,
 }
 
-/// A part of the wall that rises from `z[0]` to `z[1]`, m, while the parameter of its curve goes from `t[0]` to `t[1]`.
+/// A part of the wall that rises from the height `z[0]` to `z[1]`, m, while the parameter of its
+/// curve goes from `t[0]` to `t[1]`.
 struct Piece {
     curve: Curve,
     t: [f64; 2],
@@ -88,9 +97,9 @@ struct Piece {
 }
 
 impl Piece {
-    /// Returns the part of a segment that begins at the parameter `start`, runs towards `end`, and whose height
-    /// changes in the direction `sign` throughout. The ends of the part are in the order of their heights. `None` if
-    /// the height does not change.
+    /// Returns the part of a curve that begins at the parameter `start`, runs towards `end`, and
+    /// rises (`sign` = 1) or falls (`sign` = -1) all along. Its two ends are in the order of their
+    /// heights. The result is `None` if the height does not change.
     fn new(curve: Curve, start: f64, end: f64, sign: f64) -> Option<Piece> {
         let count = 64;
         let place = |i: usize| start + (end - start) * i as f64 / count as f64;
@@ -100,7 +109,8 @@ impl Piece {
         Some(Piece { curve, t, z: t.map(|t| curve.point_at(t)[1]) })
     }
 
-    /// Returns the curve's parameter at the height `z`, m, by Newton's method with bisection bounds.
+    /// Returns the parameter of the curve at the height `z`, m, by Newton's method within bounds
+    /// that are bisected.
     fn parameter(&self, z: f64) -> f64 {
         let [mut low, mut high] = self.t;
         let mut t = low + (high - low) * (z - self.z[0]) / (self.z[1] - self.z[0]);
@@ -123,8 +133,9 @@ impl Piece {
     }
 }
 
-/// Returns the parts of consecutive segments, from the parameter `start` of the first segment up to the first corner,
-/// along which the height changes in the direction `sign`.
+/// Returns the parts of consecutive segments along which the wall rises (`sign` = 1) or falls
+/// (`sign` = -1). They begin at the parameter `start` of the first segment and end at the first
+/// corner.
 fn smooth_pieces<'s>(
     segments: impl Iterator<Item = &'s Segment>,
     start: f64,
@@ -172,8 +183,9 @@ impl Side {
         (low < 0.0 && high > 0.0).then_some(Side { pieces, radius, surface, low, high })
     }
 
-    /// Returns the radius of the wall at the height `z` above the surface at rest, and the first two derivatives of the
-    /// radius with respect to `z`. `None` beyond the ends of the side.
+    /// Returns the radius of the wall at the height `z` above the surface at rest, and its first
+    /// and second derivative with respect to `z`, all divided by the radius of the surface. The
+    /// result is `None` beyond the ends of the side.
     fn at(&self, z: f64) -> Option<[f64; 3]> {
         if !(self.low..=self.high).contains(&z) {
             return None;
@@ -193,8 +205,8 @@ impl Side {
     }
 }
 
-/// One term of the expansion, as functions of theta and tau: its elevation, the elevation's derivative with respect to
-/// tau, its potential, and the potential's derivative with respect to theta.
+/// A term of the expansion: the functions of azimuth and phase that multiply its elevation and its
+/// potential. `m` is the azimuthal number, and `k` the multiple of the frequency.
 #[derive(Clone, Copy)]
 struct Term {
     m: usize,
@@ -239,7 +251,8 @@ impl Term {
         }
     }
 
-    /// Returns the mean square of the term's potential over theta and tau.
+    /// Returns the mean square of the function of azimuth and phase that multiplies the potential
+    /// of this term.
     fn norm(self) -> f64 {
         match self.motion {
             Motion::Planar if self.m > 0 => 0.25,
@@ -258,7 +271,8 @@ fn scaled(matrix: &DMatrix<f64>, by: &DVector<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Points (rho, theta, tau) of the surface.
+/// Points of the quadrature on the surface: the radii `rho` with their weights, and pairs of
+/// azimuth and phase.
 struct Points {
     rho: Vec<f64>,
     weights: Vec<f64>,
@@ -279,10 +293,12 @@ impl Points {
     }
 }
 
-/// Values of the potential's base functions at points, one function a column: u, u_r, u_z and u_theta/r.
+/// Values of the base functions u of the potential at points, with one column for each function: u,
+/// u_r, u_z and u_theta/r.
 struct Potentials {
     values: [DMatrix<f64>; 4],
-    /// At each point, derivatives of the sum of all base functions: zz, rz, rr, and theta, z theta, r theta.
+    /// Second derivatives of the sum of all base functions at each point, with respect to zz, rz,
+    /// rr, theta, (z, theta) and (r, theta).
     second: Vec<[f64; 6]>,
 }
 
@@ -291,13 +307,13 @@ struct Solver<'a> {
     side: &'a Side,
     terms: Vec<Term>,
     resolution: Resolution,
-    /// Combinations of harmonics with orthonormal kinetic energies, for each azimuthal number.
+    /// Combinations of solid harmonics with orthonormal kinetic energies, for each azimuthal
+    /// number.
     combinations: Vec<DMatrix<f64>>,
     points: Points,
     elevation: DMatrix<f64>,
     rate: DMatrix<f64>,
-    /// First mode: coefficients of its elevation (`shape`) and of its potential, its lambda, and int f rho^2 drho
-    /// (`amplitude`).
+    /// Coefficients of the first mode's elevation.
     shape: DVector<f64>,
     potential: DVector<f64>,
     lambda: f64,
@@ -306,7 +322,8 @@ struct Solver<'a> {
 }
 
 impl<'a> Solver<'a> {
-    /// Prepares the computation of waves in the liquid above `wall`. Returns `None` for a liquid with a hole.
+    /// Prepares the computation of waves in the liquid above `wall`. `side` is the smooth part of
+    /// the wall around the contact line. Returns `None` for a liquid with a hole, such as a ring.
     fn new(
         wall: &Wall,
         side: &'a Side,
@@ -380,8 +397,8 @@ impl<'a> Solver<'a> {
         [value, rate]
     }
 
-    /// Returns the number of coefficients that the potential of a term has. For m = 0 they include a constant,
-    /// which keeps the volume.
+    /// Returns the number of coefficients of the potential of a term. Axially symmetric terms (m =
+    /// 0) have one more, a constant, which keeps the volume.
     fn potentials_of(&self, term: Term) -> usize {
         match term.has_potential() {
             true => self.combinations[term.m].ncols() + usize::from(term.m == 0),
@@ -394,9 +411,11 @@ impl<'a> Solver<'a> {
         [self.resolution.polynomials * self.terms.len(), potentials]
     }
 
-    /// Computes the base functions of the potential at the heights `z` above the `points`. If the coefficients `c`
-    /// are given, also computes derivatives of the sum of these functions: the second derivatives zz, rz and rr, and
-    /// the derivatives with respect to theta of the sum, of its z-derivative and of its r-derivative.
+    /// Computes the base functions of the potential at the heights `z` above the `points`. `walls`
+    /// has radius, slope and curvature of the wall at these heights. If the coefficients `c` are
+    /// given, the derivatives of the sum of the base functions are computed, too: zz, rz and rr,
+    /// and the derivatives with respect to theta of the sum, of its z-derivative and of its
+    /// r-derivative.
     fn potentials(
         &self,
         points: &Points,
@@ -468,8 +487,10 @@ impl<'a> Solver<'a> {
         z.iter().map(|z| self.side.at(*z)).collect()
     }
 
-    /// Returns the gradient of L, the values of the two constraints, and the derivatives of gradient and constraints at
-    /// `x`. `part` is the coefficient that the first mode must have.
+    /// Returns the residuals of the equations for the unknowns `x`, and their derivatives. The
+    /// residuals are the gradient of Luke's functional and the values of two constraints. `part` is
+    /// the coefficient that the first mode must have. The result is `None` if the wave leaves the
+    /// smooth side of the wall.
     fn equations(&self, x: &DVector<f64>, part: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let [nz, nc] = self.sizes();
         let size = nz + nc + 2;
@@ -555,8 +576,9 @@ impl<'a> Solver<'a> {
         Some((gradient, matrix))
     }
 
-    /// Returns the matrix of the kinetic energy for the surface elevation `zeta`, and the volume between the surface at
-    /// rest and the wave.
+    /// Returns the matrix of the kinetic energy for the surface elevation `zeta`, and the volume
+    /// between the surface at rest and the wave, which must be 0. The result is `None` if the wave
+    /// leaves the smooth side of the wall.
     fn energy_above(&self, zeta: &DVector<f64>) -> Option<(DMatrix<f64>, f64)> {
         let [_, nc] = self.sizes();
         let mut energy = DMatrix::zeros(nc, nc);
@@ -584,7 +606,8 @@ impl<'a> Solver<'a> {
         Some((energy, volume))
     }
 
-    /// Returns the vector whose scalar product with the coefficients of the elevation is the coefficient of the first mode.
+    /// Returns a vector whose scalar product with the coefficients of the elevation is the
+    /// coefficient of the first mode.
     fn first_mode(&self) -> DVector<f64> {
         let [nz, _] = self.sizes();
         let count = self.resolution.polynomials;
@@ -626,14 +649,15 @@ impl<'a> Solver<'a> {
         None
     }
 
-    /// Returns the sine of the slosh angle, and the rise of the centre of mass as [`LargeWave`] defines it, both
-    /// at the phase 0.
+    /// Returns the sine of the slosh angle, and the rise of the centre of mass as [`LargeWave`]
+    /// defines it, at the phase 0 of the wave with the unknowns `x`.
     fn measure(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
         let scale = 2.0 / (self.amplitude * self.amplitude);
         Some(self.moments(x)?.map(|moment| scale * moment))
     }
 
-    /// Returns the first moments, sideways and upwards, of the liquid between the surface at rest and the wave at the phase 0.
+    /// Returns the first moments, sideways and upwards, of the liquid between the surface at rest
+    /// and the wave with the unknowns `x`, at the phase 0.
     fn moments(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
         let [nz, _] = self.sizes();
         let rule = Gauss::new(self.resolution.polynomials + 6);
@@ -656,8 +680,8 @@ impl<'a> Solver<'a> {
         Some([sideways, up])
     }
 
-    /// Computes waves whose first mode has the slosh angles `angles`, rad, ascending; `None` where Newton's
-    /// method does not converge.
+    /// Computes waves whose first mode has the slosh angles `angles`, rad, in ascending order. A
+    /// wave is `None` if Newton's method does not converge.
     fn waves(&self, angles: &[f64]) -> Vec<Option<LargeWave>> {
         let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
         let mut wave = |angle: &f64| {
@@ -682,16 +706,16 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Degrees of the solid harmonics in the truncated expansions of the potential. Each wave is the median over these
-/// truncations, because in each truncation a few waves are wrong: a multiple of the wave's frequency happens to equal the
-/// frequency of a high mode of the truncated liquid.
+/// Degrees of the solid harmonics in the computations of one wave, whose median is used. The median
+/// is needed because in each computation a few waves are wrong: a multiple of the wave's frequency
+/// happens to equal the frequency of a high mode of the truncated liquid.
 const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
-/// Largest azimuthal number, which is also the largest multiple of the frequency.
+/// Largest azimuthal number in the expansion, which is also the largest multiple of the frequency.
 const ORDER: usize = 4;
 /// Slosh angles at which waves are computed, degrees.
 const ANGLES: [f64; 9] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
-/// Largest relative scatter of the frequencies at one slosh angle, measured by the median absolute
-/// deviation of the truncations.
+/// Largest accepted relative scatter of the frequencies at one slosh angle, measured by the median
+/// absolute deviation between the [`DEGREES`].
 const SCATTER: f64 = 2e-4;
 
 fn median(values: &mut [f64]) -> f64 {
@@ -703,9 +727,9 @@ fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// Returns periodic waves of the liquid above `wall`, each the median over the truncations of [`DEGREES`], up to the
-/// slosh angle at which the frequencies of the truncations scatter by more than [`SCATTER`]. The list is empty for a
-/// liquid with a hole.
+/// Returns periodic waves of the liquid above `wall` with rising slosh angle. Each wave is the
+/// median over [`DEGREES`]. The list ends at the slosh angle at which their frequencies scatter by
+/// more than [`SCATTER`]; it is empty for a liquid with a hole.
 fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     let angles = ANGLES.map(f64::to_radians);
     let truncation = &|degree: usize| {
@@ -749,14 +773,15 @@ fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     waves
 }
 
-/// Largest relative distance of one wave from the straight line through the other waves at which the wave is not an outlier:
-/// for the frequency, and for the rise of the centre of mass.
+/// Largest relative distance from the straight line through the other waves at which a wave is not
+/// an outlier: for the frequency, and for the rise of the centre of mass.
 const OUTLIER: [f64; 2] = [5e-4, 3e-3];
 
-/// Removes waves whose frequency or rise lies off the straight line through the other waves, because the liquid of the
-/// truncated expansion has a resonance there. Each wave comes with the index of its slosh angle. With u, the square of the
-/// angle's sine, the shift of omega^2 over u and the excess of the rise over u are almost linear in u. The slope of each line
-/// is the median over all pairs of waves with different angles.
+/// Removes waves whose frequency or rise lies off the straight line through the other waves,
+/// because the truncated expansion has a resonance there. Each wave comes with the index of its
+/// slosh angle. With the squared sine u of the angle, the shift of omega^2 divided by u, and the
+/// excess of the rise divided by u, are almost linear in u. The slope of each line is the median
+/// over all pairs of waves with different angles.
 fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave)> {
     for (i, allowed) in OUTLIER.into_iter().enumerate() {
         let point = |wave: &LargeWave| {
@@ -785,18 +810,20 @@ fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave
     waves
 }
 
-/// Coefficients that give the slosh mass the energy and the frequencies of large waves, see `formulas::energy_terms`.
-/// `errors` are the largest relative errors of the frequency in planar motion, of the frequency in circular motion, and
-/// of the energy, up to the slosh angle `compared`, rad.
+/// A slosh mass with the energy and the frequencies of large waves, see `formulas::energy_terms`.
+/// `errors` are the largest relative errors, up to the slosh angle `compared`, of the frequency in
+/// planar motion, of the frequency in circular motion, and of the energy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fit {
     pub terms: EnergyTerms,
     pub errors: [f64; 3],
-    /// Relative shifts of omega^2 per squared slosh angle in the limit of small waves, planar and circular.
+    /// Relative shifts of omega^2 per squared slosh angle in the limit of small waves, in planar
+    /// and in circular motion.
     pub shifts: [f64; 2],
 }
 
-/// Returns the intercept and the slope of the straight line that is fitted to the points (u, y) with the weights u^2.
+/// Returns the intercept and the slope of the straight line that is fitted to the points (u, y)
+/// with the weights u^2.
 fn line(points: &[[f64; 2]]) -> [f64; 2] {
     let mut sums = [0.0; 5];
     for [u, y] in points {
@@ -810,8 +837,9 @@ fn line(points: &[[f64; 2]]) -> [f64; 2] {
     [(wy * wuu - wuy * wu) / determinant, (w * wuy - wu * wy) / determinant]
 }
 
-/// Returns the frequency of the slosh mass in planar motion with the amplitude `angle`, divided by the frequency of
-/// small motion. The period is the integral over the displacement q = a sin t, evaluated by quadrature.
+/// Returns the frequency of the slosh mass in planar motion with the amplitude `angle`, rad,
+/// divided by the frequency of small motion. The period is an integral over the displacement q = a
+/// sin t, which is evaluated by quadrature.
 fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let ([s, kappa], [s_2, kappa_2]) = (terms.pair, terms.next);
     let (a, count) = (angle.sin(), 32);
@@ -832,22 +860,23 @@ fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     1.0 / quarter
 }
 
-/// Returns the restoring force divided by the displacement, for m = g = l = 1; `u` is the squared displacement.
+/// Returns the restoring force of the slosh mass divided by its displacement, in units in which
+/// mass, length and specific force are 1. `u` is the squared displacement.
 fn restoring_stiffness(terms: &EnergyTerms, u: f64) -> f64 {
     1.0 / (1.0 - u).sqrt() + (terms.pair[1] - 1.0) * u / 2.0 + 0.375 * terms.next[1] * u * u
 }
 
-/// Returns the frequency of the slosh mass in circular motion with the amplitude `angle`, divided by the
-/// frequency of small motion.
+/// Returns the frequency of the slosh mass in circular motion with the amplitude `angle`, rad,
+/// divided by the frequency of small motion.
 fn circular_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let (u, [t, t_2]) = (angle.sin().powi(2), terms.rotary);
     (restoring_stiffness(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()
 }
 
-/// Returns the angle limit of a third-order slosh mass with the coefficients `pair` = (s, kappa), in a tank whose
-/// large waves have the coefficients `terms`. Beyond this slosh angle the frequency of the third-order mass, in
-/// planar or in circular motion, differs too much from the frequency of the large waves. It is at most the angle up
-/// to which `terms` hold.
+/// Returns the limits of a third-order slosh mass with the coefficients `pair` = (s, kappa), in a
+/// tank whose large waves have the coefficients `terms`. Above the returned slosh angles the
+/// frequency of the third-order mass, in planar or in circular motion, differs too much from the
+/// frequency of the large waves. They are at most the angle up to which `terms` hold.
 pub(crate) fn third_order_limit(terms: &EnergyTerms, pair: [f64; 2]) -> AngleLimit {
     let third = EnergyTerms { pair, next: [0.0; 2], rotary: [0.0; 2], ..*terms };
     let off = |angle: f64| {
@@ -867,14 +896,14 @@ pub(crate) fn third_order_limit(terms: &EnergyTerms, pair: [f64; 2]) -> AngleLim
     }
 }
 
-/// Number of angles at which [`third_order_limit`] compares frequencies.
 const LIMIT_STEPS: u32 = 200;
 
-/// Smallest slosh angle, rad, up to which waves must be known for a fit.
+/// Smallest slosh angle up to which waves must be known for a fit, rad.
 pub(crate) const LEAST: f64 = 6.0 * PI / 180.0;
 
-/// Computes periodic waves of the liquid above `wall`, and fits the coefficients of the slosh mass to them. Returns
-/// `None` for a liquid with a hole, or if the waves end below the slosh angle [`LEAST`].
+/// Computes periodic waves of the liquid above `wall`, and fits the coefficients of the slosh mass
+/// to them. `side` is the smooth part of the wall around the contact line. Returns `None` for a
+/// liquid with a hole, or if the waves end below the slosh angle [`LEAST`].
 pub(crate) fn fit(wall: &Wall, side: &Side) -> Option<Fit> {
     let [planar, circular] =
         [Motion::Planar, Motion::Circular].map(|motion| backbone(wall, side, motion));
@@ -937,8 +966,9 @@ fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
     Some(Fit { errors: errors(&terms, &planar, &circular), shifts, terms })
 }
 
-/// Returns the largest relative errors of the slosh mass up to its angle `compared`: of its frequency in planar and in
-/// circular motion, and of its energy in planar motion.
+/// Returns the largest relative errors of the slosh mass `terms` up to its angle `compared`: of its
+/// frequency in planar motion, of its frequency in circular motion, and of its energy in planar
+/// motion.
 fn errors(terms: &EnergyTerms, planar: &[LargeWave], circular: &[LargeWave]) -> [f64; 3] {
     let square = |wave: &LargeWave| wave.angle.sin().powi(2);
     let is_compared = |wave: &&LargeWave| wave.angle < terms.compared + 1e-9;
@@ -979,8 +1009,8 @@ mod tests {
         [Motion::Planar, Motion::Circular].map(|motion| backbone(&wall, &side, motion))
     }
 
-    /// The frequencies in tests/backbones.csv were computed by two other programs: one uses a variational method with
-    /// other base functions, and one marches in time.
+    /// The frequencies in tests/backbones.csv were computed by two other programs. One uses a
+    /// variational method with other base functions, the other marches in time.
     #[test]
     fn waves_in_cylinders_have_the_known_frequencies() {
         let known: Vec<[Option<f64>; 4]> = include_str!("../tests/backbones.csv")
@@ -1018,8 +1048,8 @@ mod tests {
         assert!(compared > 20, "{compared}");
     }
 
-    /// Returns the mean energy of the wave, and its energy at the phase 0, where all of the energy is potential. Both
-    /// are relative to 2 pi rho g R^4.
+    /// Returns the mean energy of the wave with the unknowns `x`, and its energy at the phase 0,
+    /// where all energy is potential. Both are relative to 2 pi rho g R^4.
     fn energies(solver: &Solver, x: &DVector<f64>) -> [f64; 2] {
         let [nz, nc] = solver.sizes();
         let zeta = &solver.elevation * x.rows(0, nz);
@@ -1036,9 +1066,10 @@ mod tests {
         [energy, solver.moments(x).unwrap()[1]]
     }
 
-    /// Along a family of periodic motions dE = omega dJ holds, with the energy E and the action J, which is the mean of twice
-    /// the kinetic energy divided by omega. At the phase 0 the liquid is at rest, so that its height gives the whole energy.
-    /// The expansion in this test has no resonance at these slosh angles.
+    /// Along a family of periodic motions the energy E and the action J obey dE = omega dJ. The
+    /// action is the mean of twice the kinetic energy divided by omega. At the phase 0 the liquid
+    /// is at rest, so that its height gives the whole energy. The expansion in this test has no
+    /// resonance at these slosh angles.
     #[test]
     fn energy_and_action_of_planar_waves_belong_to_their_frequency() {
         for (contour, fill) in [(cylinder(), 0.6), (sphere(), 0.6), (sphere(), 0.35)] {
@@ -1070,8 +1101,8 @@ mod tests {
         }
     }
 
-    /// The frequencies of the waves, each the median over the degrees of harmonics in [`DEGREES`], are compared with the
-    /// frequencies from one finer expansion, whose largest multiple of the wave's frequency is 5 instead of [`ORDER`].
+    /// The frequencies, each the median over [`DEGREES`], are compared with one finer expansion,
+    /// whose largest multiple of the frequency is 5 instead of [`ORDER`].
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn waves_in_a_sphere_do_not_depend_on_the_resolution() {
@@ -1119,8 +1150,6 @@ mod tests {
         );
     }
 
-    /// The smooth side of a wall ends at the wall's first corner. A side that is drawn as several segments with smooth
-    /// joints has the same radii and derivatives as a side of one segment.
     #[test]
     fn a_side_ends_at_corners_and_goes_on_over_smooth_joints() {
         let joined = Contour::new(vec![

@@ -8,7 +8,8 @@
 use crate::interpolation::Monotone;
 use crate::modal::Mode;
 
-/// Properties of a liquid: density `rho`, kg/m³; surface tension `sigma`, N/m; specific force `g` along the axis, m/s².
+/// Properties of a liquid: density `rho`, kg/m³; surface tension `sigma`, N/m; specific force `g`
+/// along the axis, m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fluid {
     pub rho: f64,
@@ -22,10 +23,14 @@ impl Fluid {
     }
 }
 
-/// A mode with capillarity: the square `omega2` of its natural frequency, 1/s², and the centring stiffness `spring` at the
-/// slosh mass, N/m, which is slightly negative for a wetting liquid at a large Bond number. `outside` has one sentence for
-/// each range of validity of the formula that the tank leaves. `unknown` is true if the formula does not apply to this
-/// tank and its contribution exceeds 10 % of omega^2.
+/// A mode with capillarity.
+///
+/// - `omega2`: square of the natural frequency, 1/s².
+/// - `spring`: centring stiffness at the slosh mass, N/m, which is slightly negative for a wetting
+///   liquid at a large Bond number.
+/// - `outside`: a sentence for each range of validity of the formula that the tank leaves.
+/// - `unknown`: true if the formula does not apply to this tank and its contribution exceeds 10 %
+///   of omega^2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capillary {
     pub omega2: f64,
@@ -34,20 +39,21 @@ pub struct Capillary {
     pub unknown: bool,
 }
 
-/// Largest contribution of capillarity to omega^2, relative to the contribution of gravity, at which the formula for a
-/// flat surface counts as valid for a mode whose shape phi_n capillarity changes.
+/// Largest contribution of capillarity to omega^2, relative to gravity, at which the formula for a
+/// flat surface is used for a mode whose shape is changed by capillarity.
 const LARGEST_SHARE: f64 = 0.1;
 
-/// Returns the specific force, m/s², below which [`flat`] is not valid for a mode whose shape phi_n changes;
-/// `tension` is sigma/rho, m3/s2.
+/// Returns the specific force, m/s², below which [`flat`] is not valid for a mode whose shape is
+/// changed by capillarity. `tension` is the surface tension divided by the density, m³/s².
 pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
     tension * mode.surface_gradient / LARGEST_SHARE
 }
 
-/// Computes the effect of surface tension on a mode for a flat surface (contact angle 90 degrees) whose contact line
-/// slides freely along a vertical wall. The squared frequency is omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n
-/// = int_F (phi_r^2 + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2) and
-/// boxes, and of first order in the capillary part elsewhere.
+/// Computes the effect of surface tension on a mode for a flat surface (contact angle 90 degrees)
+/// whose contact line slides freely along a vertical wall. The squared frequency is omega_n^2 = g
+/// lambda_n [1 + (sigma/(rho g)) K_n] with the surface gradient K_n = int_F (phi_r^2 + phi^2/r^2) r
+/// dr/N_n of the mode's shape phi. This is exact in cylinders, annuli (K = k^2) and boxes, because
+/// capillarity does not change the shape there. In other tanks it is of first order.
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;
@@ -76,10 +82,11 @@ pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
 const XI: f64 = formulas::cylinder::XI[0];
 const BOND: [f64; 6] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0];
 const ANGLE: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
-/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, constant contact angle and free
-/// contact line, for the Bond numbers `BOND` (rows) and the contact angles `ANGLE`, degrees (columns). The values come
-/// from the capillary eigenproblem on the static meniscus, whose error is 1e-6 where the exact result is
-/// known; they are rounded to the digits given.
+/// Squared frequency of the first mode of a deep cylinder with a curved meniscus, constant contact
+/// angle and free contact line: omega_1^2 rho R^3/sigma for the Bond numbers `BOND` (rows) and the
+/// contact angles `ANGLE`, degrees (columns). The values come from the capillary eigenproblem on
+/// the static meniscus, whose error is 1e-6 where the exact result is known; they are rounded to
+/// the digits given.
 const TABLE: [[f64; 7]; 6] = [
     [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263],
     [8.0827, 7.5726, 6.9609, 6.2873, 5.6101, 5.0195, 4.7587],
@@ -89,7 +96,8 @@ const TABLE: [[f64; 7]; 6] = [
     [190.3599, 188.8619, 187.4498, 186.2136, 185.2381, 184.6017, 184.4012],
 ];
 
-/// Returns Omega_1^2 = omega_1^2 rho R^3/sigma of a deep upright cylinder at a contact angle in degrees.
+/// Returns the squared frequency omega_1^2 rho R^3/sigma of the first mode of a deep upright
+/// cylinder, for the Bond number `bond` and the contact angle `contact_angle`, degrees.
 pub fn cylinder_omega2(bond: f64, contact_angle: f64) -> f64 {
     flat_omega2(bond) + meniscus_shift(bond, contact_angle)
 }
@@ -98,10 +106,10 @@ fn flat_omega2(bond: f64) -> f64 {
     XI * bond + XI.powi(3)
 }
 
-/// Returns the shift of Omega_1^2 by the curved meniscus, relative to Omega_1^2 of the flat surface.
-///
-/// The table is interpolated in cos(angle) and ln(1 + Bo), so that the shift at 90 degrees is exactly 0. Above Bo = 100
-/// the shift approaches its limit -2 xi^2 cos(angle) as 1/Bo (shape derivative of the eigenvalue).
+/// Returns the change of the squared frequency omega_1^2 rho R^3/sigma by a curved meniscus. The
+/// table is interpolated in cos(angle) and ln(1 + Bo), so that the change at 90 degrees is exactly
+/// 0. Above Bo = 100 the change approaches its limit -2 xi^2 cos(angle) as 1/Bo, which follows from
+/// the shape derivative of the eigenvalue.
 fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     let cosine = |angle: f64| if angle == 90.0 { 0.0 } else { angle.to_radians().cos() };
     let cos = cosine(contact_angle);
@@ -127,10 +135,11 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     Monotone::new(&places, &values).evaluate(bond.ln_1p())
 }
 
-/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2 by
-/// the meniscus of a deep cylinder, times tanh(xi h/R), is added to the result of [`flat`]. At 90 degrees, and without
-/// surface tension, the result is exactly the result of [`flat`]. A contact angle below 0 degrees is treated as 0 degrees,
-/// an angle above 90 degrees as 90 degrees.
+/// Computes the first mode of an upright cylinder with a curved meniscus. `radius` and the fill
+/// `fill` are in m, `contact_angle` in degrees. The change by the meniscus in a deep cylinder,
+/// times tanh(xi h/R) for the depth, is added to the result of [`flat`]. At 90 degrees, and without
+/// surface tension, the result is exactly the result of [`flat`]. An angle below 0 degrees is
+/// treated as 0 degrees, an angle above 90 degrees as 90 degrees.
 pub fn cylinder(
     mode: &Mode,
     radius: f64,

@@ -22,21 +22,29 @@ use crate::potential_flow::{Discretisation, Solution};
 
 const MASSLESS: f64 = 1e-9;
 
-/// One mode; number `n` is 1 for the lowest frequency. Heights are in m from the contour's own zero.
+/// A slosh mode of a tank. Heights are in m from the zero of the contour.
 ///
-/// - `lambda` = omega_n^2/g, 1/m; `lambda_r` is lambda times the outer radius of the free surface, `lambda_l` lambda
-///   times the length of a box; `l` = 1/lambda is the pendulum's length, m.
-/// - `m`: slosh mass, kg; `m_ratio`: slosh mass divided by the mass of the liquid.
-/// - `height`: height of the slosh mass at rest; `hinge`: height of the hinge, l above it; both `None` if the slosh
-///   mass is below 1e-9 of the liquid's mass. `m_h` and `m_h2` are m h, kg m, and m h^2, kg·m², with h = H - z_cg.
-/// - `wave`, `wave_inner`: elevation of the surface at the outer and at the inner wall per angle of the pendulum,
-///   m/rad; `wave_peak`: largest elevation anywhere (first mode only), at the radius `r_peak`, m; `shape`: points (r,
-///   m/rad) of the surface from the axis or inner wall outwards.
-/// - `beta` = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, from which the damping by the laminar layer
-///   at the wall follows.
-/// - `surface_gradient` = int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2, from which the stiffness by capillarity follows.
-/// - `vertical_wall`: true if the walls are vertical at the free surface; `upright`: true if the bottom is flat, too,
-///   so that capillarity does not change phi_n.
+/// - `n`: number; 1 has the lowest frequency.
+/// - `lambda`: omega_n^2/g, 1/m.
+/// - `lambda_r`, `lambda_l`: lambda times the outer radius of the free surface, or times the length
+///   of a box.
+/// - `l`: length of the pendulum, m, which is 1/lambda.
+/// - `m`, `m_ratio`: slosh mass, kg, and slosh mass divided by the mass of the liquid.
+/// - `height`, `hinge`: height of the slosh mass at rest, and of the hinge, which is `l` above it;
+///   `None` if the slosh mass is below 1e-9 of the liquid's mass.
+/// - `m_h`, `m_h2`: first moment m h, kg m, and second moment m h^2, kg·m², where h is the height
+///   of the slosh mass above the liquid's centre of mass.
+/// - `wave`, `wave_inner`: elevation of the surface at the outer and at the inner wall per angle of
+///   the pendulum, m/rad.
+/// - `wave_peak`, `r_peak`: largest elevation anywhere (first mode only), and its radius, m.
+/// - `shape`: points (r, m/rad) of the surface from the axis or inner wall outwards.
+/// - `beta`: int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, from which the damping by the
+///   laminar layer at the wall follows.
+/// - `surface_gradient`: int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m², from which the stiffness by
+///   capillarity follows.
+/// - `vertical_wall`: true if the walls are vertical at the free surface.
+/// - `upright`: true if the bottom is flat, too, so that capillarity does not change the shape of
+///   the mode.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Mode {
     pub n: usize,
@@ -73,8 +81,11 @@ pub struct Mode {
     pub upright: bool,
 }
 
-/// Fixed mass `m_0`, kg, that remains when the first `modes` modes are modelled as pendulums; its height, m from the
-/// contour's own zero, which can lie outside the tank; and its inertia across the axis about its own centre, kg·m².
+/// Fixed mass that remains when the first `modes` modes are modelled as pendulums.
+///
+/// - `m_0`: mass, kg.
+/// - `height`: height, m from the zero of the contour; it can lie outside the tank.
+/// - `inertia`: inertia across the axis about the centre of the fixed mass, kg·m².
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rest {
     pub modes: usize,
@@ -85,8 +96,11 @@ pub struct Rest {
     pub inertia: f64,
 }
 
-/// Modal parameters of a box along one of its horizontal sides: inertias of the liquid about its centre of mass, kg·m²,
-/// if it is rigid and if it is under a lid; the modes; and the fixed mass with 1, 2, ... modes as pendulums.
+/// Modal parameters of a box along one of its horizontal sides.
+///
+/// - `i_frozen_cg`, `i_eff_cg`: inertia about the centre of mass, kg·m², of rigid liquid, and of
+///   liquid under a lid.
+/// - `rest`: fixed mass with 1, 2, ... modes as pendulums.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
     #[serde(rename = "I_frozen_cg")]
@@ -103,14 +117,16 @@ pub struct Axes {
     pub y: Axis,
 }
 
-/// Damping of the modes of a tank with smooth walls, for the kinematic viscosity `nu`, m2/s, at the specific force
-/// `gravity` along the axis, m/s².
+/// Damping of the modes of a tank with smooth walls.
 ///
-/// - `shape`: the shape of the wetted wall if its damping was measured, otherwise `other`; `parts` then has the shapes with
-///   measured damping that parts of the wall have.
-/// - `correlation`: damping ratio of the first mode by the correlation of the shape, if the shape has one.
+/// - `nu`, `gravity`: kinematic viscosity, m²/s, and specific force along the axis, m/s².
+/// - `shape`: shape of the wetted wall if its damping was measured, otherwise `other`.
+/// - `correlation`: damping ratio of the first mode by the correlation of this shape, if it has
+///   one.
+/// - `parts`: for `other`, the shapes with measured damping that parts of the wall have.
 /// - `taken`: sentence that explains the chosen damping ratio.
-/// - `modes`: in the order of their frequency; for a box along its first side, and `modes_y` along its second side.
+/// - `modes`, `modes_y`: in the order of the frequencies; for a box along its first and along its
+///   second side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Damping {
     pub nu: f64,
@@ -127,8 +143,9 @@ pub struct Damping {
     pub warnings: Vec<String>,
 }
 
-/// A measured shape of a part of the wetted wall: its share of the area, and the damping by its correlation divided by
-/// the damping by the laminar layer at its wall.
+/// A measured shape that a part of the wetted wall has: `share` is the part's fraction of the area,
+/// and `factor` the damping by the shape's correlation divided by the damping by the laminar layer
+/// at its wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DampingPart {
     pub shape: &'static str,
@@ -136,10 +153,15 @@ pub struct DampingPart {
     pub factor: f64,
 }
 
-/// Natural frequencies with the surface tension `sigma`, N/m, a contact angle between surface and wall, degrees (90 is
-/// a flat surface), and the specific force `gravity` along the axis, m/s². `bond` is rho g R^2/sigma with the outer
-/// radius of the free surface; `None` for a box or without surface tension. Modes are in the order of
-/// [`ModalData::modes`]; `modes_y` are the modes along a box's second side.
+/// Natural frequencies with surface tension.
+///
+/// - `sigma`: surface tension, N/m.
+/// - `contact_angle`: angle between surface and wall, degrees; 90 is a flat surface.
+/// - `gravity`: specific force along the axis, m/s².
+/// - `bond`: Bond number rho g R^2/sigma with the outer radius R of the free surface; `None` for a
+///   box or without surface tension.
+/// - `modes`, `modes_y`: in the order of [`ModalData::modes`]; `modes_y` are the modes along a
+///   box's second side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Capillarity {
     pub sigma: f64,
@@ -153,16 +175,20 @@ pub struct Capillarity {
     pub warnings: Vec<String>,
 }
 
-/// One mode with surface tension: natural frequency, rad/s, and centring stiffness at the slosh mass, N/m, which is
-/// negative if a curved meniscus lowers the frequency; `None` if no formula is valid.
+/// A mode with surface tension: natural frequency `omega`, rad/s, and centring stiffness `k` at the
+/// slosh mass, N/m, which is negative if a curved meniscus lowers the frequency. Both are `None` if
+/// no formula is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CapillaryMode {
     pub omega: Option<f64>,
     pub k: Option<f64>,
 }
 
-/// Damping of one mode: natural frequency with capillarity, rad/s, damping ratio with the interval in which it is
-/// expected, and the damping ratio by the laminar layer at the wall only.
+/// Damping of one mode.
+///
+/// - `omega`: natural frequency with capillarity, rad/s.
+/// - `zeta`, `interval`: damping ratio, and the interval in which it is expected.
+/// - `laminar`: damping ratio by the laminar layer at the wall only.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModeDamping {
     pub omega: f64,
@@ -171,22 +197,26 @@ pub struct ModeDamping {
     pub laminar: f64,
 }
 
-/// Modal parameters of a tank at one fill. Heights are in m from the contour's own zero, except `fill`, the height of
-/// the free surface above the lowest point.
+/// Modal parameters of a tank at one fill. Heights are in m from the zero of the contour, except
+/// `fill`, the height of the free surface above the lowest point.
 ///
-/// - `kind`: `revolution` or `box`; `rho`: density, kg/m³.
-/// - `r_surface`, `r_inner`: outer and inner radius of the free surface, m; the inner one is 0 if the surface reaches
-///   the axis. `length_x`, `length_y`: sides of a box, m.
-/// - `m_liq`, `z_cg`, `z_lowest`: mass of the liquid, kg, height of its centre of mass, and height of the tank's
-///   lowest point, which is 0 for shapes and boxes.
-/// - `i_frozen_cg`, `i_frozen_axis`: inertia of the rigid liquid across the axis about its centre of mass, and
-///   about the axis, kg·m².
-/// - `i_eff_cg`: inertia of the liquid under a lid across the axis about its centre of mass, kg·m²; `i_eff_axis`:
-///   inertia of the liquid that rotates with the tank about the axis, 0 in a tank of revolution.
-/// - `modes`: in the order of their frequencies, for a box those along its first side; `axes`: the modes of both
-///   sides of a box. `rest`: fixed mass with 1, 2, ... modes as pendulums.
-/// - `capillarity`, `damping`: present if the surface tension or the viscosity is known. `finite_amplitude`: see
-///   [`crate::finite_amplitude`].
+/// - `kind`: `revolution` or `box`.
+/// - `rho`: density, kg/m³.
+/// - `r_surface`, `r_inner`: outer and inner radius of the free surface, m; the inner radius is 0
+///   if the surface reaches the axis.
+/// - `length_x`, `length_y`: sides of a box, m.
+/// - `m_liq`, `z_cg`: mass of the liquid, kg, and height of its centre of mass.
+/// - `z_lowest`: height of the tank's lowest point, which is 0 for shapes and boxes.
+/// - `i_frozen_cg`, `i_frozen_axis`: inertia of the rigid liquid, kg·m², across the axis about its
+///   centre of mass, and about the axis.
+/// - `i_eff_cg`: inertia of the liquid under a lid across the axis about its centre of mass, kg·m².
+/// - `i_eff_axis`: inertia of the liquid that rotates with the tank about the axis, kg·m²; 0 in a
+///   tank of revolution.
+/// - `modes`: in the order of their frequencies; for a box the modes along its first side.
+/// - `axes`: the modes of both sides of a box.
+/// - `rest`: fixed mass with 1, 2, ... modes as pendulums.
+/// - `capillarity`, `damping`: present if the surface tension or the viscosity is known.
+/// - `finite_amplitude`: see [`crate::finite_amplitude`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ModalData {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -217,12 +247,14 @@ pub struct ModalData {
     pub rest: Vec<Rest>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
-    /// Estimated error of all values except beta and I_0. The error of lambda and l is relative to their values. The
-    /// errors of other values are relative to: m_liq for masses; m_liq R for m_n H_n and m_0 H_0; m_liq R^2 for
-    /// inertias; R for waves and z_cg, where R is the outer radius of the free surface.
+    /// Estimated error of all values except `beta` and the fixed mass's inertia. For lambda and l
+    /// it is relative to their values. For other values it is relative to a reference: m_liq for
+    /// masses; m_liq R for moments m H; m_liq R^2 for inertias; R for waves and z_cg, where R is
+    /// the outer radius of the free surface.
     pub error: f64,
-    /// Estimated error of I_0, relative to m_liq R^2. It can be larger than `error`: the fixed mass of a shallow dish
-    /// is far above the dish, and this lever arm multiplies the error of m_0.
+    /// Estimated error of the fixed mass's inertia I_0, relative to m_liq R^2. It can be larger
+    /// than `error`: for example, the fixed mass of a shallow dish is far above the dish, and this
+    /// lever arm multiplies the error of m_0.
     #[serde(rename = "error_I_0")]
     pub error_i_0: f64,
     pub error_beta: f64,
@@ -240,11 +272,10 @@ pub struct ModalData {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spin {
-    /// Rate Omega at which tank and liquid rotate about the axis, rad/s.
+    /// Rate at which tank and liquid rotate about the axis, rad/s.
     pub omega: f64,
-    /// Specific force along the axis, m/s².
     pub gravity: f64,
-    /// Height of the centre of mass of the rotating liquid, m from the contour's own zero.
+    /// Height of the centre of mass of the rotating liquid, m from the zero of the contour.
     pub z_cg: f64,
     /// Inertia of the rotating liquid about the tank's axis, kg·m².
     #[serde(rename = "I_axis")]
@@ -252,38 +283,43 @@ pub struct Spin {
     /// Inertia of the rotating liquid across the axis about its centre of mass, kg·m².
     #[serde(rename = "I_cg")]
     pub i_cg: f64,
-    /// Height of the surface on the axis, m from the contour's own zero; `None` if the axis is dry.
+    /// Height of the surface on the axis, m from the zero of the contour; `None` if the axis is
+    /// dry.
     pub z_apex: Option<f64>,
-    /// Height up to which the outer wall is wet, m from the contour's own zero.
+    /// Height up to which the outer wall is wet, m from the zero of the contour.
     pub z_wall: f64,
-    /// Radius inside which the floor is dry, m: the radius of the surface at the height of the lowest point; 0 if
-    /// the floor is wet.
+    /// Radius inside which the floor is dry, m: the radius of the surface at the height of the
+    /// lowest point. It is 0 if the floor is wet.
     pub r_dry: f64,
-    /// Omega^2 R/g, where R is the outer radius of the surface at rest; `None` without gravity.
+    /// Flatness of the tank under spin, Omega^2 R/g with the spin rate Omega and the outer radius R
+    /// of the surface at rest; `None` without gravity.
     #[serde(rename = "Omega2_R_g")]
     pub flatness: Option<f64>,
-    /// Spin ratio 2 Omega/omega_0, where omega_0 is the frequency of the first mode without spin; `None` without a
-    /// mode.
+    /// Spin ratio 2 Omega/omega_0 with the spin rate Omega and the frequency omega_0 of the first
+    /// mode without spin; `None` without a mode.
     #[serde(rename = "2Omega_omega")]
     pub ratio: Option<f64>,
-    /// Frequencies of the first mode of an upright cylinder seen from the rotating tank, Hz: of the wave that runs
-    /// against the spin, and of the wave that runs with the spin.
+    /// Frequencies of the first mode of an upright cylinder in the rotating frame of the tank, Hz:
+    /// of the wave that runs against the spin, and of the wave that runs with the spin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequencies: Option<[f64; 2]>,
-    /// Gyroscopic coefficient C of the first mode of an upright cylinder.
+    /// Gyroscopic coefficient of the first mode of an upright cylinder, by which the spin couples
+    /// its two directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyroscopic: Option<f64>,
-    /// Rate, 1/s, at which the laminar layer at the floor of an upright cylinder brings the liquid to the rate of its
-    /// tank; `None` if the viscosity is not given.
+    /// Rate at which the laminar layer at the floor of an upright cylinder brings the liquid to the
+    /// rate of its tank, 1/s; `None` if the viscosity is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay: Option<f64>,
-    /// True if the parameters of the liquid at rest still describe the motion of the rotating liquid.
+    /// True if the parameters of the liquid at rest still describe the motion of the rotating
+    /// liquid.
     pub in_range: bool,
     pub warnings: Vec<String>,
 }
 
-/// The free surface in a mode, with further quantities of [`Mode`]: `shape` has points (r, elevation per angle) from
-/// the axis or inner wall outwards, `peak` the largest elevation per angle as (r, m/rad).
+/// The free surface in a mode. `shape` has points (r, elevation per angle) from the axis or inner
+/// wall outwards, `peak` the largest elevation per angle as (r, m/rad); for the other fields see
+/// [`Mode`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Surface {
     pub(crate) shape: Vec<[f64; 2]>,
@@ -294,8 +330,9 @@ pub(crate) struct Surface {
 }
 
 impl Mode {
-    /// Creates a slosh mode. `mass` has the modal mass m, its first moment m h and its second moment m h^2, where h is
-    /// the height of the slosh mass above the liquid's centre of mass at `z_cg`.
+    /// Creates slosh mode number `n`. `mass` has the modal mass m, its first moment m h and its
+    /// second moment m h^2, where h is the height of the slosh mass above the liquid's centre of
+    /// mass at `z_cg`. `m_liq` is the mass of the liquid, kg.
     pub(crate) fn new(
         n: usize,
         lambda: f64,
@@ -332,8 +369,9 @@ impl Mode {
 }
 
 impl ModalData {
-    /// Creates the modal data of a tank. `inertias` are, in this order, the inertia of the rigid liquid across the axis
-    /// about the centre of mass, the inertia of the rigid liquid about the axis, and the effective inertia across the axis.
+    /// Creates the modal data of a tank. `inertias` are, in this order, the inertia of the rigid
+    /// liquid across the axis about the centre of mass, the inertia of the rigid liquid about the
+    /// axis, and the effective inertia across the axis, all in kg·m².
     pub(crate) fn new(
         kind: &'static str,
         rho: f64,
@@ -359,9 +397,9 @@ impl ModalData {
         }
     }
 
-    /// Sets the numerical errors of all results. The error of the rigid liquid's inertia, I_0 = I_eff - (sum m_n
-    /// h_n)^2/m_0 - sum m_n h_n^2, follows by error propagation: its derivatives with respect to I_eff, sum m_n h_n and
-    /// m_0 are 1, 2 h_0 and h_0^2.
+    /// Sets the numerical errors of all results. The error of the fixed mass's inertia, which is
+    /// I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2, follows by error propagation: its
+    /// derivatives with respect to I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
     pub(crate) fn set_error(&mut self, error: f64, error_beta: f64) {
         (self.error, self.error_beta) = (error, error_beta);
         let axes = self.axes.iter().flat_map(|axes| axes.x.rest.iter().chain(&axes.y.rest));
@@ -376,8 +414,10 @@ impl ModalData {
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
 
-    /// Returns the natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or (`along_y`)
-    /// second side. If the data have [`Capillarity`], returns its frequencies instead, `None` where no formula is valid.
+    /// Returns the natural frequencies of the modes, Hz, at the specific force `gravity`, m/s². For
+    /// a box they are those along its first side, or along its second side if `along_y` is true. If
+    /// the data have [`Capillarity`], its frequencies are returned instead; they are `None` if no
+    /// formula is valid.
     pub fn frequencies(&self, gravity: f64, along_y: bool) -> Vec<Option<f64>> {
         let omegas: Vec<Option<f64>> = match (&self.capillarity, &self.axes) {
             (Some(found), _) => {
@@ -412,9 +452,10 @@ impl ModalData {
     }
 }
 
-/// Returns the fixed mass m_0, its height H_0 and its inertia I_0, which remain after the masses m_n of all modes at
-/// the heights H_n are subtracted from the liquid: m_0 = m_liq - sum m_n, m_0 H_0 = m_liq z_cg - sum m_n H_n, and, with
-/// heights from z_cg, I_0 = I_eff - m_0 H_0^2 - sum m_n H_n^2.
+/// Returns the fixed mass, which remains after the slosh masses m_n of all `modes` at the heights
+/// H_n are subtracted from the liquid. Its mass is m_0 = m_liq - sum m_n; its height H_0 follows
+/// from m_0 H_0 = m_liq z_cg - sum m_n H_n; and with heights from z_cg its inertia is I_0 = I_eff -
+/// m_0 H_0^2 - sum m_n H_n^2.
 pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest {
     let m_0 = m_liq - modes.iter().map(|m| m.m).sum::<f64>();
     let h_0 = if m_0 == 0.0 { 0.0 } else { -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0 };
@@ -427,8 +468,9 @@ struct Approximation {
     i_eff: f64,
 }
 
-/// Returns the orders (numbers of Gauss points per panel) of the discretisations that are compared; the first order serves
-/// only to estimate the error. With `panels` panels the discretisation of the largest order has at most about 800 unknowns.
+/// Returns the numbers of Gauss points per panel of the discretisations that are compared. The
+/// first discretisation serves only to estimate the error. The largest one of `panels` panels has
+/// at most about 800 unknowns.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -443,8 +485,8 @@ const WANTED: f64 = 2e-7;
 const ENOUGH: f64 = 1e-6;
 const WORST: f64 = 1e-2;
 const ROUNDING: f64 = 1e-10;
-/// Rounding error of beta. It is larger than the rounding errors of other quantities, because the integrand of beta is
-/// not smooth at corners.
+/// Estimated rounding error of `beta`. It is larger than the rounding errors of other quantities,
+/// because the integrand of `beta` is not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
 struct Pair {
@@ -453,8 +495,9 @@ struct Pair {
     error_beta: f64,
 }
 
-/// Returns the best approximation and its estimated errors, on the usual panels or, if the usual panels are not
-/// accurate enough, on shorter panels.
+/// Returns the best approximation for the first `modes` modes and its estimated errors. Shorter
+/// panels are used if the usual panels are not accurate enough. `rho` is the density of the liquid,
+/// kg/m³.
 fn pair(wall: &Wall, volume: &Volume, rho: f64, modes: usize) -> Option<Pair> {
     let usual = pair_on(wall, volume, rho, modes, false);
     if usual.as_ref().is_some_and(|pair| pair.error < ENOUGH) {
@@ -486,15 +529,17 @@ fn pair_on(wall: &Wall, volume: &Volume, rho: f64, modes: usize, fine: bool) -> 
     })
 }
 
-/// Estimates the error from the last two differences between discretisations: the geometric mean of `before`, `last`
-/// and `last`, or `last` if that is larger. `last` by itself is not a bound, because convergence is irregular and two
-/// discretisations may agree by chance. The more suddenly the difference falls, the farther the mean stays above it.
+/// Estimates the error of a result from the last two differences between discretisations, `before`
+/// and `last`: the geometric mean of `before`, `last` and `last`, or `last` if this is larger.
+/// `last` by itself is not a bound, because convergence is irregular and two discretisations may
+/// agree by chance. The more suddenly the difference falls, the farther the mean stays above it.
 fn estimate(before: f64, last: f64) -> f64 {
     last.max((before * last * last).cbrt())
 }
 
-/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. If `wall` is the wall of a full closed
-/// tank, there is no free surface, and the result has only the effective inertia and no modes.
+/// Solves for the first `modes` modes of a liquid of the density `rho`, kg/m³, above `wall`. `fill`
+/// is the height of the surface above the lowest point, m. For the wall of a full closed tank,
+/// which has no free surface, the result has no modes, but the effective inertia.
 ///
 /// # Errors
 /// If the estimated error is above 1e-2.
@@ -519,9 +564,11 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<Mod
     Ok(data)
 }
 
-/// Returns twice the largest differences between two discretisations, as defined at [`ModalData::error`]. The factor 2
-/// is needed because results at weak corners converge only with the fourth power of the order: with orders 12 and 16
-/// the error of the finer discretisation is then 0.46 of the difference, with orders 20 and 24 0.93.
+/// Returns twice the largest differences between two discretisations, relative to the references of
+/// [`ModalData::error`]: for all values except `beta`, and for `beta`. The factor 2 is needed
+/// because results at weak corners converge only with the fourth power of the order: with orders 12
+/// and 16 the error of the finer discretisation is 0.46 of the difference, with orders 20 and 24 it
+/// is 0.93.
 fn difference(a: &Approximation, b: &Approximation, r: f64, m_liq: f64) -> (f64, f64) {
     let mut error = (a.i_eff - b.i_eff).abs() / (m_liq * r * r);
     let mut error_beta: f64 = 0.0;
@@ -597,8 +644,9 @@ fn approximate(
 mod tests {
     use super::*;
 
-    /// The stated error is twice the difference of two discretisations, divided by a reference quantity: lambda and beta
-    /// by their own values, masses by the liquid's 5 kg, moments by 5 kg times R = 2 m, waves by R, inertias by 5 kg R^2.
+    /// The stated error is twice the difference of two discretisations, divided by a reference:
+    /// lambda and beta by their own values, masses by the liquid's 5 kg, moments by 5 kg times R =
+    /// 2 m, waves by R, inertias by 5 kg R^2.
     #[test]
     fn each_stated_error_is_relative_to_its_reference_quantity() {
         let approximation = |change: &dyn Fn(&mut Mode)| {
@@ -657,9 +705,10 @@ mod tests {
         assert!((found.error / expected - 1.0).abs() < 1e-6, "{:e} {expected:e}", found.error);
     }
 
-    /// Solves random contours of lines, splines and ellipses, with corners, at random fills and numbers of modes. Returns
-    /// the true errors divided by the stated errors. The true values come from panels of half the length, which have no
-    /// point in common with the tested panels. Contours that the halved panels do not resolve are skipped.
+    /// Solves random contours of lines, splines and ellipses with corners, at random fills and for
+    /// random numbers of modes. Returns the true errors divided by the stated errors. The true
+    /// values come from panels of half the length, which have no point in common with the tested
+    /// panels. Contours that the halved panels do not resolve are skipped.
     fn errors_over_stated_ones(seeds: core::ops::Range<u64>) -> Vec<f64> {
         seeds.filter_map(error_over_stated_one).collect()
     }
@@ -722,8 +771,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// If only twice the last difference between discretisations were stated as the error, the true error would be 0.74
-    /// (seed 7) and 0.99 (seed 114) of the stated error, which leaves no margin.
+    /// With twice the last difference alone as the stated error, the true error would be 0.74 (seed
+    /// 7) and 0.99 (seed 114) of it, which leaves no margin.
     #[test]
     fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -4,11 +4,13 @@ use crate::curve::{Curve, Point, Segment, add, cross, dot, norm, sub};
 
 pub(crate) type Corner = usize;
 
-/// Part of a segment with its own coordinate v = 0..1. The curve's parameter, counted from the segment's end if `end`
-/// is true and otherwise from its start, is s = s0 + length v^gamma.
+/// Part of a segment of the boundary over which the solution is smooth, with its own coordinate v =
+/// 0..1. The curve's parameter, counted from the segment's end if `end` is true and otherwise from
+/// its start, is `s0` + `length` v^gamma.
 ///
-/// At a corner of interior angle al the velocity potential behaves as rho^nu, nu = pi/al, where rho is the distance
-/// from the corner. With gamma > 1 it is a smooth function of v, and so are the singular parts of all kernels.
+/// At a corner with the interior angle al of the liquid, the potential behaves as rho^nu with nu =
+/// pi/al and the distance rho from the corner. If gamma is large enough, it is a smooth function of
+/// v, and so are the singular parts of all kernels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
     pub(crate) segment: usize,
@@ -19,8 +21,13 @@ pub(crate) struct Panel {
     pub(crate) nu: f64,
 }
 
-/// A point `p` of the boundary with its data for the integral equation: unit normal `n` out of the liquid, `speed` ds/dv, m,
-/// the curve's parameter `t` and its distances from the segment's ends, and the vector `offset` from the nearer end, `corner`.
+/// A point of the boundary with its data for the integral equation.
+///
+/// - `p`, `n`: position, and unit normal out of the liquid.
+/// - `speed`: derivative ds/dv of the arc length with respect to the panel's coordinate, m.
+/// - `t`, `from_start`, `to_end`: parameter of the curve, and its distances from the two ends of
+///   the segment.
+/// - `corner`, `offset`: the nearer end of the segment, and the vector from this end to the point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryPoint {
     pub(crate) p: Point,
@@ -34,9 +41,12 @@ pub(crate) struct BoundaryPoint {
     offset: Point,
 }
 
-/// Segments of the wall, and after them the free surface, counter-clockwise in (r, z). `surface` is the index of the
-/// free surface; without a free surface it is the number of segments. `ends` are exact on the axis. `grading` holds
-/// (gamma, nu) at the start and at the end of every segment.
+/// Boundary of the liquid: the segments of the wall, and after them the free surface,
+/// counter-clockwise in (r, z).
+///
+/// - `surface`: index of the free surface; without a free surface the number of segments.
+/// - `ends`: ends of every segment, exactly on the axis where they belong there.
+/// - `grading`: exponents (gamma, nu) at the start and at the end of every segment, see [`Panel`].
 #[derive(Clone, Debug)]
 pub(crate) struct Boundary {
     pub(crate) segments: Vec<Segment>,
@@ -46,8 +56,8 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    /// Creates the boundary from `wall`, which is cut at the free surface, and runs from the axis or the inner contact
-    /// line to the outer contact line.
+    /// Creates the boundary of the liquid from the wetted wall, which runs from the axis or the
+    /// inner contact line to the outer contact line.
     pub(crate) fn new(wall: &[Segment]) -> Boundary {
         let mut segments = wall.to_vec();
         let (inner, outer) = (wall[0].start(), wall[wall.len() - 1].end());
@@ -116,8 +126,8 @@ impl Boundary {
         }
     }
 
-    /// Returns the vector y - x between two points of the boundary. It has full relative accuracy
-    /// even if both are near a corner.
+    /// Returns the vector y - x between two points of the boundary, to full relative accuracy even
+    /// if both are near a corner.
     pub(crate) fn difference(&self, x: &BoundaryPoint, y: &BoundaryPoint) -> Point {
         if x.segment == y.segment {
             let segment = &self.segments[x.segment];
@@ -132,9 +142,10 @@ impl Boundary {
         }
     }
 
-    /// Returns the place on the panel that is nearest to the point x, as the fraction s = v^gamma of its length (which
-    /// may lie outside 0..1), and the distance of x from it, divided by the local length element ds. `w` is x minus the
-    /// start of the panel.
+    /// Returns the place on the panel that is nearest to a point x, and its distance from x. The
+    /// place is a fraction v^gamma of the panel's length, which may lie outside 0..1; the distance
+    /// is divided by the local length element ds. `w` is the vector from the start of the panel to
+    /// x.
     pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
         let segment = &self.segments[panel.segment];
         let run = (segment.to - segment.from).signum();
@@ -157,15 +168,16 @@ impl Boundary {
         [s, norm(residual) / norm(slope)]
     }
 
-    /// Returns true at the axis, where the two ends of the boundary are different points.
+    /// Returns `true` if the corner lies on the axis, where the two ends of the boundary are
+    /// different points.
     fn is_on_axis(&self, corner: Corner) -> bool {
         corner == 0 && self.ends[0][0][0] == 0.0
     }
 
-    /// Cuts the boundary into panels over which the solution is smooth. No panel turns by more than 60 degrees. No
-    /// panel is long compared with the free surface, with the panel's distance from the free surface, with its distance
-    /// from another part of the boundary, or with its neighbours. The panels resolve `modes` modes. `fine` gives
-    /// shorter panels, for contours with details that the usual panels do not resolve.
+    /// Cuts the boundary into panels over which the solution is smooth, for `modes` modes. No panel
+    /// turns by more than 60 degrees. No panel is long compared with the free surface, with its
+    /// distance from the free surface or from another part of the boundary, or with its neighbours.
+    /// `fine` gives shorter panels, for contours with details that the usual panels do not resolve.
     pub(crate) fn panels(&self, modes: usize, fine: bool) -> Vec<Panel> {
         // In a thin layer or a cusp, short panels would be too many, so that longer panels are allowed.
         let (width, many) = if fine { (0.6 * WIDTH, 2 * MANY) } else { (WIDTH, MANY) };
@@ -191,8 +203,9 @@ impl Boundary {
         panels.iter().flat_map(halves).collect()
     }
 
-    /// Returns panels that are at most `gap` times as long as their distance from another part of the boundary, and, on
-    /// the free surface, at most `width` of its width. `None` if there would be more than `many` panels.
+    /// Returns panels that are at most `gap` times as long as their distance from another part of
+    /// the boundary. On the free surface they are at most `width` of its width. The result is
+    /// `None` if there would be more than `many` panels.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
         let (longest, z_surface) = match self.ends.get(self.surface) {
@@ -275,13 +288,14 @@ impl Boundary {
 const FEW: usize = 12;
 const MANY: usize = 36;
 const WIDTH: f64 = 0.35;
-/// Exponent gamma that concentrates points towards an apex on the axis. The potential near an apex is a power of the
-/// distance with an exponent between 0.8 and 2, except for very slender cones.
+/// Exponent gamma that concentrates points near an apex on the axis. The potential near an apex is
+/// a power of the distance with an exponent between 0.8 and 2, except for very slender cones.
 const APEX: f64 = 4.0;
 
-/// Returns gamma and nu = pi/al at a corner between two directions of travel. gamma is a whole number, so that the
-/// curve is an analytic function of v, and gamma nu is at least 6. A contour of `many` short segments turns only little
-/// at each joint; such weak corners get a smaller gamma, because they need no panels of their own.
+/// Returns the exponents gamma and nu (see [`Panel`]) at a corner between the directions of travel
+/// `before` and `after`. gamma is a whole number, so that the curve is an analytic function of v,
+/// and gamma nu is at least 6. A contour of `many` short segments turns only little at each joint;
+/// such weak corners get a smaller gamma, because they need no panels of their own.
 fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
@@ -340,9 +354,9 @@ mod tests {
         vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
     }
 
-    /// A corner where the liquid has an angle of pi/2 has nu = 2, and a re-entrant corner with 3 pi/2 has nu = 2/3. At
-    /// a jump of the curvature the potential has a term rho^2 log rho, which is smooth if rho is proportional to v^3. A
-    /// cusp gets the largest gamma. Weak corners between many short segments get a smaller gamma.
+    /// A corner where the liquid has an angle of pi/2 has nu = 2, and a re-entrant corner with 3
+    /// pi/2 has nu = 2/3. At a jump of the curvature the potential has a term rho^2 log rho, which
+    /// is smooth if rho is proportional to v^3. A cusp gets the largest gamma.
     #[test]
     fn corners_are_graded_by_their_angle() {
         let at = |degrees: f64, many: bool| {
@@ -369,9 +383,9 @@ mod tests {
         assert_eq!(at(1.0, false).0, 6.0);
     }
 
-    /// The test checks four properties: the points of each panel lie between its ends, and panels follow one another along the
-    /// boundary; ds/dv is the derivative of the arc length; normals point outwards; the lengths of the panels add up to the
-    /// length of the boundary.
+    /// The points of each panel lie between its ends, and panels follow one another along the
+    /// boundary; ds/dv is the derivative of the arc length; normals point outwards; the lengths of
+    /// the panels add up to the length of the boundary.
     #[test]
     fn panels_follow_one_another_along_the_whole_boundary() {
         let cap = 0.8 * 20f64.to_radians().cos();
@@ -443,9 +457,8 @@ mod tests {
         }
     }
 
-    /// The foot of a point near an arc has the same polar angle as the point, and its distance is measured along the
-    /// arc; near a line, it is measured along the line. Each of the four iterations reduces the error to the ratio of
-    /// distance to radius, 1e-1.
+    /// The nearest place to a point near an arc has the same polar angle as the point. Each of the
+    /// four iterations reduces the error to the ratio of distance to radius, 1e-1.
     #[test]
     fn the_nearest_place_on_a_panel_is_found_for_every_point() {
         for wall in [sphere(), ring(), step()] {
@@ -465,8 +478,6 @@ mod tests {
         }
     }
 
-    /// A full sphere needs only three panels of 60 degrees, because its panels are close neither to each other nor to a
-    /// free surface.
     #[test]
     fn a_full_sphere_has_three_panels() {
         let boundary = Boundary::new(&[Segment::arc([0.0, 0.0], 1.0, -90.0, 90.0)]);

@@ -18,16 +18,18 @@ use crate::table::{format_length, significant};
 use crate::tank::{Fill, Geometry, Shape, Tank};
 use crate::{damping, modal};
 
-/// Largest contribution of capillarity to the stiffness of mode 1, relative to gravity, at which the coefficients of
-/// finite amplitude are used.
+/// Largest contribution of capillarity to the stiffness of the first mode, relative to gravity, at
+/// which the coefficients of finite amplitude are used.
 const MOST_CAPILLARY: f64 = 0.1;
 
-/// Surface tension divided by density, m3/s2, assumed for a liquid whose surface tension is not given: the value of water,
-/// the largest of common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
+/// Surface tension divided by density, m³/s², that is assumed for a liquid whose surface tension is
+/// not given. It is the value of water, the largest of common liquids (hydrazine 6.6e-5, MMH
+/// 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
 const LARGEST_TENSION: f64 = 7.3e-5;
 
-/// The FMU for which the parameters are written. HubSlosh gets a table of modes (`slosh.source = table`) and keeps the
-/// tank's position on the hub, `tank.r`; in Spacecraft the tank has a number from 1 to 4.
+/// The FMU for which the parameters are written. HubSlosh gets a table of modes (`slosh.source =
+/// table`) and keeps its parameter `tank.r`, the tank's position on the hub. In Spacecraft the tank
+/// has a number from 1 to 4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     HubSlosh,
@@ -36,8 +38,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// Returns the name that a variable of SloshTank's tank, such as `tank.mass[1]`, has in this FMU, such as
-    /// `tank[2].mass[1]`.
+    /// Returns the name of a tank's variable in this FMU. `of_sloshtank` is its name in SloshTank:
+    /// for example, `tank.mass[1]` is `tank[2].mass[1]` in Spacecraft.
     pub(crate) fn name(self, of_sloshtank: &str) -> String {
         match self {
             Target::Spacecraft { tank } => {
@@ -50,12 +52,14 @@ impl Target {
 
 /// Properties of the liquid other than its density.
 ///
-/// - `gravity`: specific force along the tank's axis, m/s², at least 0, for which damping ratios and stiffnesses are
-///   computed.
-/// - `nu`: kinematic viscosity, m2/s; without it the damping ratios are not set.
+/// - `gravity`: specific force along the tank's axis, m/s², at least 0, for which damping ratios
+///   and stiffnesses are computed.
+/// - `nu`: kinematic viscosity, m²/s; without it the damping ratios are not set.
 /// - `sigma`: surface tension, N/m; without it there is no centring stiffness.
-/// - `contact_angle`: angle between surface and wall, measured in the liquid, degrees; 90 is a flat surface.
-/// - `spin`: rate at which tank and liquid rotate together about the tank's axis, rad/s, if they do.
+/// - `contact_angle`: angle between surface and wall, measured in the liquid, degrees; 90 is a flat
+///   surface.
+/// - `spin`: rate at which tank and liquid rotate together about the tank's axis, rad/s, if they
+///   do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
     pub gravity: f64,
@@ -70,8 +74,8 @@ impl Liquid {
         Some(Fluid { rho: data.rho, sigma: self.sigma?, g: self.gravity })
     }
 
-    /// Returns a warning if no surface tension is given although it may have an effect: with [`LARGEST_TENSION`] the
-    /// Bond number would be below [`LOW_BOND`].
+    /// Returns a warning if no surface tension is given although it may matter: with
+    /// [`LARGEST_TENSION`] the Bond number would be below [`LOW_BOND`].
     fn missing_tension(&self, data: &ModalData) -> Option<String> {
         let bond = self.gravity * half_width(data).powi(2) / LARGEST_TENSION;
         let matters = self.sigma.is_none() && self.gravity > 0.0 && bond < LOW_BOND;
@@ -83,8 +87,8 @@ impl Liquid {
         })
     }
 
-    /// Returns the specific force along the axis, m/s2, below which the stiffnesses of the modes are wrong because of
-    /// surface tension. `None` if the stiffnesses hold down to 0.
+    /// Returns the specific force along the axis, m/s², below which the stiffnesses of the modes
+    /// are wrong because of surface tension, or `None` if the stiffnesses hold down to 0.
     fn lowest_gravity(&self, data: &ModalData) -> Option<f64> {
         let mode = data.modes.first()?;
         match self.sigma {
@@ -96,8 +100,8 @@ impl Liquid {
         }
     }
 
-    /// Returns true if the damping in `data` was computed with this liquid's viscosity, gravity, surface
-    /// tension and contact angle.
+    /// Returns `true` if the damping in `data` was computed with the viscosity, gravity, surface
+    /// tension and contact angle of this liquid.
     fn damped(&self, data: &ModalData) -> bool {
         let damping = data.damping.as_ref().map(|of| (of.nu, of.gravity));
         let surface = data.capillarity.as_ref().map(|of| (of.sigma, of.contact_angle));
@@ -106,13 +110,12 @@ impl Liquid {
     }
 }
 
-/// Returns the radius, m, of a tank's free surface; for a box, half of its shorter side.
+/// Returns the radius of a tank's free surface, m. For a box it is half of the shorter side.
 fn half_width(data: &ModalData) -> f64 {
     let lengths = [data.length_x, data.length_y].into_iter().flatten();
     data.r_surface.unwrap_or_else(|| 0.5 * lengths.fold(f64::INFINITY, f64::min))
 }
 
-/// Value of a parameter: a quantity in SI units, a number, or an item of an enumeration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     Real(f64),
@@ -120,10 +123,14 @@ pub enum Value {
     Item(&'static str),
 }
 
-/// Parameters under the names of an FMU's variables, and lines for the user: `notes` state the source and the accuracy
-/// of the values, `warnings` the values that were left out, and `unknown` the values so far outside the range of their
-/// formula that nobody should use them without a check. `third_order` lists the modes, counted from 1, whose
-/// coefficients of finite amplitude are among the `values`.
+/// Parameters under the names of an FMU's variables, with remarks for the user.
+///
+/// - `notes`: source and accuracy of the values.
+/// - `warnings`: values that were left out.
+/// - `unknown`: values so far outside the range of their formula that nobody should use them
+///   without a check.
+/// - `third_order`: the modes, counted from 1, whose coefficients of finite amplitude are among the
+///   `values`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     pub notes: Vec<String>,
@@ -133,8 +140,9 @@ pub struct ParameterSet {
     pub third_order: Vec<(usize, Coefficients)>,
 }
 
-/// Returns the modes with the stiffness by capillarity. It is computed by the formula for a flat surface; for the first
-/// mode of an upright cylinder with another contact angle, by the table for a curved meniscus.
+/// Returns the stiffnesses of `modes` by capillarity. They are computed by the formula for a flat
+/// surface; for the first mode of an upright cylinder with another contact angle (the second
+/// element of the pair, degrees) by the table for a curved meniscus. Warnings are added to `set`.
 fn with_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -173,7 +181,8 @@ fn with_capillarity(
     all
 }
 
-/// Returns the centring stiffnesses of the modes, N/m, 0 for a negative stiffness, because the FMUs do not accept it.
+/// Returns the centring stiffnesses of the modes by surface tension, N/m. A negative stiffness is
+/// replaced by 0, because the FMUs do not accept it. Warnings are added to `set`.
 fn springs(
     tank: &Tank,
     data: &ModalData,
@@ -206,8 +215,8 @@ fn springs(
     (1..).zip(modes.iter().zip(&all)).map(spring).collect()
 }
 
-/// Returns (axis, index) of the three modes that represent a box in Spacecraft: the first mode along each axis, and the
-/// heavier one of the two second modes.
+/// Chooses the three modes that represent a box in Spacecraft: the first mode along each axis, and
+/// the heavier one of the two second modes. Returns the axis and the index of each.
 fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     let mass = |axis: usize| axes[axis].get(1).map_or(0.0, |mode| mode.m);
     let mut chosen = vec![(0, 0), (1, 0)];
@@ -217,8 +226,8 @@ fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     chosen
 }
 
-/// Returns warnings about the surface tension of a tank's modes: formulas that are used outside their range, or a
-/// surface tension that is not given although it has an effect.
+/// Returns warnings about the surface tension of a tank's modes: a formula is used outside its
+/// range, or a surface tension that matters is not given.
 pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String> {
     match &data.capillarity {
         Some(found) => found.warnings.clone(),
@@ -226,8 +235,8 @@ pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String>
     }
 }
 
-/// Returns the natural frequencies of a tank's modes with the liquid's surface tension and contact angle, at its
-/// `gravity`; `None` if no surface tension is given.
+/// Returns the natural frequencies of a tank's modes with the surface tension, contact angle and
+/// specific force of `liquid`, or `None` if no surface tension is given.
 pub fn tank_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -254,8 +263,9 @@ pub fn tank_capillarity(
     Some(modal::Capillarity { sigma, contact_angle, gravity, bond, modes, modes_y, warnings })
 }
 
-/// Solves for the modes of a tank at a fill, and adds the results that depend on further properties of the liquid:
-/// capillarity, damping, spin, and the amplitude dependence of the first mode.
+/// Solves for `modes` modes of a tank at a fill, and adds the results that depend on further
+/// properties of the liquid: capillarity, damping, spin, and the amplitude dependence of the first
+/// mode.
 ///
 /// # Errors
 /// The errors of [`Tank::fill_height`], [`Tank::solve`], [`spin`] and [`tank_damping`].
@@ -271,10 +281,12 @@ pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<Mo
     Ok(data)
 }
 
-/// Returns the damping of a tank's modes, see [`damping::tank_damping`], with their stiffness by capillarity.
+/// Returns the damping of a tank's modes as [`damping::tank_damping`] does, and takes their
+/// stiffness by capillarity from `liquid`. `nu` is the kinematic viscosity, m²/s.
 ///
 /// # Errors
-/// If the liquid has neither gravity nor surface tension, because there is no natural frequency then.
+/// If the liquid has neither gravity nor surface tension, because there is no natural frequency
+/// then.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
@@ -289,12 +301,12 @@ pub fn tank_damping(
 }
 
 impl ParameterSet {
-    /// Returns the parameters of a tank whose modes were solved as `data`. The set has as many modes as `data` has, at
-    /// most as many as the FMU has.
+    /// Returns the parameters of a tank under the names of the FMU `target`. `data` are the solved
+    /// modes of the tank. All of them become modes of the FMU, but at most as many as the FMU has.
     ///
     /// # Errors
-    /// A tank that the FMU cannot represent (tank number above four, full tank), or a viscosity without gravity and
-    /// surface tension.
+    /// A tank that the FMU cannot represent (tank number above four, full tank), or a viscosity
+    /// without gravity and surface tension.
     pub fn new(
         tank: &Tank,
         data: &ModalData,
@@ -304,8 +316,9 @@ impl ParameterSet {
         ParameterSet::with_energy(tank, data, target, liquid, target != Target::HubSlosh)
     }
 
-    /// Returns the parameters as [`ParameterSet::new`] does. If `has_energy` is true, coefficients that give the wave's
-    /// energy are used where they are known. HubSlosh and tanks with a fill table accept only third-order coefficients.
+    /// Returns the parameters as [`ParameterSet::new`] does. If `has_energy` is true, coefficients
+    /// that also give the wave's energy are used where they are known. HubSlosh and tanks with a
+    /// fill table accept only third-order coefficients.
     pub(crate) fn with_energy(
         tank: &Tank,
         data: &ModalData,
@@ -647,7 +660,7 @@ impl ParameterSet {
         notes.chain(values).collect()
     }
 
-    /// Returns the parameters as SSV, the parameter set of SSP 1.0.
+    /// Returns the parameters as the text of an SSV file, the parameter set of SSP 1.0.
     pub fn to_ssv(&self) -> String {
         // XML forbids two hyphens in a comment.
         let notes = self.comments().map(|note| format!("  {}\n", note.replace("--", "- -")));

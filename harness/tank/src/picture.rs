@@ -225,10 +225,10 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
     }
 }
 
-/// Draws the section of the tank with its liquid and, for each mode, the free surface, scaled to equal largest
-/// elevations. For modes with more than 1 % of the mass it also draws the pendulum's hinge and slosh mass if they
-/// lie inside the drawing. The frequencies hold at the specific force `gravity`, m/s², unless the data have
-/// frequencies with surface tension.
+/// Draws the section of the tank with its liquid as SVG. For each mode it draws the free surface,
+/// scaled to equal largest elevations, and, if the mode has more than 1 % of the mass and the
+/// drawing has room, hinge and slosh mass of the pendulum. The frequencies in the legend hold at
+/// the specific force `gravity`, m/s², unless the data have frequencies with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
@@ -311,8 +311,9 @@ fn three_digits(value: f64) -> String {
     if places == 12 { format!("{value:.2e}") } else { format!("{value:.places$}") }
 }
 
-/// Draws a sweep over the fill: the tank on the left, and at the same heights of the free surface the frequencies, the
-/// mass ratios and the hinges of the modes on the right.
+/// Draws a sweep over the fill as SVG: the tank on the left, and on the right the frequencies, mass
+/// ratios and hinges of the modes at the same heights of the free surface. The frequencies hold at
+/// the specific force `gravity`, m/s².
 pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
     let Some(last) = rows.last() else { return page(200.0, 60.0, "sweep", "") };

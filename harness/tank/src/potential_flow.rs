@@ -20,9 +20,11 @@ use crate::gauss::{Gauss, legendre, legendre_slopes};
 use crate::panel::{Boundary, BoundaryPoint, Panel};
 use crate::ring::potential;
 
-/// The boundary of the liquid cut into panels with `order` Gauss points each. `surface` is the index of the first point
-/// on the free surface. `projection` turns the values at the points of a panel into coefficients of Legendre
-/// polynomials, [k * order + j].
+/// Boundary of the liquid, cut into panels with `order` Gauss points each.
+///
+/// - `surface`: index of the first point on the free surface.
+/// - `projection`: matrix [k * order + j] that turns the values at the points of a panel into
+///   coefficients of Legendre polynomials.
 #[derive(Debug)]
 pub(crate) struct Discretisation {
     boundary: Boundary,
@@ -34,8 +36,11 @@ pub(crate) struct Discretisation {
     projection: Vec<f64>,
 }
 
-/// Modes and pitch function at the boundary's points: lambda_n, 1/m, ascending; phi_n, normalised to int phi_n^2 r ds =
-/// 1 over the free surface; and psi.
+/// Solution at the points of the boundary.
+///
+/// - `lambda`: eigenvalues omega_n^2/g of the modes, 1/m, ascending.
+/// - `phi`: potentials of the modes, normalised to int phi_n^2 r ds = 1 over the free surface.
+/// - `psi`: potential of the liquid if the tank rotates about a horizontal axis (pitch).
 #[derive(Debug)]
 pub(crate) struct Solution {
     pub(crate) lambda: Vec<f64>,
@@ -43,8 +48,8 @@ pub(crate) struct Solution {
     pub(crate) psi: Vec<f64>,
 }
 
-/// A part [v0, v1] of a panel with its integration points, and the values of the panel's Legendre polynomials at these
-/// points, one point after the other.
+/// A part from v0 to v1 of a panel, with its integration points, and the values of the panel's
+/// Legendre polynomials at these points, one point after the other.
 struct Part {
     v0: f64,
     v1: f64,
@@ -55,25 +60,28 @@ struct Part {
 }
 
 const PART: usize = 16;
-/// A part of a panel is integrated with Gauss points if x lies outside the Bernstein ellipse whose semi-axes have this sum.
+/// Limit of [`bernstein`]'s sum for a part of a panel. If a point x is outside the ellipse with
+/// this sum of semi-axes, the part is integrated with Gauss points; otherwise it is bisected.
 const FAR: f64 = 2.3;
-/// Limit of the same sum for a whole panel. If x lies outside the ellipse of this limit, the panel is integrated with its
-/// own points, without bisection.
+/// Limit of [`bernstein`]'s sum for a whole panel. If a point x is outside the ellipse with this
+/// sum of semi-axes, the panel is integrated with its own points, without bisection.
 const FAR_WHOLE: f64 = 3.0;
-/// Number of iterations for the eigenvectors. For a few modes each iteration reduces the slowest error component to about a
-/// third.
+/// Number of iterations for the eigenvectors. For a few modes each iteration reduces the slowest
+/// component of the error to about a third.
 const ITERATIONS: usize = 30;
-/// Number of points of the integration rule on each side of x on its own panel; [`OWN_POWER`] is the power with which
-/// the rule absorbs the logarithm.
+/// Number of integration points on each side of a point on its own panel, where the kernel has a
+/// logarithm. [`OWN_POWER`] is the power with which the points are concentrated so that the
+/// logarithm is integrated exactly.
 const OWN: usize = 20;
 const OWN_POWER: i32 = 5;
-/// Longest interval of v over which the rule with [`OWN`] points integrates. It is limited because the density is a
-/// polynomial of degree order - 1.
+/// Longest interval of the panel's coordinate over which [`OWN`] points integrate. It is limited
+/// because the density is a polynomial of the degree order - 1.
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
-    /// Discretises the liquid above a wall for `modes` modes. The wall runs from the axis or the inner
-    /// contact line to the outer one. `fine` uses more and shorter panels.
+    /// Discretises the boundary of the liquid for `modes` modes, with `order` Gauss points per
+    /// panel. `wall` runs from the axis or the inner contact line to the outer contact line. `fine`
+    /// uses more and shorter panels.
     pub(crate) fn new(wall: &[Segment], modes: usize, order: usize, fine: bool) -> Discretisation {
         let boundary = Boundary::new(wall);
         let panels = boundary.panels(modes, fine);
@@ -133,7 +141,8 @@ impl Discretisation {
         self.points.iter().map(|x| x.p[0]).collect()
     }
 
-    /// Returns the normal velocity, at all points, of the boundary rotating at 1 rad/s about (0, `z0`).
+    /// Returns the normal velocity at all points of the boundary, m/s, if the tank rotates at 1
+    /// rad/s about a horizontal axis at the height `z0`, m.
     pub(crate) fn pitch(&self, z0: f64) -> Vec<f64> {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
@@ -142,8 +151,9 @@ impl Discretisation {
         self.surface..self.points.len()
     }
 
-    /// Solves for the first `modes` modes, and for psi with the normal velocity `pitch`. Returns `None` if the matrix
-    /// cannot be solved. For m = 1 the operator is regular, so that this happens only if the panels are unusable.
+    /// Solves for the first `modes` modes, and for the pitch potential with the normal velocity
+    /// `pitch` at all points. Returns `None` if the matrix cannot be solved. The operator is
+    /// regular, so that this happens only if the panels are unusable.
     pub(crate) fn solve(&self, modes: usize, pitch: &[f64]) -> Option<Solution> {
         let count = self.len();
         let surface = self.surface_range();
@@ -194,8 +204,9 @@ impl Discretisation {
         Some(Solution { lambda, phi, psi })
     }
 
-    /// Assembles the matrices of the boundary integral equation: 1/2 + D with the double layer D, and the single layer
-    /// S, for sources at each point of the free surface F and for the sources `q` on the whole boundary.
+    /// Assembles the matrices of the boundary integral equation: 1/2 + D with the double layer D,
+    /// and the single layer S. The sources are each point of the free surface, and the sources `q`
+    /// on the whole boundary.
     fn assemble(&self, q: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
         let (count, order) = (self.len(), self.order);
         let own = self.own_rules();
@@ -314,8 +325,10 @@ impl Discretisation {
         Part { v0, v1, points, weights, values, halves: None }
     }
 
-    /// Returns the points in the complex plane of a panel's coordinate v that the panel maps to x, and to the mirror
-    /// image of x behind the axis. The kernels are singular at both. `None` if a point is far from the panel.
+    /// Returns the points of the complex plane of a panel's coordinate that the panel maps to the
+    /// point `x`, and to the mirror image of `x` behind the axis, because the kernels are singular
+    /// there. A point is `None` if it is far from the panel. `ends` are the ends of the panel and
+    /// `length` its length, m.
     fn preimages(
         &self,
         panel: &Panel,
@@ -396,10 +409,12 @@ impl Discretisation {
         basis.iter().enumerate().map(|(k, value)| value * coefficient(k)).sum()
     }
 
-    /// Returns the integral of the squared surface gradient, int [u_s^2 + u^2/r^2] r ds, over the free surface or the
-    /// wall. The function u is given at all points, and u_s is its derivative along the contour. Near a corner u_s
-    /// behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. The integral over the last 1e-6 of the
-    /// panel therefore follows from the exponent (1 if nu > 1, where u_s has a limit).
+    /// Returns the integral of the squared surface gradient of the function `u`, int [u_s^2 +
+    /// u^2/r^2] r ds, over the free surface if `on_surface` is true and otherwise over the wall.
+    /// `u` is given at all points, and u_s is its derivative along the contour. Near a corner u_s
+    /// behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. Therefore the
+    /// integral over the last 1e-6 of the panel follows from the exponent (1 if nu > 1, where u_s
+    /// has a limit).
     pub(crate) fn gradient(&self, u: &[f64], on_surface: bool) -> f64 {
         let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];
@@ -431,7 +446,9 @@ impl Discretisation {
         total
     }
 
-    /// Returns the radius of the point of the free surface where |u| is largest, and u there, with its sign.
+    /// Returns the radius at which the magnitude of the function `u` is largest on the free
+    /// surface, and the value of `u` there, with its sign. `u` is given at all points of the
+    /// boundary.
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];
@@ -449,8 +466,9 @@ impl Discretisation {
         best
     }
 
-    /// Returns the function `u`, given at all points, along the free surface as (r, value) with `dense` intervals per
-    /// panel, from the outer contact line to the axis or to the inner contact line, including both ends.
+    /// Interpolates the function `u`, which is given at all points, along the free surface. Returns
+    /// pairs of radius and value from the outer contact line to the axis or to the inner contact
+    /// line, both included, with `dense` intervals per panel.
     pub(crate) fn along_surface(&self, u: &[f64], dense: usize) -> Vec<[f64; 2]> {
         let first = self.surface / self.order;
         let mut all = Vec::new();
@@ -498,8 +516,9 @@ struct OwnRule {
     values: Vec<f64>,
 }
 
-/// Returns the sum of the semi-axes of the ellipse that has its foci at the ends of [v0, v1] and passes through a point
-/// of the complex plane, divided by half of the length. The error of n Gauss points falls as this sum to the power -2n.
+/// Returns the sum of the semi-axes of the Bernstein ellipse through `point`, a point of the
+/// complex plane. The ellipse has its foci at v0 and v1, and its size is divided by half of their
+/// distance. The error of n Gauss points falls as this sum to the power -2n.
 fn bernstein(point: [f64; 2], v0: f64, v1: f64) -> f64 {
     let half = 0.5 * (v1 - v0);
     let x = (point[0] - 0.5 * (v0 + v1)) / half;
@@ -533,8 +552,8 @@ mod tests {
         |[r, z]| (r * (4.0 * z * z - r * r), [4.0 * z * z - 3.0 * r * r, 8.0 * r * z]),
     ];
 
-    /// Green's third identity holds to the quadrature error of 16 points per panel. At the step's inner edge, where r
-    /// behaves as v^9, a cubic in r is a polynomial of degree 27 in v.
+    /// Green's third identity holds to the quadrature error of 16 points per panel. At the step's
+    /// inner edge, where r behaves as v^9, a cubic in r is a polynomial of degree 27 in v.
     #[test]
     fn harmonic_functions_satisfy_the_integral_equation() {
         for wall in walls() {
@@ -561,8 +580,9 @@ mod tests {
         }
     }
 
-    /// r cos theta is a uniform flow, whose int [u_s^2 + u^2/r^2] r ds over the free surface and the walls is known by hand.
-    /// Near the step's inner edge the last 1e-6 of a panel counts three times, as it should for a flow around the edge.
+    /// r cos theta is a uniform flow, whose int [u_s^2 + u^2/r^2] r ds over the free surface and
+    /// the walls is known by hand. Near the step's inner edge the last 1e-6 of a panel counts three
+    /// times, as it should for a flow around the edge.
     #[test]
     fn the_surface_gradient_of_a_uniform_flow_is_exact() {
         let (sin, cos) = 20f64.to_radians().sin_cos();
@@ -600,7 +620,7 @@ mod tests {
         }
     }
 
-    /// The wave r (1 − r²/(3 b²)) has its maximum at r = b, which is not a node of the mesh.
+    /// The wave r (1 − r²/(3 b²)) has its maximum at r = b, which is not a point of the mesh.
     #[test]
     fn the_surface_s_largest_elevation_is_found_between_points() {
         for (wall, b) in walls().iter().zip([0.5, 0.61, 1.2]) {
@@ -626,8 +646,8 @@ mod tests {
         assert_eq!([bernstein([1.0, 0.0], 1.0, 3.0), bernstein([2.5, 0.0], 1.0, 3.0)], [1.0; 2]);
     }
 
-    /// Integrates v^k log|v - x| for k = 0 and 1, and polynomials. With 20 points on each side of x, stretched by the
-    /// fifth power, the error of the logarithm is 1e-12.
+    /// Integrates v^k log|v - x| for k = 0 and 1, and polynomials. With 20 points on each side of
+    /// x, concentrated by the fifth power, the error of the logarithm is 1e-12.
     #[test]
     fn quadrature_on_a_panel_with_a_logarithmic_singularity_is_exact() {
         let mesh = Discretisation::new(&walls()[0], 3, 12, false);
@@ -659,9 +679,9 @@ mod tests {
         }
     }
 
-    /// The preimages of a point and of its mirror image behind the axis, in the coordinate v of a panel: v^gamma is
-    /// the foot point on the panel plus i times the distance divided by the length. The tested points are too close
-    /// for the panel's own points.
+    /// For a point and its mirror image behind the axis, v^gamma is the nearest place on the panel
+    /// plus i times the distance divided by the length. The tested points are too close for the
+    /// panel's own points.
     #[test]
     fn the_preimage_of_a_point_under_a_panel_s_map_is_found() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);

@@ -10,7 +10,8 @@
 //!
 //!   Q = chi k K - (2/k) E,        Q' = (k/2) [K - chi E/(chi - 1)]        (DLMF 14.5(v), 14.10.4).
 
-/// Number of terms of the series in 1/chi^2. At chi = 3 the truncation error is below 1e-16.
+/// Number of terms of the series of the Legendre function in 1/chi^2. At chi = 3 the terms that are
+/// left out are below 1e-16.
 const TERMS: usize = 17;
 
 const SERIES: [f64; TERMS] = {
@@ -44,8 +45,8 @@ fn elliptic(kc: f64) -> (f64, f64) {
     }
 }
 
-/// Returns the Legendre function of the second kind Q_1/2 and its derivative at chi = 1 + `x` with x > 0. The relative
-/// error is below 1e-13.
+/// Returns the Legendre function of the second kind Q_1/2 and its derivative at chi = 1 + `x` with
+/// x > 0. The relative error is below 1e-13.
 pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     let chi = 1.0 + x;
     if x > 2.0 {
@@ -64,8 +65,8 @@ pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     (chi * k * big_k - 2.0 / k * big_e, 0.5 * k * (big_k - chi / x * big_e))
 }
 
-/// Returns the potential g(x, y) at the point x of a ring source through y, and its derivative dg/dn along the normal
-/// at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the normal at y.
+/// Returns the potential at a point x of a ring source through a point y, and its derivative along
+/// the normal `n` at y. `r` and `ry` are the radii of x and y, m, and `d` is the vector y - x.
 pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64) {
     let rr = r * ry;
     let x = (d[0] * d[0] + d[1] * d[1]) / (2.0 * rr);
@@ -79,8 +80,9 @@ pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64)
 mod tests {
     use super::*;
 
-    /// The reference is Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt by the trapezoidal rule, which converges
-    /// geometrically for a periodic integrand: at chi >= 1.05 it is exact to rounding with 2000 points.
+    /// The reference is Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt by the trapezoidal rule, which
+    /// converges geometrically for a periodic integrand: at chi >= 1.05 it is exact to rounding
+    /// with 2000 points.
     #[test]
     fn the_legendre_function_equals_its_integral() {
         for x in [0.05, 0.5, 1.0, 1.9999, 2.0001, 5.0, 100.0] {

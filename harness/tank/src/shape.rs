@@ -9,14 +9,14 @@ use crate::contour::Wall;
 use crate::curve::{Point, Segment, norm, sub};
 use crate::tank::Shape;
 
-/// Largest distance of the wetted wall from a sphere, cylinder, cone or torus, relative to its size, at which the wall
-/// counts as this shape.
+/// Largest distance of a wetted wall from a sphere, cylinder, cone or torus, relative to its size,
+/// at which the wall counts as this shape.
 const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
 
-/// The shape of a wetted wall whose shape is one of those with measured damping, and the fill, m above the lowest point.
-/// The shape is made high enough for the fill.
+/// A wetted wall with a shape whose damping was measured. The shape is made high enough for the
+/// fill `fill`, m above the lowest point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
     pub shape: Shape,
@@ -39,8 +39,9 @@ impl Recognised {
     }
 }
 
-/// Recognises a wetted wall as a sphere, upright cylinder, cone or torus. `fill` is the height of the free
-/// surface above the lowest point, m.
+/// Recognises a wetted wall as a sphere, upright cylinder, cone or torus, because only for these
+/// shapes was the damping measured. `fill` is the height of the free surface above the lowest
+/// point, m. Returns `None` for any other wall.
 pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     let points = sample_points(wall, PLACES);
     let cut = Cut::from_whole_wall(&points, fill)?;
@@ -51,22 +52,26 @@ pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     })
 }
 
-/// A part of the wetted wall that has one of the shapes whose damping was measured. Parts are listed upwards from the
-/// lowest point of the tank. A part has the depth of liquid up to which the wall has this shape, and the part's share of
-/// the wetted area.
+/// A part of the wetted wall that has a shape whose damping was measured. Parts are listed upwards
+/// from the lowest point of the tank.
+///
+/// - `found`: the shape, with the depth of liquid up to which the wall has this shape.
+/// - `share`: the part's share of the wetted area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
     pub found: Recognised,
     pub share: f64,
 }
 
-/// Returns the shapes with measured damping (sphere, cylinder, cone, torus) that a wetted wall has in part, each with
-/// its share. `fill` is the height of the free surface above the lowest point, m.
+/// Returns the shapes with measured damping (sphere, cylinder, cone, torus) that parts of a wetted
+/// wall have, each with its share. `fill` is the height of the free surface above the lowest point,
+/// m.
 ///
-/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its lowest point and the
-/// contact line that it would have there. The share of a shape is 1 if the wall deviates by less than 1e-6 of its
-/// size, and 0 from the deviation [`FAR`] on. A smooth step between these deviations makes the result continuous in
-/// the fill and in the shape of the tank.
+/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its
+/// lowest point and the contact line that it would have at this height. The share of a shape is 1
+/// if the wall deviates by less than 1e-6 of its size, and 0 from the deviation [`FAR`] on. A
+/// smooth step between these deviations makes the result continuous in the fill and in the shape of
+/// the tank.
 pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     let places = (SAMPLES / wall.segments.len()).clamp(2, PLACES);
     let points = sample_points(wall, places);
@@ -91,8 +96,9 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     found
 }
 
-/// Returns the measured shapes that are similar to the whole wetted wall. The share of a shape falls from 1 for an
-/// exact wall to 0 at the distance [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
+/// Returns the measured shapes that are similar to the whole wetted wall. The share of a shape
+/// falls from 1 for an exact wall to 0 at the distance [`NEAR`]. `fill` is the height of the free
+/// surface above the lowest point, m.
 pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sample_points(wall, PLACES);
     let Some(cut) = Cut::from_whole_wall(&points, fill) else { return Vec::new() };
@@ -110,12 +116,13 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     KINDS.into_iter().filter_map(of_kind).collect()
 }
 
-/// Distance of the wall from a shape, relative to the wall's size, from which on it does not count as this shape.
+/// Distance of a wall from a shape, relative to the wall's size, from which on the wall does not
+/// count as this shape.
 const FAR: f64 = 0.01;
 
-/// Distance of the wall from a shape, relative to the smaller of depth and largest radius, from which on the wall
-/// does not count as similar to this shape. A spheroid that differs by a few per cent from a sphere dissipates as
-/// much as the sphere.
+/// Distance of a wall from a shape, relative to the smaller of depth and largest radius, from which
+/// on the wall does not count as similar to this shape. For example, a spheroid that differs by a
+/// few per cent from a sphere dissipates as much as the sphere.
 const NEAR: f64 = 0.1;
 
 const LEAST: f64 = 0.02;
@@ -129,8 +136,9 @@ fn sample_points(wall: &Wall, places: usize) -> Vec<Point> {
     wall.segments.iter().flat_map(on).collect()
 }
 
-/// The part of a wall below a level: the radii of its contact lines, m (`inner` is `None` if the wall begins on the
-/// axis), the height of its lowest point, m from the contour's own zero, and the depth at the level, m.
+/// The part of a wall below a level: the radii of its contact lines, m (`inner` is `None` if the
+/// wall begins on the axis), the height `bottom` of its lowest point, m from the zero of the
+/// contour, and the depth at the level, m.
 #[derive(Clone, Copy)]
 struct Cut {
     inner: Option<f64>,
@@ -184,8 +192,9 @@ impl Kind {
         }
     }
 
-    /// Returns the part of the wall that has a shape of this kind, as if there were no other kinds. `None` if its share
-    /// is at most [`LEAST`].
+    /// Returns the lower part of the wall that has a shape of this kind, while other kinds are
+    /// disregarded. `points` are points of the wall, and `fill` is the height of the free surface
+    /// above the lowest point, m. Returns `None` if the share of the part is at most [`LEAST`].
     fn part(self, points: &[Point], fill: f64) -> Option<Part> {
         let whole = Cut::from_whole_wall(points, fill)?;
         let lowest =
@@ -253,7 +262,8 @@ impl Kind {
     }
 }
 
-/// Returns the dimensions of a shape other than its height: radius or half angle, and the radius of a ring.
+/// Returns the dimensions of a shape except its height: radius or half angle, and the radius of a
+/// ring.
 fn dimensions(shape: &Shape) -> [f64; 2] {
     match *shape {
         Shape::Cylinder { radius, .. } | Shape::Sphere { radius } => [radius, 0.0],

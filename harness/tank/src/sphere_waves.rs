@@ -5,9 +5,10 @@
 
 use formulas::energy_terms::EnergyTerms;
 
-/// Table for spheres. Each row has the fill h/R, the coefficients kappa, s, t, kappa_2, s_2 and t_2 (see
-/// `EnergyTerms`), and the slosh angle, degrees, up to which the slosh mass was compared with potential flow. For h/R
-/// from 1.1 on the third-order theory has poles.
+/// Table of the slosh mass in spheres. Each row has the fill h/R, the coefficients kappa, s, t,
+/// kappa_2, s_2 and t_2 (see `EnergyTerms`), and the slosh angle, degrees, up to which the slosh
+/// mass was compared with potential flow. The table ends at h/R = 1.05, because from 1.1 on the
+/// third-order theory has poles.
 const ROWS: [[f64; 8]; 13] = [
     [0.10, 2.7378, 2.2305, 0.4304, 0.919, -0.149, -0.060, 12.8],
     [0.15, 2.3039, 1.9074, 0.3203, 3.372, 1.556, 0.253, 14.8],
@@ -24,14 +25,15 @@ const ROWS: [[f64; 8]; 13] = [
     [1.05, 4.4189, 3.7385, 0.8008, 7.105, 4.104, -0.210, 11.9],
 ];
 
-/// Largest relative errors of the slosh mass over all rows of the table and between the rows: of its frequency,
-/// and of its energy.
+/// Largest relative errors of the slosh mass at and between the rows of the table: of its
+/// frequency, and of its energy.
 pub(crate) const ERRORS: [f64; 2] = [5e-4, 4e-3];
 
-/// Slosh angles at which the error of a forced response near resonance reaches 3 % or 3 degrees. Each row has h/R and
-/// three angles, degrees: with third-order coefficients (the smaller angle of planar and rotary motion), with the
-/// coefficients of [`ROWS`] in planar motion, and with these in rotary motion. The damping ratio of every mode is 0.01.
-/// The tank moves along a line or on a circle, at the frequency of free waves of 9 degrees and 1 % from it
+/// Slosh angles at which the error of a forced response near resonance reaches 3 % or 3 degrees in
+/// a sphere. Each row has h/R and three angles, degrees: with third-order coefficients (the smaller
+/// angle of planar and rotary motion), with the coefficients of [`ROWS`] in planar motion, and with
+/// these in rotary motion. The damping ratio of every mode is 0.01. The tank moves along a line or
+/// on a circle, at the frequency of free waves of 9 degrees and 1 % from it
 /// (`examples/forced_waves.rs`). 14 degrees is the largest angle that was compared.
 const FORCED: [[f64; 4]; 7] = [
     [0.10, 7.1, 8.2, 8.2],
@@ -43,19 +45,18 @@ const FORCED: [[f64; 4]; 7] = [
     [1.05, 7.1, 11.8, 7.6],
 ];
 
-/// Returns the slosh angles, rad, at which the error of a forced response in a sphere filled to h/R = `fill` reaches 3
-/// %: with third-order coefficients, with [`energy_terms`] in planar motion, and with [`energy_terms`] in rotary motion.
+/// Returns the slosh angles, rad, at which the error of a forced response in a sphere filled to h/R
+/// = `fill` reaches 3 %: with third-order coefficients, with [`energy_terms`] in planar motion, and
+/// with [`energy_terms`] in rotary motion.
 pub(crate) fn forced_limits(fill: f64) -> Option<[f64; 3]> {
     let pair = FORCED.windows(2).find(|pair| (pair[0][0]..=pair[1][0]).contains(&fill))?;
     let share = (fill - pair[0][0]) / (pair[1][0] - pair[0][0]);
     Some([1, 2, 3].map(|k| (pair[0][k] + (pair[1][k] - pair[0][k]) * share).to_radians()))
 }
 
-/// Returns the coefficients that give the slosh mass the energy of a large wave in a sphere filled to h/R = `fill`;
-/// `None` if the fill is outside the rows of the table.
-///
-/// The coefficients are interpolated linearly. Frequency and energy are nearly linear in the coefficients, so that they
-/// are interpolated nearly linearly, too.
+/// Returns the coefficients that give the slosh mass the energy of a large wave in a sphere filled
+/// to h/R = `fill`, or `None` if the fill is outside the rows of the table. The coefficients are
+/// interpolated linearly, because frequency and energy are nearly linear in them.
 pub(crate) fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     let pair = ROWS.windows(2).find(|pair| (pair[0][0]..=pair[1][0]).contains(&fill))?;
     let share = (fill - pair[0][0]) / (pair[1][0] - pair[0][0]);

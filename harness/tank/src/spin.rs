@@ -34,16 +34,18 @@ use crate::contour::{Contour, Problems, bisect};
 use crate::modal::{ModalData, Spin};
 use crate::tank::{Geometry, Shape, Tank};
 
-/// Relative error of a pendulum's frequency, (1 - C) Omega/omega_0, above which a warning says that pendulums do not
-/// take part in the spin of the liquid.
+/// Largest relative error of a pendulum's frequency, (1 - C) Omega/omega_0, that is accepted
+/// without a warning. It arises because a pendulum does not take part in the spin of the liquid. C
+/// is the gyroscopic coefficient, Omega the spin rate and omega_0 the frequency without spin.
 const PENDULUM_ERROR: f64 = 0.05;
 
-/// Computes the steady rotation of the liquid of a tank, whose modes were solved as `data`, about the tank's axis at
-/// `omega`, rad/s, under the specific force `gravity`, m/s². `nu` is the kinematic viscosity, m²/s.
+/// Computes the steady rotation of the liquid of a tank about the tank's axis at `omega`, rad/s.
+/// `data` are the modes of the tank at rest, `gravity` is the specific force, m/s², and `nu` the
+/// kinematic viscosity, m²/s.
 ///
 /// # Errors
-/// A box, because it has no axis of revolution; a tank without a free surface; a rate that is not above 0; liquid that
-/// may lie in separate pools.
+/// A box, because it has no axis of revolution; a tank without a free surface; a rate that is not
+/// above 0; liquid that may lie in separate pools.
 pub fn spin(
     tank: &Tank,
     data: &ModalData,
@@ -141,7 +143,7 @@ pub fn spin(
     })
 }
 
-/// Free surface of the rotating liquid, g z - Omega^2 r^2/2 = c.
+/// Free surface of the rotating liquid: the heights z and radii r with g z - Omega^2 r^2/2 = c.
 struct Surface {
     omega: f64,
     gravity: f64,
@@ -149,8 +151,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns the surface of the rotating liquid if `contour` contains the volume `volume`, m3, of liquid. `omega` is
-    /// the rate, rad/s, `gravity` the specific force, m/s2.
+    /// Returns the surface of the rotating liquid for the volume `volume`, m³, of liquid in
+    /// `contour`. `omega` is the spin rate, rad/s, and `gravity` the specific force, m/s².
     fn with_volume(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();
@@ -162,7 +164,7 @@ impl Surface {
         }))
     }
 
-    /// Returns the square of the radius to which the liquid reaches inwards at the height z, m2.
+    /// Returns the square of the radius to which the liquid reaches inwards at the height `z`, m².
     fn inner(&self, z: f64) -> f64 {
         (2.0 * (self.gravity * z - self.c) / (self.omega * self.omega)).max(0.0)
     }

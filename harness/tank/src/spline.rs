@@ -5,15 +5,16 @@ use nalgebra::{DMatrix, DVector};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 
-/// Smallest angle between two straight pieces of the polyline, rad, at which the curve keeps a
-/// corner.
+/// Smallest angle between two straight pieces of the polyline at which the curve keeps a corner,
+/// rad.
 const CORNER: f64 = 0.7;
 
 const MANY: usize = 100;
 
-/// Fits cubic splines through the points, twice continuously differentiable between corners. A point where the polyline
-/// turns by more than 40 degrees ([`CORNER`]) is a corner. At the axis the curve is horizontal. At its other ends and
-/// at corners the third derivative is constant over the first two intervals (not-a-knot).
+/// Fits a curve of cubic splines through `points`, which is twice continuously differentiable
+/// between corners. A point where the polyline turns by more than 40 degrees ([`CORNER`]) is a
+/// corner. At the axis the curve is horizontal. At its other ends and at corners the third
+/// derivative is constant over the first two intervals (not-a-knot).
 ///
 /// # Errors
 /// Two successive points that are equal.
@@ -45,7 +46,8 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     Ok(segments)
 }
 
-/// Keeps every k-th point and both ends, with k so that `total` points give about 100 segments.
+/// Keeps both ends and every k-th of `points`, with k so that `total` points would give about 100
+/// segments, because computing time grows fast with the number of segments.
 fn thin_points(points: &[Point], total: usize) -> Vec<Point> {
     let every = total.div_ceil(MANY);
     let last = points.len() - 1;
@@ -117,7 +119,8 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
 mod tests {
     use super::*;
 
-    /// Returns value and first three derivatives by arc length of the polyline at both ends of every piece.
+    /// Returns the value and the first three derivatives, with respect to arc length of the
+    /// polyline, at both ends of every piece of the spline.
     fn derivatives(points: &[Point]) -> Vec<[[Point; 4]; 2]> {
         let pieces = spline(points).unwrap();
         let one = |(segment, p): (&Segment, &[Point])| {

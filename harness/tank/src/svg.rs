@@ -7,12 +7,14 @@ use svgtypes::{PathParser, PathSegment};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 
-/// Reads the first `<path>` of a drawing, in which the axis is at x = 0 and y points downwards; `scale` is in m per
-/// unit of the drawing. Supports lines, cubic and quadratic curves, and arcs with unrotated axes. Lines that close the
-/// path along the axis are left out.
+/// Reads the contour of a tank from the first `<path>` of an SVG drawing. In the drawing the axis
+/// is at x = 0 and y points downwards; `scale` is in m per unit of the drawing. Lines, cubic and
+/// quadratic curves, and arcs with unrotated axes are supported. Lines that close the path along
+/// the axis are left out.
 ///
 /// # Errors
-/// A file that cannot be read; a file without a path, or with a transform, rotated arcs or several subpaths.
+/// A file that cannot be read; a file without a path, or with a transform, rotated arcs or several
+/// subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
     let text = crate::contour::read_text(path)
         .map_err(|why| Problems::from(format!("{}: {why}", path.display())))?;
@@ -151,7 +153,8 @@ fn cubic_from_quadratic([a, b, c]: [Point; 3]) -> Segment {
     bezier([a, third(a, b), third(c, b), c])
 }
 
-/// Creates the arc of an ellipse from `p` to `q`, counter-clockwise if `up` is true (SVG 2, appendix B.2.4).
+/// Creates the arc of an ellipse with the radii `rx` and `ry` from `p` to `q`: the longer of the
+/// two arcs if `large` is true, and counter-clockwise if `up` is true (SVG 2, appendix B.2.4).
 fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
     let (rx, ry) = (rx.abs(), ry.abs());
     // both points in coordinates in which the ellipse is a unit circle
@@ -181,8 +184,8 @@ mod tests {
     use super::*;
     use core::f64::consts::{PI, TAU};
 
-    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs. The arcs are a quarter or three quarters of
-    /// the ellipse, about one of two centres and in either direction.
+    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs: a quarter or three
+    /// quarters of the ellipse, about one of two centres and in either direction.
     #[test]
     fn the_four_arcs_between_two_points_have_their_turns_and_centres() {
         let (p, q) = ([2.0, 0.0], [0.0, 1.0]);
@@ -209,8 +212,8 @@ mod tests {
         }
     }
 
-    /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it connects them. The
-    /// arc is then half an ellipse about the middle of the two points.
+    /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it
+    /// connects them.
     #[test]
     fn an_arc_that_is_too_small_grows() {
         let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);
@@ -219,10 +222,9 @@ mod tests {
         assert!((found.to - found.from - PI).abs() < 1e-15);
     }
 
-    /// A smooth curve begins with the mirrored last control point, or with its own start if the previous
-    /// curve is of another kind. (1, 0), (2, 1) ends with the slope (1, 1), so the next control point is (3,
-    /// 2). Horizontal and vertical lines keep the other coordinate. The test covers absolute and relative
-    /// commands, with y down.
+    /// A smooth curve begins with the mirrored last control point, or with its own start if the
+    /// previous curve is of another kind. (1, 0), (2, 1) ends with the slope (1, 1), so that the
+    /// next control point is (3, 2).
     #[test]
     fn short_svg_commands_equal_the_long_ones() {
         let read = |path: &str| segments(path, 0.5).unwrap();

@@ -7,14 +7,15 @@ use crate::modal::{ModalData, Mode, ModeDamping};
 use crate::parameters::{Liquid, tank_damping};
 use crate::tank::Tank;
 
-/// Modal parameters at ascending fills, one row each. The row of a fill without liquid or without a free surface has no modes.
+/// Modal parameters at ascending fills, one row each. The row of a fill without liquid or without a
+/// free surface has no modes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     pub rows: Vec<ModalData>,
 }
 
-/// Solves for `modes` modes at each of the `fills`, m above the lowest point. A fill of 0, and a fill without a free
-/// surface, give a row without modes.
+/// Solves for `modes` modes of a tank at each of the `fills`, m above the lowest point. A fill of
+/// 0, and a fill without a free surface, give a row without modes.
 ///
 /// # Errors
 /// The problems of all fills, listed; also fills that do not ascend.
@@ -51,10 +52,11 @@ impl Sweep {
         }
     }
 
-    /// Returns the rows as comma-separated values with a heading. Units are SI; H and hinge count from the contour's
-    /// own zero. Damping ratios with their intervals, and the third-order coefficients of mode 1 with their error and
-    /// the largest angle of their validity, rad, have columns if any row has them. Values that are not known, and modes
-    /// that a row lacks, are empty.
+    /// Returns the rows as comma-separated values with a heading, in SI units. Heights count from
+    /// the zero of the contour. Damping ratios with their intervals, and the third-order
+    /// coefficients of mode 1 with their error and the largest angle of their validity, rad, have
+    /// columns if any row has them. Values that are not known, and modes that a row lacks, are
+    /// empty.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
         let is_damped = self.rows.iter().any(|row| row.damping.is_some());

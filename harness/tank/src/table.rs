@@ -3,7 +3,8 @@
 use crate::coefficients::FiniteAmplitude;
 use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest, Spin};
 
-/// Formats a length in m to 1e-9 m without trailing zeros, because fills from a volume have 17 digits.
+/// Formats a length in m to 1e-9 m without trailing zeros, because a fill that was computed from a
+/// volume has 17 digits.
 pub(crate) fn format_length(length: f64) -> String {
     format!("{length:.9}").trim_end_matches('0').trim_end_matches('.').to_string()
 }
@@ -13,8 +14,9 @@ pub(crate) fn significant(value: f64) -> String {
     if rounded == 0.0 { "0".into() } else { rounded.to_string() }
 }
 
-/// Returns the data as text: liquid, modes, rigid liquid, and error. The frequencies are those at the specific force
-/// `gravity`, m/s², unless the data have frequencies with surface tension.
+/// Returns the modal data as a table for the terminal: liquid, modes, rigid liquid, and error. The
+/// frequencies hold at the specific force `gravity`, m/s², unless the data have frequencies with
+/// surface tension.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = Text::default();
     let (name, fill, rho) =

@@ -37,11 +37,12 @@ enum Entry {
 
 /// A tank given by its dimensions, m and degrees, with its lowest point at z = 0.
 ///
-/// - `Cylinder`: upright, with flat ends. `Annulus`: upright, with a flat bottom.
+/// - `Cylinder`: upright, with flat ends.
+/// - `Annulus`: ring between two upright walls, with a flat bottom.
 /// - `Spheroid`: ellipsoid of revolution about the vertical axis.
 /// - `Cone`: apex at the bottom, open at the top.
-/// - `DomedCylinder`: cylinder with elliptical domes; `bottom` and `top` are the heights of the domes, 0 for a flat
-///   end. If `bottom` is negative, the bottom bulges into the tank.
+/// - `DomedCylinder`: cylinder with elliptical domes; `bottom` and `top` are the heights of the
+///   domes, 0 for a flat end. If `bottom` is negative, the bottom bulges into the tank.
 /// - `Torispherical`: cylinder whose heads have a spherical crown and a toroidal knuckle.
 /// - `Torus`: ring with a circular section, its axis vertical.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
@@ -146,8 +147,8 @@ impl Shape {
     }
 }
 
-/// Shape of a tank, lengths in m: a body of revolution, with the [`Shape`] from which it was built, if any, or a box
-/// that is open at the top.
+/// Shape of a tank, lengths in m: a body of revolution, with the [`Shape`] from which it was built,
+/// if any, or a box that is open at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     Revolution { contour: Contour, shape: Option<Shape> },
@@ -161,8 +162,8 @@ pub struct Tank {
     pub geometry: Geometry,
 }
 
-/// Amount of liquid in a tank, given as the height of the free surface above the tank's lowest point, m; as a fraction
-/// of the tank's volume, 1 for a full tank; or as the mass of the liquid, kg.
+/// Amount of liquid in a tank: the height of the free surface above the tank's lowest point, m; a
+/// fraction of the tank's volume, 1 for a full tank; or the mass of the liquid, kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fill {
     Height(f64),
@@ -186,11 +187,12 @@ impl core::str::FromStr for Fill {
     }
 }
 
-/// Largest number of segments of a contour. It is limited because each segment is divided into several panels, so that the
-/// computing time grows fast.
+/// Largest number of segments of a contour. It is limited because each segment is divided into
+/// several panels, so that the computing time grows fast.
 const MOST_SEGMENTS: usize = 200;
 
-/// Phrases of the TOML reader's messages, and the phrases about tank files that replace them.
+/// Phrases in the messages of the TOML reader, each with the phrase about tank files that replaces
+/// it for the user.
 const TERMS: [(&str, &str); 7] = [
     (
         "invalid type: unit variant, expected struct variant",
@@ -289,7 +291,7 @@ impl Tank {
         Ok(Tank { name: file.name, density, geometry })
     }
 
-    /// Creates a tank from a shape, with a liquid of `density`, kg/m³.
+    /// Creates a tank from a shape, with a liquid of the density `density`, kg/m³.
     ///
     /// # Errors
     /// Lists every dimension outside its range.
@@ -298,16 +300,19 @@ impl Tank {
         Ok(Tank { name: None, density, geometry })
     }
 
-    /// Returns the largest fill, m above the lowest point; `None` for a box.
+    /// Returns the largest possible fill, m above the lowest point, or `None` for a box, which is
+    /// open at the top.
     pub fn depth(&self) -> Option<f64> {
         self.contour().map(Contour::depth)
     }
 
-    /// Returns the height of the free surface above the lowest point, m, for a given amount of liquid. A fraction of the
-    /// volume may be 0 to 1, and a mass 0 to the mass of the full tank. A height is returned unchanged and unchecked.
+    /// Returns the height of the free surface above the lowest point, m, for an amount of liquid. A
+    /// fraction of the volume may be 0 to 1, and a mass 0 to the mass of the full tank. A height is
+    /// returned unchanged and unchecked.
     ///
     /// # Errors
-    /// An amount above the tank's capacity or below 0; a fraction of a box, which is open at the top.
+    /// An amount above the tank's capacity or below 0; a fraction of a box, which is open at the
+    /// top.
     pub fn fill_height(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = self.contour().map(Contour::capacity);
         let volume = match (fill, capacity) {
@@ -345,8 +350,8 @@ impl Tank {
         })
     }
 
-    /// Returns the mass of the liquid, kg, at `fill`, m above the lowest point. It is bit-identical to the mass in the
-    /// result of [`Tank::solve`], but does not take the time to solve for modes.
+    /// Returns the mass of the liquid, kg, at `fill`, m above the lowest point. It is bit-identical
+    /// to the mass in the result of [`Tank::solve`], but does not take the time to solve for modes.
     ///
     /// # Errors
     /// A fill outside the tank.
@@ -365,11 +370,11 @@ impl Tank {
         }
     }
 
-    /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed tank has
-    /// no free surface and no modes.
+    /// Solves for the modal parameters of the tank at `fill`, m above the lowest point, with
+    /// `modes` modes. A full closed tank has no free surface and no modes.
     ///
-    /// Cylinders and annuli given by their dimensions, and boxes, are solved in closed form, all other tanks by
-    /// the boundary integral equation.
+    /// Cylinders and annuli given by their dimensions, and boxes, are solved in closed form, all
+    /// other tanks by the boundary integral equation.
     ///
     /// # Errors
     /// A fill outside the tank; a number of modes outside 1 to [`MOST_MODES`].
@@ -432,8 +437,9 @@ impl Tank {
         data
     }
 
-    /// Returns the modal data of the full closed tank, which has neither a free surface nor modes;
-    /// `None` if `fill` is not the full height.
+    /// Returns the modal data of the full closed tank, which has neither a free surface nor modes.
+    /// The result is `None` if `fill`, m above the lowest point, is not the full height, or if the
+    /// tank cannot be full.
     fn full_tank_data(&self, fill: f64) -> Option<ModalData> {
         let contour = self.contour()?;
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
@@ -443,8 +449,8 @@ impl Tank {
     }
 }
 
-/// Returns the value of `result` if there are no `problems`; otherwise an error that lists `problems` and the errors of
-/// `result`.
+/// Returns the value of `result` if there are no `problems`. Otherwise it returns an error that
+/// lists `problems` and the errors of `result`, so that the user sees all faults of a file at once.
 fn with_problems<T>(mut problems: Vec<String>, result: Result<T, Problems>) -> Result<T, Problems> {
     match result {
         Ok(value) if problems.is_empty() => return Ok(value),
@@ -499,7 +505,8 @@ fn segment(entry: &Entry) -> Segment {
     }
 }
 
-/// Reads two columns r, z in m. A first line without numbers counts as a heading, and `#` begins a comment.
+/// Reads the two columns r and z, m, of a file of points. A first line without numbers counts as a
+/// heading, and `#` begins a comment.
 fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

@@ -50,15 +50,18 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::gauss::{Gauss, legendre, legendre_slopes};
 
-/// Relative difference between 2 omega_1 and the frequency of an excited mode, below which the third order is not valid.
+/// Relative difference between twice the frequency of the first mode and the frequency of an
+/// excited mode below which the third-order theory is not valid.
 pub const DETUNING: f64 = 0.01;
 
-/// A mode chi that the square of the first mode excites, with its wave number `kappa`, 1/m.
+/// A mode that the square of the first mode excites.
 ///
-/// - `mode` identifies it: azimuthal number and number from 1 in round sections; half waves over the angle and number
-///   from 1 in sectors; half waves along the motion and across it in boxes.
-/// - `planar`, `circular`: squared projections on chi, divided by N and by the first mode's N. The first element belongs
-///   to (X^2 + Y^2)/2, which excites the frequency 0; the second belongs to (X^2 - Y^2)/2 and X Y, which excite 2 omega.
+/// - `kappa`: its wave number, 1/m.
+/// - `mode`: azimuthal number and number from 1 in round sections; half waves over the angle and
+///   number from 1 in sectors; half waves along the motion and across it in boxes.
+/// - `planar`, `circular`: squared projections on this mode, in the notation of the module divided
+///   by N and by the first mode's N. The first element belongs to (X^2 + Y^2)/2, which excites the
+///   frequency 0; the second belongs to (X^2 - Y^2)/2 and X Y, which excite 2 omega.
 /// - `at_wall`: C chi/N at the wall, for planar motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
@@ -69,10 +72,14 @@ pub struct Excited {
     pub at_wall: f64,
 }
 
-/// The first mode and the modes that its square excites; they do not depend on the depth. `k` is the first mode's wave
-/// number, 1/m. `amplitude` is the amplitude a of the elevation per slosh angle, m: int psi x/int psi^2, with x along
-/// the motion. `fourth` is int psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of
-/// circular motion, `None` if the section has no circular motion.
+/// The first mode psi of a tank's cross-section and the modes that its square excites. They do not
+/// depend on the depth.
+///
+/// - `k`: wave number of the first mode, 1/m.
+/// - `amplitude`: amplitude of the elevation per slosh angle, m: int psi x/int psi^2, with x along
+///   the motion.
+/// - `fourth`: int psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int
+///   psi^2 of circular motion; `None` if the section has no circular motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
     pub k: f64,
@@ -82,19 +89,21 @@ pub struct Overlaps {
 }
 
 impl Overlaps {
-    /// Computes the overlap integrals of a circular section of radius 1 with `count` modes of each azimuthal number.
+    /// Computes the overlap integrals of a circular section of radius 1 with `count` modes of each
+    /// azimuthal number.
     pub fn new(count: usize) -> Overlaps {
         Overlaps::round(0.0, 1.0, count)
     }
 
-    /// Computes the overlap integrals of a circular (`inner` = 0) or annular section with `count` modes of each
-    /// azimuthal number, radii in m.
+    /// Computes the overlap integrals of a circular (`inner` = 0) or annular section with `count`
+    /// modes of each azimuthal number. The radii are in m.
     pub fn round(inner: f64, outer: f64, count: usize) -> Overlaps {
         let [first, mean, double] = [1.0, 0.0, 2.0].map(|nu| Radial::new(inner, outer, nu, count));
         Overlaps::from_waves(&first, &mean, &double)
     }
 
-    /// Returns the overlap integrals of psi = u(r) cos(nu theta) with the modes of the orders 0 and 2 nu.
+    /// Computes the overlap integrals of the first mode u(r) cos(nu theta), the first of the modes
+    /// `first`, with the modes `mean` of the order 0 and `double` of the order 2 nu.
     fn from_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
         let psi = first.mode(0);
         let mut excited = Vec::new();
@@ -126,7 +135,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the overlap integrals of a box for motion along its side `length`, m; the other side is different.
+    /// Computes the overlap integrals of a rectangular box for motion along its side of the length
+    /// `length`, m.
     pub fn rectangle(length: f64) -> Overlaps {
         let k = PI / length;
         Overlaps {
@@ -143,8 +153,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the overlap integrals of a square box, for planar motion along its sides or, if `diagonal` is
-    /// true, along a diagonal.
+    /// Computes the overlap integrals of a square box with sides of the length `length`, m, for
+    /// planar motion along its sides or, if `diagonal` is true, along a diagonal.
     pub fn square(length: f64, diagonal: bool) -> Overlaps {
         let k = PI / length;
         let double = [([2, 0], [0.5, 0.25]), ([0, 2], [0.0, 0.25])];
@@ -171,14 +181,16 @@ impl Overlaps {
         }
     }
 
-    /// Returns the relative shifts of omega^2 per squared slosh angle, in planar and in circular motion, at a depth, m.
-    /// If the section has no circular motion, its shift is 0.
+    /// Returns the relative shifts of the squared frequency per squared slosh angle, in planar and
+    /// in circular motion, at the depth `depth`, m. If the section has no circular motion, its
+    /// shift is 0.
     pub fn shifts(&self, depth: f64) -> [f64; 2] {
         self.detuned_shifts(depth, 0.0)
     }
 
-    /// Returns the shifts with a changed response of the excited modes, which are computed at the frequency
-    /// 2 omega (1 + `detuning`). A large difference shows that a pole is close.
+    /// Returns the shifts of the squared frequency as [`Overlaps::shifts`] does, but with the
+    /// response of the excited modes at the frequency 2 omega (1 + `detuning`). A large difference
+    /// shows that a pole of the theory is close.
     pub(crate) fn detuned_shifts(&self, depth: f64, detuning: f64) -> [f64; 2] {
         let [t_1, _, b] = self.wave(depth);
         let k2 = self.k * self.k;
@@ -199,8 +211,8 @@ impl Overlaps {
         [-8.0 * l_4[0] * amplitude2, -4.0 * l_4[1] * amplitude2]
     }
 
-    /// Returns s and kappa of the equivalent mass at a depth, m. If the section has no circular motion, s is 1 and
-    /// kappa gives the planar shift.
+    /// Returns the coefficients s and kappa of the equivalent mass at the depth `depth`, m. If the
+    /// section has no circular motion, s is 1 and kappa gives the planar shift.
     pub fn equivalent(&self, depth: f64) -> [f64; 2] {
         self.detuned_equivalent(depth, 0.0)
     }
@@ -214,8 +226,9 @@ impl Overlaps {
         [0.75 * kappa - 2.0 * planar, kappa]
     }
 
-    /// Returns the second-order elevation at the wall per squared slosh angle, m, when planar motion has its
-    /// largest elevation there. It adds to the crest and subtracts from the trough.
+    /// Returns the second-order elevation at the wall per squared slosh angle, m, at the instant
+    /// when planar motion has its largest elevation there. It adds to the crest and subtracts from
+    /// the trough.
     pub fn second_wave(&self, depth: f64) -> f64 {
         let [_, _, b] = self.wave(depth);
         let elevation = |mode: &Excited| {
@@ -226,8 +239,9 @@ impl Overlaps {
         self.amplitude * self.amplitude * self.excited.iter().map(elevation).sum::<f64>()
     }
 
-    /// Returns T, omega, and the first-order amplitude b of the potential divided by the first-order amplitude a of the
-    /// elevation, with g = 1.
+    /// Returns k tanh(k h) and the frequency of the first mode at the depth `depth`, m, with g = 1,
+    /// and the first-order amplitude of its potential divided by the first-order amplitude of its
+    /// elevation.
     fn wave(&self, depth: f64) -> [f64; 3] {
         let t_1 = self.k * (self.k * depth).tanh();
         // The last element follows from the first-order equation eta_t = G_0 Phi.
@@ -249,7 +263,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the excited mode whose frequency is within [`DETUNING`] of twice the first mode's frequency at a depth, m.
+    /// Returns the excited mode whose frequency is within [`DETUNING`] of twice the first mode's
+    /// frequency at the depth `depth`, m, or `None` if there is no such mode.
     pub fn secondary_resonance(&self, depth: f64) -> Option<[usize; 2]> {
         let [t_1, ..] = self.wave(depth);
         let near = |mode: &&Excited| {
@@ -260,8 +275,9 @@ impl Overlaps {
     }
 }
 
-/// Equations of an excited mode, divided by C: t, the source of the mean elevation, and the matrix and the vector of
-/// the equations for (p_2, f).
+/// Equations of an excited mode chi, divided by its overlap C with the first mode: `t` is kappa
+/// tanh(kappa h), `elevated` the source of the mean elevation, and `matrix` and `vector` belong to
+/// the equations for its elevation and potential at twice the frequency.
 struct Response {
     t: f64,
     elevated: f64,
@@ -274,15 +290,20 @@ fn inverse(m: Matrix2<f64>) -> Matrix2<f64> {
     Matrix2::new(d, -b, -c, a) / (a * d - b * c)
 }
 
-/// Returns the stationary value of the quadratic function x.M x/2 + v.x over all x.
+/// Returns the stationary value over all x of the quadratic function x.M x/2 + v.x with the matrix
+/// `m` and the vector `v`.
 fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     -0.5 * v.dot(&(inverse(m) * v))
 }
 
-/// Radial parts u of the modes of order nu, by Galerkin's method: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with u' = 0 at
-/// the walls and int u^2 r dr = 1; a constant is not a mode. `r` and `weights` (which include r dr) are points and
-/// weights of the quadrature, m; `kappa` are the wave numbers, 1/m, ascending; `values` has u at the points, one mode a
-/// column, and `at_wall` has u at the outer wall.
+/// Radial parts u(r) of the modes of the order nu in a circular or annular section, by Galerkin's
+/// method. They obey (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with u' = 0 at the walls and int u^2 r
+/// dr = 1; a constant is not a mode.
+///
+/// - `r`, `weights`: points, m, and weights of the quadrature; the weights include r dr.
+/// - `kappa`: wave numbers, 1/m, ascending.
+/// - `values`: u at the points, one mode a column.
+/// - `at_wall`: u of each mode at the outer wall.
 struct Radial {
     r: Vec<f64>,
     weights: Vec<f64>,
@@ -343,7 +364,8 @@ impl Radial {
         }
     }
 
-    /// Returns u of a mode at the points of the quadrature, with a positive value at the outer wall.
+    /// Returns the radial part of mode `n`, counted from 0, at the points of the quadrature. It is
+    /// positive at the outer wall.
     fn mode(&self, n: usize) -> Vec<f64> {
         self.values.column(n).iter().copied().collect()
     }
@@ -353,8 +375,9 @@ impl Radial {
     }
 }
 
-/// Returns orthonormal functions on the disc and their derivatives with respect to r. They are
-/// (r/R)^nu P_j^(0,nu)(2 x - 1) with x = (r/R)^2, by the recurrence DLMF 18.9.2.
+/// Returns `size` orthonormal functions on a disc of the radius R = `outer`, and their derivatives
+/// with respect to r, at x = (r/R)^2. They are (r/R)^nu P_j^(0,nu)(2 x - 1) by the recurrence DLMF
+/// 18.9.2.
 pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f64)> {
     let y = 2.0 * x - 1.0;
     let (mut p, mut slope) = ((1.0, 1.0 + 0.5 * (nu + 2.0) * (y - 1.0)), (0.0, 0.5 * (nu + 2.0)));
@@ -378,8 +401,8 @@ pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64
     all
 }
 
-/// Returns Legendre polynomials over the width of a ring, and their derivatives with respect to r, at the fraction
-/// `s` of the width.
+/// Returns `size` Legendre polynomials over the width of a ring, and their derivatives with respect
+/// to r, at the fraction `s` of the width `width`, m.
 fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
     let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
     legendre(s, &mut values);
@@ -391,8 +414,9 @@ fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
 
-    /// The reference is table 9.5 of Abramowitz and Stegun, to more digits. The zero of J0' at 0 does not belong to a
-    /// mode. The tolerance covers the rounding error of the largest eigenvalue, about 1e6.
+    /// The reference is table 9.5 of Abramowitz and Stegun, to more digits. The zero of J0' at 0
+    /// does not belong to a mode. The tolerance covers the rounding error of the largest
+    /// eigenvalue, about 1e6.
     #[test]
     fn wave_numbers_of_the_circle_equal_those_of_the_tables() {
         for (nu, known) in [

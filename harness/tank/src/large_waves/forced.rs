@@ -20,8 +20,8 @@ use crate::contour::Wall;
 use crate::gauss::Gauss;
 use crate::tank::{Geometry, Tank};
 
-/// Allowed motions of the liquid: in a plane (`Plane`), in space (`All`), and steadily on a circle (`Circle`). In the last
-/// one, azimuth theta and phase tau occur only as tau - theta.
+/// Allowed motions of the liquid: in a plane (`Plane`), in space (`All`), and steadily on a circle
+/// (`Circle`). On a circle, azimuth theta and phase tau occur only as tau - theta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     Plane,
@@ -29,14 +29,15 @@ pub enum Space {
     Circle,
 }
 
-/// A product of a function of m theta and a function of k tau, each a sine where `sine` is true, otherwise a cosine.
+/// A function of azimuth theta and phase tau: the product of a function of m theta and a function
+/// of k tau. Each is a sine where `sine` is true, otherwise a cosine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Function {
     space: Space,
     sine: [bool; 2],
 }
 
-/// Returns cos x, or sin x if `sine` is true, and its derivative.
+/// Returns the cosine of x, or its sine if `sine` is true, and the derivative.
 fn wave(x: f64, sine: bool) -> [f64; 2] {
     let (sin, cos) = x.sin_cos();
     if sine { [sin, cos] } else { [cos, -sin] }
@@ -92,8 +93,9 @@ impl Function {
         }
     }
 
-    /// Returns pairs (azimuth, phase) at which the elevation determines the wave everywhere, because the wave has the symmetry
-    /// (theta + pi, tau + pi) and, in plane motion, the symmetry -theta.
+    /// Returns pairs (azimuth, phase) at which the elevation determines the wave everywhere. They
+    /// are fewer than all pairs, because the wave has the symmetry (theta + pi, tau + pi) and, in
+    /// plane motion, the symmetry -theta. `count` sets the resolution.
     pub(super) fn grid(self, count: usize) -> Vec<[f64; 2]> {
         let half = |n: usize| PI * (n as f64 + 0.5) / count as f64;
         let [thetas, taus] = match self.space {
@@ -108,17 +110,20 @@ impl Function {
 /// A steady forced wave. Each vector holds the values of one period at [`PHASES`] phases.
 #[derive(Clone, Debug)]
 pub struct ForcedWave {
-    /// Slosh displacement q along x and y; its length is the sine of the slosh angle.
+    /// Displacement of the slosh mass along x and y, in units of its length; its magnitude is the
+    /// sine of the slosh angle.
     pub q: [Vec<f64>; 2],
-    /// Acceleration of the tank along x and y in units of g: for each axis the coefficients of cos(tau) and sin(tau).
+    /// Acceleration of the tank along x and y, in units of g: for each axis the coefficients of
+    /// cos(tau) and sin(tau) with the phase tau.
     pub push: [[f64; 2]; 2],
-    /// Frequency divided by the frequency of small waves.
+    /// Frequency of the wave divided by the frequency of small free waves.
     pub ratio: f64,
 }
 
 pub const PHASES: usize = 64;
 
-/// Returns the first harmonic of the values of one period: the coefficients of cos(tau) and sin(tau).
+/// Returns the first harmonic of the values of one period, as the coefficients of cos(tau) and
+/// sin(tau) with the phase tau.
 pub fn first_harmonic(values: &[f64]) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for (i, value) in values.iter().enumerate() {
@@ -129,8 +134,8 @@ pub fn first_harmonic(values: &[f64]) -> [f64; 2] {
 }
 
 impl ForcedWave {
-    /// Returns the force on the tank along x and y at all phases, divided by the weight of the slosh mass. `share` is
-    /// the slosh mass divided by the mass of the liquid.
+    /// Returns the force of the liquid on the tank along x and y at all phases, divided by the
+    /// weight of the slosh mass. `share` is the slosh mass divided by the mass of the liquid.
     pub fn force(&self, share: f64) -> [Vec<f64>; 2] {
         [0, 1].map(|axis| {
             let values = &self.q[axis];
@@ -145,7 +150,8 @@ impl ForcedWave {
     }
 }
 
-/// Returns the second derivative with respect to the phase at `tau`, from the harmonics of the `values` of one period.
+/// Returns the second derivative, with respect to the phase, of a periodic function at the phase
+/// `tau`. It is computed from the harmonics of the `values` of one period.
 fn second_derivative(values: &[f64], tau: f64) -> f64 {
     let count = values.len();
     (1..count / 4)
@@ -159,10 +165,11 @@ fn second_derivative(values: &[f64], tau: f64) -> f64 {
         .sum()
 }
 
-/// Solver for forced waves in a tank.
+/// Solver for steady waves in a tank that moves sideways.
 pub struct Forced<'a> {
     solver: Solver<'a>,
-    /// Damping matrix for the coefficients of the potential, 2 zeta sum omega_n u_n u_n^T.
+    /// Damping matrix for the coefficients of the potential: the sum over all modes of 2 zeta
+    /// omega_n u_n u_n^T.
     drag: DMatrix<f64>,
     omega: f64,
     ratio: f64,
@@ -177,7 +184,8 @@ pub struct Walls {
 }
 
 impl Walls {
-    /// Returns `None` for a box, and for a surface at a corner of the wall.
+    /// Returns the walls of a tank that is filled to `fill`, m above the lowest point. The result
+    /// is `None` for a box, and for a surface at a corner of the wall.
     pub fn new(tank: &Tank, fill: f64) -> Option<Walls> {
         let Geometry::Revolution { contour, .. } = &tank.geometry else { return None };
         let wall = contour.cut(fill).ok()?;
@@ -187,9 +195,10 @@ impl Walls {
 }
 
 impl<'a> Forced<'a> {
-    /// Prepares the computation of waves whose frequency is `ratio` times the frequency of small waves; `zeta` is the damping
-    /// ratio of all modes. `degree` (of the harmonics) and `order` (largest multiple of the frequency) set the resolution.
-    /// Returns `None` for a liquid with a hole.
+    /// Prepares the computation of waves whose frequency is `ratio` times the frequency of small
+    /// waves. `zeta` is the damping ratio of all modes. The resolution consists of the `degree` of
+    /// the harmonics and the `order`, the largest multiple of the frequency. Returns `None` for a
+    /// liquid with a hole.
     pub fn new(
         walls: &'a Walls,
         space: Space,
@@ -215,15 +224,15 @@ impl<'a> Forced<'a> {
         Some(Forced { solver, drag, omega, ratio, first })
     }
 
-    /// Returns the numbers of unknowns of the elevation, of the potential and of the accelerations. One more
-    /// unknown is a pressure.
+    /// Returns the numbers of unknowns of the elevation, of the potential and of the tank's
+    /// acceleration. One more unknown is a pressure.
     fn sizes(&self) -> [usize; 3] {
         let [nz, nc] = self.solver.sizes();
         [nz, nc, self.first.len()]
     }
 
-    /// Returns the vector whose scalar product with the coefficients of the elevation is the n-th coefficient
-    /// of the first mode.
+    /// Returns a vector whose scalar product with the coefficients of the elevation is the `n`-th
+    /// coefficient of the first mode.
     fn part(&self, n: usize) -> DVector<f64> {
         let [nz, ..] = self.sizes();
         let count = self.solver.resolution.polynomials;
@@ -312,9 +321,9 @@ impl<'a> Forced<'a> {
         None
     }
 
-    /// Computes one wave for each of the ascending `sizes`. The first mode of each wave is its size times `shape`,
-    /// which has the coefficients of cos(tau) and sin(tau) along x, and then along y. The list ends where Newton's
-    /// method does not converge.
+    /// Computes a wave for each of the ascending `sizes`. The first mode of a wave is its size
+    /// times `shape`, which has the coefficients of cos(tau) and sin(tau) along x, and then along
+    /// y. The list ends where Newton's method does not converge.
     pub fn waves(&self, shape: &[f64], sizes: &[f64]) -> Vec<(DVector<f64>, ForcedWave)> {
         let [nz, nc, pushes] = self.sizes();
         let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
@@ -335,9 +344,10 @@ impl<'a> Forced<'a> {
         waves
     }
 
-    /// Computes the wave in a tank that moves along x with the acceleration `push` cos(tau), in units of g. `x` holds the unknowns
-    /// of a wave close to it. The accelerations change from those of this wave to `push` in several steps if one step
-    /// does not converge. Only for `Space::All`.
+    /// Computes the wave in a tank that moves along x with the acceleration `push` cos(tau), in
+    /// units of g. `x` holds the unknowns of a similar wave. If Newton's method does not converge,
+    /// the acceleration is changed from its value in this wave to `push` in several steps. It
+    /// requires [`Space::All`].
     pub fn on_a_line(&self, x: &DVector<f64>, push: f64) -> Option<ForcedWave> {
         let [nz, nc, pushes] = self.sizes();
         let from = x.rows(nz + nc + 1, pushes).into_owned();
@@ -401,8 +411,8 @@ enum Held {
     Push(usize, f64),
 }
 
-/// Returns sum omega_n u_n u_n^T over the modes of an azimuthal number, as a matrix for the combinations of harmonics,
-/// divided by the square root of the specific force.
+/// Returns the sum of omega_n u_n u_n^T over the modes of the azimuthal number `m`, divided by the
+/// square root of the specific force, as a matrix for the combinations of harmonics.
 fn drag_of_modes(solver: &Solver, m: usize) -> DMatrix<f64> {
     let Resolution { degree, polynomials, .. } = solver.resolution;
     let (f, harmonics) =

@@ -17,8 +17,8 @@ use hubslosh_tank::finite_amplitude::amplitude_dependence;
 
 use crate::common::tank;
 
-/// Slosh angle, rad, and the frequencies of planar and of rotary waves at this angle, divided by the frequency of small
-/// waves.
+/// A slosh angle, rad, and the frequencies of planar and of rotary waves at this angle, divided by
+/// the frequency of small waves.
 type Row = (f64, [Option<f64>; 2]);
 
 fn backbones() -> Vec<(f64, Vec<Row>)> {
@@ -38,9 +38,9 @@ fn pair(s: f64, kappa: f64) -> EnergyTerms {
     EnergyTerms { pair: [s, kappa], next: [0.0; 2], rotary: [0.0; 2], compared: 0.0 }
 }
 
-/// Returns the frequency of a slosh mass with the coefficients `of` at the slosh `angle`, rad, divided by its frequency in
-/// small motion, for planar and for circular motion. The equations are those of `fmu/craft/src/surface.rs` with l = g = 1.
-/// Planar motion is integrated by quadrature with q = a sin t, for which the integrand is periodic.
+/// Returns the frequency of the slosh mass of `fmu/craft/src/surface.rs` at the slosh angle
+/// `angle`, in planar and in circular motion, divided by the frequency of small motion. The period
+/// of planar motion is an integral over q = a sin t, for which the integrand is periodic.
 fn frequency_ratios(of: &EnergyTerms, angle: f64) -> [f64; 2] {
     let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (of.pair, of.next, of.rotary);
     let a = angle.sin();
@@ -78,9 +78,9 @@ fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f6
     None
 }
 
-/// The test computes the slosh angle at which the frequency of the model begins to differ from fully nonlinear potential
-/// flow, and compares it with the stated limit. In rotary motion the model is valid up to larger angles, except where a
-/// secondary resonance folds its branch.
+/// The angle limit of a model is the slosh angle at which its frequency begins to differ from fully
+/// nonlinear potential flow. In rotary motion the model is valid up to larger angles, except where
+/// a secondary resonance folds its branch.
 #[test]
 fn at_the_angle_limit_the_model_s_frequency_departs_from_nonlinear_potential_flow() {
     for (fill, rows) in backbones() {
@@ -103,8 +103,8 @@ fn at_the_angle_limit_the_model_s_frequency_departs_from_nonlinear_potential_flo
     }
 }
 
-/// Up to the stated limit, planar frequencies must agree within 0.06 % and rotary ones within 0.11 %. The third-order model
-/// reaches an error of 0.3 % at smaller angles.
+/// Up to the stated limit the frequencies agree within 0.06 % (planar) and 0.11 % (rotary). The
+/// third-order model reaches an error of 0.3 % at smaller angles.
 #[test]
 fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
     let mut compared = 0;
@@ -129,9 +129,8 @@ fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
     assert!(compared > 150, "{compared}");
 }
 
-/// At h/R = 0.8 and 1 the interpolated coefficients s and kappa give frequencies within 0.3 % of nonlinear potential flow up
-/// to 16 degrees. In planar motion they are closer to it than the frequencies of a pendulum from 7 degrees on. At h/R = 1 the
-/// planar branch splits near 2 to 3.5 degrees.
+/// At h/R = 0.8 and 1 the interpolated s and kappa give frequencies within 0.3 % of nonlinear
+/// potential flow up to 16 degrees. At h/R = 1 the planar branch splits near 2 to 3.5 degrees.
 #[test]
 fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     let is_bridged = |fill: f64| fill > BRIDGED[0] && fill < BRIDGED[1];
@@ -157,8 +156,9 @@ fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     }
 }
 
-/// In tanks other than cylinders the limit is estimated as a fraction of the angle at which the series breaks down. In
-/// cylinders of every depth, whose true limits are known, this estimate must be smaller than the true limit.
+/// In tanks other than cylinders the limit is estimated as a fraction of the angle at which the
+/// series breaks down. In cylinders, whose true limits are known, the estimate must be smaller than
+/// the true limit.
 #[test]
 fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
     let mut smallest = f64::INFINITY;

@@ -7,8 +7,8 @@ use hubslosh_tank::Tank;
 use hubslosh_tank::modal::Damping;
 use hubslosh_tank::parameters::{Liquid, tank_damping};
 
-/// Kinematic viscosity, m2/s, and specific force, m/s2, at which most of the tanks are within the range of the correlation
-/// for spheres.
+/// Kinematic viscosity, m²/s, and specific force, m/s², at which most of the tanks are within the
+/// range of the correlation for spheres.
 const SLOW: [f64; 2] = [1e-6, 0.3];
 
 fn damping_at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
@@ -21,9 +21,10 @@ fn tank_with(shape: &str) -> Tank {
     tank(&format!("density = 1000.0\n{shape}"))
 }
 
-/// Name, tank, and liquid (viscosity, specific force) of the tests. Cone, sphere and torus have one correlation at every
-/// fill, the box has none, and the cylinder has two. The walls of capsule, cylinder with a dome, cone with a cylinder, and
-/// dish are a measured shape up to a tangent point or a corner.
+/// Name, tank, and liquid (viscosity, specific force) of each test. Cone, sphere and torus have one
+/// correlation at every fill, the box has none, and the cylinder has two. The walls of capsule,
+/// cylinder with a dome, cone with a cylinder, and dish are a measured shape up to a tangent point
+/// or a corner.
 const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ("sphere", "shape = { sphere = { radius = 0.3 } }", SLOW),
     (
@@ -52,10 +53,10 @@ const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ),
 ];
 
-/// Computes the damping at `count` + 1 fills that are 0.1 % of the tank's height apart, the first at the fraction `from`.
-/// Returns the largest relative change between neighbours of the damping ratio, and the largest changes of the damping ratio
-/// and of both ends of its interval, each divided by the damping of the laminar layer, because this damping changes with the
-/// fill, too.
+/// Returns the largest relative changes between `count` + 1 neighbouring fills from the fill `from`
+/// on, which are 0.1 % of the tank's height apart. The first number is the change of the damping
+/// ratio. The other three are changes of the damping ratio and of both ends of its interval after
+/// division by the damping of the laminar layer, because this damping changes with the fill, too.
 fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64; 4] {
     let depth = tank.depth().unwrap_or(1.0);
     let numbers = |i: usize| {
@@ -86,9 +87,9 @@ fn the_damping_ratio_has_no_step_at_500_fills() {
     }
 }
 
-/// Covers each place where a wall stops being a measured shape: tangent point, shoulder, corner, knuckle. Also covers the
-/// ends of the measured ranges of sphere, cylinder and torus, and the fill of a torus at which its correlation falls below
-/// the damping of the laminar layer.
+/// Covers each place where a wall stops being a measured shape (tangent point, shoulder, corner,
+/// knuckle), the ends of the measured ranges, and the fill of a torus at which its correlation
+/// falls below the damping of the laminar layer.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn damping_has_no_step_where_a_wall_leaves_a_shape() {
@@ -114,7 +115,6 @@ fn damping_has_no_step_where_a_wall_leaves_a_shape() {
     }
 }
 
-/// Covers fills at the tangent of a capsule, where the dome meets the cylinder, and fills within the cylinder.
 #[test]
 fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
     let (_, shape, liquid) = TANKS[1];
@@ -138,8 +138,7 @@ fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
     }
 }
 
-/// The estimates are the correlation of the measured shape, and 1.45 times the damping of the laminar layer for the rest of
-/// the wall.
+/// Both estimates are the correlation of the shape, and 1.45 times the laminar layer.
 #[test]
 fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains_them() {
     let walls = [
@@ -164,9 +163,8 @@ fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains
     }
 }
 
-/// The dimensions of spheroids and capsules change gradually until the shape is a sphere. Near the sphere the damping ratio
-/// must be a smooth function of the dimensions. Filled to 0.8 of its height, the sphere has ten times the damping of the
-/// laminar layer, and the interval of a spheroid that differs from it by a few per cent must contain this value.
+/// The dimensions of spheroids and capsules change gradually until the shape is a sphere. At 0.8 of
+/// its height, the sphere has ten times the damping of the laminar layer.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
@@ -206,8 +204,6 @@ fn shapes_close_to_a_sphere_have_the_damping_of_the_sphere() {
     }
 }
 
-/// The wall of these tanks has one measured shape at every fill, so that the damping ratio must equal the published formula,
-/// apart from rounding errors.
 #[test]
 fn a_wall_with_a_measured_shape_has_the_damping_of_its_published_correlation() {
     let close = |found: f64, expected: f64| {

@@ -6,8 +6,8 @@ use crate::common::tank;
 use hubslosh_tank::parameters::{Liquid, tank_damping};
 use hubslosh_tank::{ModalData, Mode, Tank};
 
-/// Tanks of each kind with a fill; an `@` marks lengths that are scaled. Some are solved in closed form and some by the
-/// integral equation; some are full or thin.
+/// Tanks of each kind with a fill; an `@` marks lengths that are scaled. Some are solved in closed
+/// form and some by the integral equation; some are full or thin.
 const TANKS: [(&str, f64); 10] = [
     ("shape = { cylinder = { radius = @0.7, height = @2.0 } }", 0.6),
     ("shape = { annulus = { inner_radius = @0.3, outer_radius = @0.7, height = @2.0 } }", 0.6),
@@ -113,7 +113,7 @@ fn quantities(data: &ModalData) -> Vec<Quantity> {
     all
 }
 
-/// In a tank four times as large, with four times the density, masses, lengths and frequencies must scale exactly.
+/// The factors are powers of two, so that masses, lengths and frequencies must scale exactly.
 #[test]
 fn every_modal_parameter_scales_by_its_physical_dimension() {
     let one = solved(1.0, 512.0);
@@ -129,8 +129,9 @@ fn every_modal_parameter_scales_by_its_physical_dimension() {
     }
 }
 
-/// The second tank is 4 times as large, and its times are 2 times as long. With the same gravity, 16/2 times the viscosity
-/// and 64/4 times the surface tension, all dimensionless numbers are then equal.
+/// The second tank is 4 times as large, and its times are 2 times as long. The dimensionless
+/// numbers are then equal with the same gravity, 16/2 times the viscosity and 64/4 times the
+/// surface tension.
 #[test]
 fn similar_tanks_have_the_same_damping_and_the_same_description() {
     let [one, large] = [1.0, 4.0].map(|c| solved(c, 512.0));

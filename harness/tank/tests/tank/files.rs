@@ -202,8 +202,8 @@ fn every_impossible_fill_of_a_tank_is_refused_with_a_clear_message() {
     }
 }
 
-/// A contour counts as closed if the gap is at most 1e-6 of the tank's size, and a free surface is refused within 1e-6 of the
-/// tank's size from a shoulder. Both limits hold for small and large tanks, up to the largest size of 100 m.
+/// Gaps and distances from a shoulder count relative to the size of the tank, up to the largest
+/// size of 100 m.
 #[test]
 fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     for c in [0.01, 1.0, 50.0] {
@@ -254,8 +254,7 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     }
 }
 
-/// The full tank is given as a height, in per cent and as a mass. The message states mass, centre of mass and inertia of the
-/// liquid as a rigid body.
+/// The full tank is given as a height, as a fraction and as a mass.
 #[test]
 fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -274,9 +273,8 @@ fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     }
 }
 
-/// Compares volume and mass of the solved tank with the requested volume and mass, and heights with closed forms. The volume
-/// is integrated by two rules, with 20 points per piece and with 5 points on smaller pieces, so that only the rounding errors
-/// of the sums and the error of 60 bisections remain.
+/// Volumes are integrated by two rules, with 20 points per piece and with 5 points on smaller
+/// pieces, so that only rounding errors and the error of 60 bisections remain.
 #[test]
 fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     let tanks = [
@@ -320,8 +318,8 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     assert!("1.2 m".parse::<Fill>().unwrap_err().to_string().contains("neither a height in m"));
 }
 
-/// Heights of a shape count from its lowest point, heights of a contour from the zero of its drawing. The test compares one
-/// tank in both forms, in the table, the JSON and the parameter file.
+/// Heights of a shape count from its lowest point, heights of a contour from the zero of its
+/// drawing.
 #[test]
 fn the_table_and_the_parameter_file_state_where_heights_are_zero() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
@@ -343,7 +341,6 @@ fn the_table_and_the_parameter_file_state_where_heights_are_zero() {
     }
 }
 
-/// A tank that is drawn completely and filled in part must have the results of the contour that is drawn only up to the fill.
 #[test]
 fn a_tank_filled_in_part_equals_the_contour_up_to_the_fill() {
     let whole = solve("shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }", 0.5, 3);
@@ -404,8 +401,8 @@ fn built_in_shapes_have_the_volumes_of_textbooks() {
     assert!(bottom.solve(1.5, 2).is_ok());
 }
 
-/// For 25 points of a half circle the error of straight lines is 2e-3; with `spline` a curve through the points has an error
-/// of 1e-6.
+/// For 25 points of a half circle the error of straight lines is 2e-3, the error of the spline
+/// 1e-6.
 #[test]
 fn points_of_a_contour_are_joined_by_straight_lines_or_by_a_spline() {
     let folder = tempfile::tempdir().unwrap();
@@ -456,8 +453,8 @@ fn points_of_a_contour_are_joined_by_straight_lines_or_by_a_spline() {
     assert!(said.contains("1 point(s); a contour needs at least two"), "{said}");
 }
 
-/// The drawing is in millimetres with y downwards: a hemispherical bottom as an arc, a wall, a top dome as two curves (a
-/// quarter circle as a cubic is accurate to 3e-4), closed along the axis. The path has absolute and relative commands.
+/// The drawing is in millimetres with y downwards: a hemispherical bottom as an arc, a wall, a top
+/// dome as two cubic curves (accurate to 3e-4), closed along the axis.
 #[test]
 fn a_contour_is_read_from_an_svg_drawing() {
     let folder = tempfile::tempdir().unwrap();
@@ -563,7 +560,7 @@ fn a_result_states_if_the_tank_is_a_body_of_revolution_or_a_box() {
     }
 }
 
-/// The box of 0.8 m by 0.5 m has modes along both sides. In the printed table each number must stand below its heading.
+/// Each number of the printed table stands below its heading.
 #[test]
 fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
@@ -597,8 +594,8 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     assert_eq!(rows.matches("n along y").count(), 1, "{rows}");
 }
 
-/// Sets each dimension, one at a time, to its limit, which must be refused, and to a value slightly above it, which must be
-/// accepted.
+/// Each dimension is set to its limit, which is refused, and to a value slightly above the limit,
+/// which is accepted.
 #[test]
 fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
     let dome = |bottom: f64, top: f64| {
@@ -687,7 +684,6 @@ fn a_table_at_0_gravity_has_a_note_that_only_capillarity_restores_the_liquid() {
     assert_eq!(said(2.0, 0.0), (false, true));
 }
 
-/// The tank is drawn 80 m above the zero of the drawing. Only its own size counts for the largest allowed size.
 #[test]
 fn a_tank_drawn_far_above_its_zero_does_not_count_as_large() {
     let far = solve("profile = [{ line = [0, 80, 1, 80] }, { line = [1, 80, 1, 81] }]", 0.5, 1);
@@ -709,8 +705,6 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
     assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
 }
 
-/// A parameter file is written from a result with damping and from a result without. Both files must be equal, because the
-/// file computes the damping for its own liquid.
 #[test]
 fn parameter_files_use_the_damping_of_their_own_liquid_and_not_of_the_result() {
     let text = "density = 875.0\n\
@@ -741,8 +735,6 @@ fn parameter_files_use_the_damping_of_their_own_liquid_and_not_of_the_result() {
     }
 }
 
-/// The function for the mass computes no modes. Its result must be bit-identical to the mass in the solution, at every fill
-/// and in a full tank.
 #[test]
 fn the_mass_without_modes_equals_the_mass_of_the_solution_with_modes() {
     for text in [

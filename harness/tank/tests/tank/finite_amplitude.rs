@@ -30,9 +30,9 @@ fn assert_unknown(text: &str, fill: f64, why: &str) {
     assert!(found.warnings[0].contains("pendulum"), "{found:?}");
 }
 
-/// The tank is the bench's, with a radius of 81.5 mm and 10 or 5 cm of liquid. Each pair has a slosh angle, degrees, and the
-/// frequency at this angle divided by the frequency of small waves. The potential flow was computed without expansion in the
-/// steepness; at 8 degrees terms of the fifth order contribute 3e-4.
+/// Each pair has a slosh angle, degrees, and the frequency at this angle divided by the frequency
+/// of small waves, from potential flow without expansion in the steepness. At 8 degrees terms of
+/// the fifth order contribute 3e-4.
 #[test]
 fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     for (fill, planar, circular) in [
@@ -54,8 +54,8 @@ fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     }
 }
 
-/// The same tank is computed as a shape, as a profile, and with a bottom that is almost but not exactly flat, which the
-/// method for arbitrary contours solves.
+/// The tank is given as a shape, as a profile, and with a bottom that is almost but not exactly
+/// flat, which the method for any contour solves.
 #[test]
 fn the_methods_for_flat_bottoms_and_for_any_contour_agree_within_their_errors() {
     for fill in [0.5, 1.3, 2.5] {
@@ -79,8 +79,8 @@ fn the_methods_for_flat_bottoms_and_for_any_contour_agree_within_their_errors() 
     }
 }
 
-/// A scaled tank must have the same coefficients, and a capsule that is filled only within its lower half sphere must have
-/// the sphere's coefficients.
+/// A scaled tank has the same coefficients, and a capsule that is filled only within its lower half
+/// sphere has the sphere's coefficients.
 #[test]
 fn large_wave_coefficients_depend_only_on_the_shape_of_the_liquid() {
     let sphere = coefficients_at("shape = { sphere = { radius = 1.0 } }", 0.5);
@@ -98,7 +98,7 @@ fn large_wave_coefficients_depend_only_on_the_shape_of_the_liquid() {
     assert!(capsule.angle_limit < sphere.angle_limit, "{capsule:?}");
 }
 
-/// Coefficients are left out for a ring with inclined walls, for a nearly full sphere, where their error is large, and for
+/// Coefficients are left out for a ring with inclined walls, for a nearly full sphere, and at
 /// depths with secondary resonances.
 #[test]
 fn large_wave_coefficients_that_cannot_be_computed_are_left_out_with_a_reason() {
@@ -117,9 +117,7 @@ fn large_wave_coefficients_that_cannot_be_computed_are_left_out_with_a_reason() 
     );
 }
 
-/// Near the poles of third-order theory a cylinder gets interpolated values of s and kappa, and not the values of a pendulum.
-/// Limits are stated at every depth: also at h/R = 0.5 and 0.4, where the series is valid up to 22 degrees, and in shallow
-/// liquid. The fold of rotary motion is stated, too.
+/// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa.
 #[test]
 fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     let at =
@@ -149,9 +147,9 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
 }
 
-/// In a sphere, the third-order model and the model with the wave's energy are both valid up to the angle at which their
-/// response to forcing differs by 3 % from potential flow. At fills outside the table the limit is an estimate; at h/R = 1.5
-/// it must be smaller than 2.6 degrees, where the error is 3 %.
+/// Both models of a sphere are valid up to the angle at which their response differs by 3 % from
+/// forced waves of potential flow. At fills outside the table the limit is an estimate; at h/R =
+/// 1.5 it must be smaller than the 2.6 degrees of the forced waves.
 #[test]
 fn limits_of_a_sphere_follow_from_its_forced_waves() {
     let at = |fill: f64| coefficients_at("shape = { sphere = { radius = 1.0 } }", fill);
@@ -172,8 +170,8 @@ fn limits_of_a_sphere_follow_from_its_forced_waves() {
     assert!(deep.angle_limit.to_degrees() < 2.62, "{deep:?}");
 }
 
-/// The FMU's test with forced waves reads coefficients and limits from a file. They must be those that `hubslosh tank`
-/// writes.
+/// The FMU's test with forced waves reads its coefficients and limits from a file, and they must be
+/// those that `hubslosh tank` writes.
 #[test]
 fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
     let rows = include_str!("../../../../fmu/craft/tests/craft/forced_waves.csv").lines().skip(1);
@@ -244,8 +242,9 @@ fn files_for_the_fmus_have_the_angle_limits() {
     assert!(amplitude_dependence("box = [0.8, 0.5]", 0.4).is_some());
 }
 
-/// Returns the angle limit of mode 1, in degrees, and true if the parameter file contains large-wave coefficients, for the
-/// tank `text` filled to the fraction `share`.
+/// Returns the parameter `angle_limit` of mode 1, in degrees, for a tank that is filled to the
+/// fraction `share` (a box to 0.6 `share` m), and true if the file contains coefficients of large
+/// waves.
 fn angle_limit(text: &str, share: f64, liquid: Liquid) -> (f64, bool) {
     let tank = tank(&format!("density = 1000.0\n{text}"));
     let fill = tank.fill_height(Fill::Share(share)).unwrap_or(0.6 * share);
@@ -256,8 +255,8 @@ fn angle_limit(text: &str, share: f64, liquid: Liquid) -> (f64, bool) {
     (limit.to_degrees(), !third_order_of(&set).is_empty())
 }
 
-/// Mode 1 must never have the FMU's default limit of 45 degrees just because no limit is known. For a tank without
-/// coefficients the limit is the angle at which a pendulum differs from the liquid.
+/// Without coefficients the limit is the angle at which a pendulum differs from the liquid, and not
+/// the FMU's default of 45 degrees.
 #[test]
 fn files_have_an_angle_limit_for_every_shape_and_fill() {
     let mut pendulums = 0;
@@ -287,8 +286,8 @@ fn files_have_an_angle_limit_for_every_shape_and_fill() {
     assert!(limit < 6.3 && !has_coefficients, "{limit}");
 }
 
-/// In spheres third-order theory has poles between h/R 1.1 and 1.25. There the frequency of the liquid changes more strongly
-/// with the amplitude than at other fills, so that the range of a pendulum is smaller.
+/// Between h/R 1.1 and 1.25 the third-order theory has poles, so that the frequency of the liquid
+/// changes more strongly with the amplitude.
 #[test]
 fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
     let at = |fill: f64| amplitude_dependence_at("shape = { sphere = { radius = 1.0 } }", fill);
@@ -308,8 +307,8 @@ fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
     assert!(refused > 8, "{refused}");
 }
 
-/// For h/R from 0.25 to 0.7, parameter files for SloshTank and Spacecraft must contain the coefficients that give the slosh
-/// mass the energy of the wave. Files for HubSlosh and for draining tanks contain the third-order coefficients.
+/// Coefficients of the wave's energy are known for h/R from 0.25 to 0.7. Files for HubSlosh and for
+/// draining tanks contain the third-order coefficients.
 #[test]
 fn files_have_the_energy_terms_where_they_are_known() {
     let cylinder = tank("density = 1000.0\nshape = { cylinder = { radius = 0.1, height = 2.0 } }");
@@ -361,8 +360,8 @@ fn files_have_the_energy_terms_where_they_are_known() {
     assert!(matches!(all[1].1, Value::Real(x) if (x.to_degrees() - 6.5).abs() < 0.01), "{all:?}");
 }
 
-/// The coefficients that give the slosh mass the energy of the wave come from a table. For small waves they must give the
-/// frequency of third-order theory, which another method computes.
+/// For small waves the coefficients of the table must give the frequency of third-order theory,
+/// which another method computes.
 #[test]
 fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.4 } }");
@@ -393,7 +392,6 @@ fn with_large_waves(text: &str, fill: f64) -> FiniteAmplitude {
     data.finite_amplitude.unwrap()
 }
 
-/// A cone is a tank without a table of coefficients; they are computed if they are requested.
 #[test]
 #[ignore = "four seconds of CPU time: .ci/long-tests"]
 fn large_wave_coefficients_of_a_cone_are_computed_on_request() {
@@ -423,8 +421,8 @@ fn large_waves_are_refused_for_a_box_and_a_ring_with_a_reason() {
     }
 }
 
-/// Without a given surface tension, a tank whose Bond number may be below 100 gets a warning. With 1000 kg/m3, R = 0.1 m and
-/// the largest expected sigma/rho of 7.3e-5 m3/s2 this is the case below 0.73 m/s2.
+/// With 1000 kg/m³, R = 0.1 m and the largest expected sigma/rho of 7.3e-5 m³/s² the Bond number is
+/// 100 at 0.73 m/s².
 #[test]
 fn a_missing_surface_tension_gives_a_warning_at_low_bond_numbers() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.1 } }");
@@ -455,8 +453,8 @@ fn a_missing_surface_tension_gives_a_warning_at_low_bond_numbers() {
     }
 }
 
-/// A rectangular box has s = 1 and the kappa that gives the planar change of the frequency. A square box also has circular
-/// motion, which determines s.
+/// A rectangular box has s = 1 and the kappa that gives the planar shift of the frequency; a square
+/// box also has circular motion, which determines s.
 #[test]
 fn boxes_have_third_order_coefficients_for_each_length() {
     let long = amplitude_dependence_at("box = [0.8, 0.5]", 0.4);
@@ -510,7 +508,8 @@ fn third_order_of(set: &ParameterSet) -> Vec<(String, f64)> {
 const WATER: Liquid =
     Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
 
-/// Only mode 1 has coefficients, and in a box the first mode along each length. Files for HubSlosh contain none for a box.
+/// Only mode 1 has coefficients (in a box: the first mode along each length). Files for HubSlosh
+/// contain none for a box.
 #[test]
 fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     let cylinder =
@@ -543,7 +542,6 @@ fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     assert!(third_order_of(&set).is_empty());
 }
 
-/// There are no coefficients for a torus, near a pole, in shallow liquid, and with dominant surface tension.
 #[test]
 fn parameter_files_without_large_wave_coefficients_state_the_reason() {
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
@@ -575,8 +573,6 @@ fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
     })
 }
 
-/// The parameter file has s and kappa at each point of the fill table, and the errors of both in its notes. It has no single
-/// pair of s and kappa for all fills.
 #[test]
 fn a_draining_tank_has_the_coefficients_of_every_fill() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -596,9 +592,8 @@ fn a_draining_tank_has_the_coefficients_of_every_fill() {
     assert_eq!(set.warnings, [""; 0]);
 }
 
-/// In the sphere third-order theory has poles from 0.556 to 0.63 m, and the coefficients are not known above 0.85 m. Between
-/// known fills the values of the table must stay between the neighbouring values; above the last known fill they keep its
-/// value.
+/// In the sphere the third order has poles from 0.556 to 0.63 m, and the coefficients are not known
+/// above 0.85 m.
 #[test]
 fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -631,7 +626,7 @@ fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills()
     assert_eq!(set.notes.iter().filter(unknown).count(), 4);
 }
 
-/// A torus has no coefficients at any fill, and a sphere with only one known fill has no second value to interpolate to.
+/// A torus has no coefficients at any fill, and the sphere has them at only one of the two fills.
 #[test]
 fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     for (shape, fills, why) in [
@@ -647,8 +642,6 @@ fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     }
 }
 
-/// The notes of a fill table state the errors of the coefficients between its points. They must equal the errors at further
-/// fills.
 #[test]
 fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
     compare_placed_tables(&[("cylinder = { radius = 0.5, height = 1.5 }", 0.7, 1.4)]);

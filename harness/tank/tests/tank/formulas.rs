@@ -11,8 +11,8 @@ fn laminar(mode: &Mode, nu: f64, g: f64) -> f64 {
     damping::laminar(mode.beta, nu, (g * mode.lambda).sqrt())
 }
 
-/// The factor tanh(1.84 x)^(-1/4) of the formula comes from the frequency in the layer's damping. The rounded 1.84 instead of
-/// 1.8412 makes a difference of 0.2 %.
+/// The factor tanh(1.84 x)^(-1/4) of Stephens's formula comes from the frequency in the layer's
+/// damping. Its rounded 1.84 instead of 1.8412 makes a difference of 0.2 %.
 #[test]
 fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     for fill in [0.02, 0.05, 0.0815, 0.15, 0.25] {
@@ -22,8 +22,8 @@ fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     }
 }
 
-/// The formula gives 1.39 to 1.54 times the damping ratio of the laminar layer from h/R = 0.5 on, but only 0.90 times at h/R
-/// = 0.2.
+/// The ratio of the two damping ratios is 1.39 to 1.54 from h/R = 0.5 on, but only 0.90 at h/R =
+/// 0.2.
 #[test]
 fn mikishev_and_dorozhkin_s_formula_is_below_the_laminar_layer_in_shallow_liquid() {
     for (x, least, most) in
@@ -36,8 +36,8 @@ fn mikishev_and_dorozhkin_s_formula_is_below_the_laminar_layer_in_shallow_liquid
     }
 }
 
-/// The wall factor beta of a cylinder in closed form is compared with the solver's value for the cylinder's contour. The
-/// damping of a box is compared with Keulegan's logarithmic decrement in his own form, (sqrt(pi nu T)/w) [1 + w/a + (pi
+/// Compares the damping of a cylinder in closed form with the solver's value for its contour, and
+/// the damping of a box with Keulegan's logarithmic decrement: (sqrt(pi nu T)/w) [1 + w/a + (pi
 /// w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2 pi zeta.
 #[test]
 fn damping_of_the_laminar_layer_in_cylinder_and_box_equals_published_values() {
@@ -58,7 +58,7 @@ fn damping_of_the_laminar_layer_in_cylinder_and_box_equals_published_values() {
     }
 }
 
-/// The two branches of the formula for spheres must have the same value in a half-full sphere. Up to this fill the formula
+/// The two branches of the formula must agree in a half-full sphere. Up to this fill the formula
 /// gives 2 to 4.5 times the damping of the laminar layer.
 #[test]
 fn damping_of_a_sphere_is_continuous_at_half_fill() {
@@ -83,8 +83,8 @@ fn damping_of_cone_and_torus_equals_values_computed_by_hand() {
     assert!((torus * core::f64::consts::TAU / fit - 1.0).abs() < 1e-12);
 }
 
-/// The frequency omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) must hold exactly, and the integral over a drawn
-/// contour must give the same result. At g = 0 only the stiffness by surface tension remains.
+/// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) holds exactly, and the integral over a
+/// drawn contour gives the same result. At g = 0 only the stiffness by surface tension remains.
 #[test]
 fn capillarity_of_a_flat_surface_is_exact_in_a_cylinder() {
     let (r, h) = (0.0815f64, 0.1);
@@ -125,8 +125,8 @@ fn capillarity_of_a_flat_surface_is_exact_in_a_cylinder() {
     assert!(!strong.unknown, "nothing is known there, but it is 1e-5 of omega^2");
 }
 
-/// Contact angles, degrees, that belong to the columns of the meniscus table. Its values are Omega_1^2 = omega_1^2 rho
-/// R^3/sigma of a deep cylinder, with a row for each Bond number.
+/// Contact angles, degrees, of the columns of the table of frequencies omega_1^2 rho R^3/sigma of a
+/// deep cylinder; its rows are Bond numbers.
 const ANGLES: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
 const MENISCUS: [(f64, [f64; 7]); 6] = [
     (0.0, [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263]),
@@ -155,8 +155,8 @@ fn real(set: &ParameterSet, name: &str) -> f64 {
     }
 }
 
-/// Computes omega_1^2 = g/l + k/m from the file for the FMU, as rho R^3 omega_1^2/sigma. Every value of the table must agree
-/// to its last digit. The liquid is so deep that tanh(20 xi) is 1.
+/// The file for the FMU gives omega_1^2 = g/l + k/m. Every value of the table must agree to its
+/// last digit. The liquid is so deep that tanh(20 xi) is 1.
 #[test]
 fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     let sigma = 0.072;
@@ -175,9 +175,9 @@ fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     }
 }
 
-/// At a contact angle of 90 degrees the result must be bit-identical to the flat surface. For large Bond numbers the
-/// contribution to rho R^3 omega^2/sigma tends to xi^3 - 2 xi^2 cos(angle), to 1e-9 at Bo = 1e12. Below about 23 degrees it
-/// is negative, and the file has 0 instead and a warning. Without surface tension there is no stiffness.
+/// At 90 degrees the result is bit-identical to the flat surface. For large Bond numbers the
+/// contribution to rho R^3 omega^2/sigma is xi^3 - 2 xi^2 cos(angle). Below about 23 degrees it is
+/// negative, and the file has 0 instead and a warning.
 #[test]
 fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     let (xi, sigma) = (1.841_183_781_340_659_3f64, 0.072);
@@ -208,9 +208,8 @@ fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     assert!(!none.warnings.iter().any(told), "0 is allowed: {:?}", none.warnings);
 }
 
-/// At a contact angle of 90 degrees the frequency equals the frequency with a flat surface. Between the values of the table
-/// it must rise steadily with the Bond number and with the angle, and for large Bond numbers the shift must approach its
-/// known limit.
+/// The frequency rises steadily with the Bond number and with the angle, and the shift approaches
+/// its known limit for large Bond numbers.
 #[test]
 fn the_frequency_with_a_curved_meniscus_is_smooth_between_the_values_of_the_table() {
     let xi = 1.841_183_781_340_659_3f64;
@@ -294,8 +293,8 @@ fn damped(
     .unwrap()
 }
 
-/// A tank must have the same damping if it is drawn in one piece or in three pieces, shifted along its axis, drawn as an
-/// ellipse with equal axes, or as the wetted part of a larger tank.
+/// The tank is drawn in one piece or in three pieces, shifted along its axis, drawn as an ellipse
+/// with equal axes, or as the wetted part of a larger tank.
 #[test]
 fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
     let half = 1.0 / 2.0_f64.sqrt();
@@ -346,8 +345,9 @@ fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
     assert_eq!(damped(capsule, 0.4, 1e-6, 0.05, None).shape, "sphere");
 }
 
-/// At h/R = 0.2 and R = 0.5 m, 1.45 times the damping ratios of the laminar layer of the first three modes are 2.98e-3,
-/// 1.06e-3 and 0.56e-3 (computed by hand to three digits). By Stephens the factor of the first mode is 1.493 instead of 1.45.
+/// At h/R = 0.2 and R = 0.5 m, 1.45 times the damping ratios of the laminar layer of the first
+/// three modes are 2.98e-3, 1.06e-3 and 0.56e-3 (computed by hand). By Stephens the factor of the
+/// first mode is 1.493.
 #[test]
 fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     let found =
@@ -376,8 +376,6 @@ fn the_damping_ratio_of_a_cylinder_comes_with_the_source_of_its_formula() {
     }
 }
 
-/// Warnings must name each measured range of a shape's correlation that the tank is outside of, at the effective specific
-/// force.
 #[test]
 fn the_damping_ratio_of_a_tank_names_each_measured_range_that_the_tank_leaves() {
     let number = damping::sphere_number(0.5, 1e-6, 9.81);
@@ -406,8 +404,8 @@ fn the_damping_ratio_of_a_tank_names_each_measured_range_that_the_tank_leaves() 
     }
 }
 
-/// In a half-full sphere of 0.5 m the correlation is within its measured range at 0.05 m/s2, where it gives 2.1 times the
-/// estimate for unmeasured shapes. At 9.81 m/s2 it is outside of this range.
+/// In a half-full sphere of 0.5 m the correlation is within its measured range at 0.05 m/s², where
+/// it gives 2.1 times the estimate for unmeasured shapes, and outside of this range at 9.81 m/s².
 #[test]
 fn two_damping_estimates_that_disagree_are_both_reported() {
     let shape = "shape = { sphere = { radius = 0.5 } }";
@@ -424,8 +422,7 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
     assert!(outside.modes[0].zeta < correlation && correlation < outside.modes[0].interval[1]);
 }
 
-/// Without gravity the frequency follows from surface tension only, and the damping must stay finite. At a Bond number of 45
-/// the interval ends at the result of drop-tower tests.
+/// At a Bond number of 45 the interval ends at the result of drop-tower tests.
 #[test]
 fn damping_follows_from_capillarity_without_gravity() {
     let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
@@ -441,8 +438,6 @@ fn damping_follows_from_capillarity_without_gravity() {
     assert!(low.modes[0].interval[1] > 1.8 * low.modes[0].zeta);
 }
 
-/// For a box of 0.8 m by 0.5 m the file states along which side HubSlosh's modes move, and warns that rotary slosh also needs
-/// the modes along the other side.
 #[test]
 fn the_file_of_a_box_states_along_which_side_its_modes_move() {
     let set = |lengths: &str| {
@@ -477,8 +472,6 @@ fn the_file_of_a_box_states_along_which_side_its_modes_move() {
     assert!(square.iter().all(|(name, _)| !name.starts_with("slosh.table.direction")));
 }
 
-/// If the sentence on the damping names a second estimate, it must state the value of this estimate with at least three
-/// digits.
 #[test]
 fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
     let number = |taken: &str, before: &str| -> f64 {
@@ -502,8 +495,8 @@ fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
     assert!((correlation / found.correlation.unwrap() - 1.0).abs() < 1e-3, "{}", found.taken);
 }
 
-/// The table of the curved meniscus holds for deep liquid. The warning must appear if the surface is noticeably curved (low
-/// Bond number) and the liquid is less than a radius deep. Here the Bond number is 100 g.
+/// The table holds for deep liquid. The warning appears if the surface is noticeably curved (low
+/// Bond number) and the liquid is less than a radius deep. In this test Bo = 100 g.
 #[test]
 fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
     let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", 0.2, 1).modes[0];
@@ -540,8 +533,7 @@ fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
     assert!((added(-0.1) / added(0.0) - 1.0).abs() < 1e-12);
 }
 
-/// For a half-full sphere only a first-order formula for surface tension exists. The frequency counts as unknown if surface
-/// tension adds more than a tenth of the stiffness by gravity. Here the Bond number is 1e4 g.
+/// The tank is a half-full sphere with Bo = 1e4 g, for which only a first-order formula exists.
 #[test]
 fn a_frequency_is_unknown_if_capillarity_adds_more_than_a_tenth_of_gravity() {
     let half = &solve("shape = { sphere = { radius = 1.0 } }", 1.0, 1).modes[0];
@@ -561,9 +553,8 @@ fn a_frequency_is_unknown_if_capillarity_adds_more_than_a_tenth_of_gravity() {
     );
 }
 
-/// In Spacecraft and SloshTank a box with two lengths has planar modes along both sides. Rigid liquid and slosh masses at
-/// rest together must have the mass and the centre of mass of the liquid, and about either axis the inertia of liquid under a
-/// lid, which is known in closed form.
+/// Fixed mass and slosh masses at rest together have the mass and the centre of mass of the liquid,
+/// and about either axis the inertia of liquid under a lid, which is known in closed form.
 #[test]
 fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     let tank = Tank::parse("density = 1000.0\nbox = [0.8, 0.5]", Path::new("")).unwrap();
@@ -619,9 +610,8 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     }
 }
 
-/// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere through bottom and contact line
-/// is up to a fifth of the difference between height and width. The test uses the sizes of a laboratory model and of a
-/// launcher.
+/// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere
+/// through bottom and contact line is up to a fifth of the difference between height and width.
 #[test]
 fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

@@ -5,9 +5,10 @@ use core::fmt::Write as _;
 use hubslosh_tank::picture::{COLOURS, FAINT, Frame, page, text};
 use hubslosh_tank::third_order::Overlaps;
 
-/// Draws how the first frequency of an upright cylinder depends on the amplitude, over the depth: the change of the squared
-/// frequency per squared slosh angle in planar and in circular motion, for the liquid and for a pendulum. Third-order theory
-/// has poles at the secondary resonances. Points mark the fills of the bench, 5 and 10 cm.
+/// Draws the amplitude dependence of the first frequency of an upright cylinder over the depth as
+/// SVG: shifts of omega^2 per squared slosh angle in planar and in circular motion, for the liquid
+/// and for a pendulum. The third order has poles at the secondary resonances. Points mark the fills
+/// of the bench, 5 and 10 cm.
 pub fn draw(overlaps: &Overlaps) -> String {
     let frame =
         Frame { left: 80.0, top: 96.0, width: 620.0, height: 360.0, x: [0.1, 2.0], y: [-1.0, 1.0] };
@@ -66,8 +67,8 @@ pub fn draw(overlaps: &Overlaps) -> String {
     page(720.0, frame.top + frame.height + 50.0, title, &svg)
 }
 
-/// Returns the depths, m, at which an excited mode has twice the frequency of the first mode, in ascending order, each with
-/// the azimuthal and radial number of the mode. Near these depths third-order theory is not valid.
+/// Returns the depths, m, at which an excited mode has twice the frequency of the first mode, in
+/// ascending order, each with the excited mode. Near these depths the third order is not valid.
 pub fn resonances(overlaps: &Overlaps) -> Vec<(f64, [usize; 2])> {
     let mut found = Vec::new();
     for mode in &overlaps.excited {

@@ -3,8 +3,8 @@
 use crate::common::{reference, solve, tank, toml};
 use hubslosh_tank::closed_form;
 
-/// The wall does no work on the liquid if the sphere rotates about its centre, so that all hinges are there. The required
-/// accuracy is 1e-6 R. The height of a mode is m h divided by m, so that its error is 1e-10 divided by the mass ratio.
+/// The wall does no work on the liquid if the sphere rotates about its centre. The height of a mode
+/// is m h divided by m, so that its error is 1e-10 divided by the mass ratio.
 #[test]
 fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     for i in 1..20 {
@@ -23,8 +23,8 @@ fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     }
 }
 
-/// The reference values are those of Budiansky (1960) for the half-full sphere, to more digits, and a table over the fill
-/// whose nine digits were computed twice. The tolerance is half a unit of the last digit.
+/// Compares with the half-full sphere of Budiansky (1960), to more digits, and with a table whose
+/// nine digits were computed twice.
 #[test]
 fn spheres_have_the_known_frequencies_and_masses() {
     let table = [
@@ -49,9 +49,9 @@ fn spheres_have_the_known_frequencies_and_masses() {
     }
 }
 
-/// A nearly empty sphere is a shallow paraboloid, with lambda_n R = 2 n^2 - 1 and corrections of the order of h/R times n^4.
-/// A nearly full sphere is the ice-fishing problem (a small circular opening in a plane lid), in which lambda_1 times the
-/// radius of the surface is 2.7547.
+/// Nearly empty, the sphere is a shallow paraboloid, in which lambda_n R tends to 2 n^2 - 1. Nearly
+/// full, it is the ice-fishing problem (a small circular opening in a plane lid), in which lambda_1
+/// times the radius of the surface is 2.7547.
 #[test]
 fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     let data = solve("shape = { sphere = { radius = 1.0 } }", 1e-3, 3);
@@ -65,9 +65,8 @@ fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     assert!((data.modes[0].m / (1000.0 * a.powi(3)) - 1.933).abs() < 0.01);
 }
 
-/// In a shallow spherical dish almost no inertia is left after five modes: m_4 l_4^2 is 5e-14 m R^2 at h = 0.01 R, so that
-/// the computed inertia of the fixed mass consists of its error. The fixed mass is at the sphere's centre, 7 to 220 R above
-/// the liquid.
+/// A shallow dish leaves almost no inertia after five modes, so that the computed I_0 consists of
+/// its error. The fixed mass is at the sphere's centre, 7 to 220 R above the liquid.
 #[test]
 fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     for fill in [1e-2, 1e-3, 1e-4, 1e-5] {
@@ -81,9 +80,9 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     }
 }
 
-/// Effective inertias in closed form are compared with sums over 20,000 modes, whose remainder is 50^-3 of the remainder
-/// after 400 modes. In shallow liquid an earlier sum of 400 modes was wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for
-/// the annulus, although the stated error was 1e-11.
+/// The sums run over 20,000 modes, whose remainder is 50^-3 of the remainder after 400 modes. In
+/// shallow liquid a sum of 400 modes is wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for the
+/// annulus.
 #[test]
 fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     let xi = closed_form::zeros_of_j1_slope(20_000);
@@ -110,8 +109,8 @@ fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     assert!(off.abs() < 1e-11, "annulus: {off}");
 }
 
-/// The inertia of the fixed mass is a difference, I_eff - m_0 h_0^2 - sum m h^2. Its stated error must be at least the error
-/// of the effective inertia I_eff, and must grow with the distance of the fixed mass from the centre of mass.
+/// I_0 = I_eff - m_0 h_0^2 - sum m h^2 is a difference, so that its error is at least the error of
+/// I_eff and grows with the distance of the fixed mass from the centre of mass.
 #[test]
 fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     for (shape, fill) in [
@@ -127,8 +126,8 @@ fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     }
 }
 
-/// The exact potential is phi_1 = r z, with lambda_1 = 1/h, m_1 = 3/4 of the liquid, H_1 = 0.6 h, the hinge at 1.6 h, and the
-/// wave h. All other modes have no mass, and the fixed quarter of the liquid is above the liquid's centre.
+/// The exact solution is phi_1 = r z with lambda_1 = 1/h, 3/4 of the liquid's mass at 0.6 h, the
+/// hinge at 1.6 h, and the wave h.
 #[test]
 fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     for h in [0.3, 1.2] {
@@ -148,7 +147,7 @@ fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     }
 }
 
-/// The fixed mass must be positive, because it is an added mass with pressure 0 on the surface.
+/// The fixed mass is an added mass with pressure 0 on the surface, so that it cannot be negative.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn the_fixed_mass_is_positive_for_any_number_of_modes() {
@@ -205,8 +204,8 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
     }
 }
 
-/// The known sums are the sum of all modal masses and the limits of the inertia. The sum of 1/(xi^2 - 1) is 1/2; after the
-/// first 400 zeros xi the remainder is 1/(400 pi^2).
+/// The sums are all modal masses and the limits of the inertia. The sum of 1/(xi^2 - 1) is 1/2;
+/// after the first 400 zeros xi the remainder is 1/(400 pi^2).
 #[test]
 fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     let xi = closed_form::zeros_of_j1_slope(400);
@@ -235,7 +234,7 @@ fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     );
 }
 
-/// The FMU's formulas for an upright cylinder are m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2 xi
+/// The FMU's formulas are m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2 xi
 /// h/d)) and a wave of 2 R/(xi^2 - 1) per angle.
 #[test]
 fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
@@ -255,8 +254,9 @@ fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
     }
 }
 
-/// If all lengths are multiplied by c, wave numbers must be divided by c, masses must grow as c^3 and inertias as c^5. A
-/// shift of the contour along the axis must shift all heights by the same amount and change nothing else.
+/// If all lengths are multiplied by c, lambda is divided by c, masses grow as c^3 and inertias as
+/// c^5. A shift of the contour along the axis shifts all heights by the same amount and changes
+/// nothing else.
 #[test]
 fn slosh_modes_scale_and_shift_with_the_contour_of_the_tank() {
     let profile = |c: f64, z: f64| {
@@ -284,7 +284,7 @@ fn slosh_modes_scale_and_shift_with_the_contour_of_the_tank() {
     }
 }
 
-/// The wall is cut near the angle at which two segments count as a corner. The result must not change.
+/// The angles between the segments are near the angle from which on two segments count as a corner.
 #[test]
 fn cutting_a_wall_into_more_segments_changes_nothing() {
     let one = solve("profile = [{ arc = [0, 1, 1, -90, 30] }]", 1.3, 5);
@@ -299,8 +299,7 @@ fn cutting_a_wall_into_more_segments_changes_nothing() {
     }
 }
 
-/// Covers nearly full and nearly empty tanks, cusps and thin gaps, where the solver is less accurate. The true error is known
-/// from the hinge of a sphere and from the closed form of an annulus.
+/// The true error is known from the hinge of a sphere and from the closed form of an annulus.
 #[test]
 fn the_true_error_is_below_the_stated_error_in_tanks_that_are_hard_to_solve() {
     compare_hinges_of_spheres(&[0.01, 1.99]);
@@ -331,8 +330,8 @@ fn compare_hinges_of_spheres(fills: &[f64]) {
     }
 }
 
-/// A full tank has no free surface, so that its errors are stated relative to its radius of gyration. The sizes differ by
-/// powers of two, so that all digits must agree.
+/// Errors of a full tank are stated relative to its radius of gyration. The sizes differ by powers
+/// of two, so that all digits must agree.
 #[test]
 fn a_full_tank_s_error_does_not_depend_on_its_size() {
     let error = |c: f64| {
@@ -344,9 +343,9 @@ fn a_full_tank_s_error_does_not_depend_on_its_size() {
     assert_eq!([error(0.0625), error(16.0)], [error(1.0); 2]);
 }
 
-/// For a lens and a needle, two discretisations differ by 2e-7, so that a third, finer one is used. A knuckle of 2 % of the
-/// radius gets panels that are as short as the gap between its ends. A shelf 2 cm thick, 2 cm above the floor, needs shorter
-/// panels for an error of 1e-6.
+/// For a lens and a needle, two discretisations differ by 2e-7, so that a third, finer one is used.
+/// A knuckle of 2 % of the radius gets panels that are as short as the gap between its ends. A
+/// shelf 2 cm thick, 2 cm above the floor, needs shorter panels for an error of 1e-6.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn thin_liquids_and_small_details_are_solved_as_accurately_as_other_tanks() {
@@ -366,8 +365,8 @@ fn thin_liquids_and_small_details_are_solved_as_accurately_as_other_tanks() {
     }
 }
 
-/// A dome that bulges into the tank meets the cylinder in a cusp. The result must differ only slightly from the result for a
-/// tank in which the last 1e-3 R of the cusp is filled up.
+/// A dome that bulges into the tank meets the cylinder in a cusp. The reference is a tank in which
+/// the last 1e-3 R of the cusp is filled up.
 #[test]
 fn a_cusp_at_the_edge_of_an_inverted_dome_hardly_changes_the_result() {
     let cusp = solve(
@@ -391,8 +390,8 @@ fn a_cusp_at_the_edge_of_an_inverted_dome_hardly_changes_the_result() {
     }
 }
 
-/// Wave numbers must scale as inverse lengths. In a thin annulus the first wave number tends to 1/R (a wave around the
-/// circle), and the next ones to n pi/(R - R_i) (standing waves between the two walls).
+/// In a thin annulus the first wave number is 1/R (a wave around the circle), and the next ones are
+/// n pi/(R - R_i) (standing waves between the two walls).
 #[test]
 fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     let ones = closed_form::annular_wave_numbers(0.4, 1.0, 5);
@@ -415,7 +414,7 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     }
 }
 
-/// For each axis of the box, lambda times the length L along the waves is k L tanh(k h) with k L = pi, 3 pi, ….
+/// Lambda times the length along the waves is k L tanh(k h) with k L = pi, 3 pi, ….
 #[test]
 fn each_axis_of_a_box_has_the_frequencies_of_its_length() {
     let data = closed_form::rectangular(0.8, 0.5, 0.2, 1000.0, 2);

@@ -23,8 +23,8 @@ fn the_committed_figure_of_the_documentation_equals_the_drawn_figure() {
     is_drawn(&svg, "../../modelDescription/HubSlosh/documentation/liquid.svg");
 }
 
-/// The expected pictures, of a tank with a dome, its modes and its sweep, were inspected by eye once. This test reports any
-/// change.
+/// The expected pictures, of a tank with a dome, its modes and its sweep, were inspected by eye
+/// once.
 #[test]
 fn pictures_of_a_tank_and_its_sweep_equal_the_inspected_ones() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/common_bulkhead.toml");
@@ -41,7 +41,7 @@ fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }
 
-/// A tank four times as large must be drawn with the same lines; only the numbers at the axes differ.
+/// Only the numbers at the axes differ.
 #[test]
 fn the_picture_of_a_scaled_tank_has_identical_lines() {
     let drawn = |factor: f64| {
@@ -118,9 +118,8 @@ fn points(path: &str) -> Vec<[f64; 2]> {
     path.split(['M', 'L']).skip(1).map(place).collect()
 }
 
-/// Compares the area of the liquid to the right of the axis, divided by the squared distance from the axis to the tank's
-/// wall, with its exact value: for example fill over radius for a cylinder. The tolerance is a hundredth of a pixel of some
-/// hundred pixels.
+/// The exact area is relative to the squared distance from the axis to the tank's wall; for a
+/// cylinder it is fill over radius. The tolerance is a hundredth of a pixel of some hundred pixels.
 #[test]
 fn the_drawn_liquid_has_the_area_of_the_wetted_section() {
     for (text, fill, area) in [

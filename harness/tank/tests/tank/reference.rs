@@ -4,9 +4,9 @@ use crate::common::{number, reference, tank, toml};
 use hubslosh_tank::{Mode, Rest};
 use serde_json::Value;
 
-/// Returns the largest deviations of `modes` and `rest`, the fixed masses, from the reference `case`: of wave numbers and
-/// pendulum lengths (relative), of masses (divided by `m_liq`), of m H (divided by `m_liq` `r`), of inertias (divided by
-/// `m_liq` `r`^2), and of waves (divided by `r`). `first` is the number of the first mode that is compared.
+/// Returns the largest deviations of the modes, from number `first` on, and of the fixed mass from
+/// the reference `case`: of lambda and l (relative), of masses (relative to `m_liq`), of moments m
+/// H (to m_liq r), of inertias (to m_liq r^2), and of waves (to `r`).
 fn deviation(
     case: &Value,
     modes: &[Mode],
@@ -51,8 +51,9 @@ fn deviation(
     worst
 }
 
-/// The documentation promises an error of 1e-6 for three modes and 1e-5 for five. This test requires 1e-9, which the solver
-/// reaches (1e-8 for waves, which are extrapolated to the contact line), and a true error below the stated error.
+/// The documentation promises an error of 1e-6 for three modes and 1e-5 for five. This test
+/// requires 1e-9, which the solver reaches (1e-8 for waves, which are extrapolated to the contact
+/// line).
 #[test]
 fn every_reference_tank_is_reproduced_within_the_stated_error() {
     for case in reference().iter().filter(|case| case["kind"] == "revolution") {
@@ -96,8 +97,7 @@ fn every_reference_tank_is_reproduced_within_the_stated_error() {
     }
 }
 
-/// A mode whose mass is below 1e-9 of the liquid has no defined height, but a defined moment m h. The example is modes 2 to 5
-/// of a cone of 45 degrees.
+/// The example is modes 2 to 5 of a cone of 45 degrees, whose mass is below 1e-9 of the liquid.
 #[test]
 fn massless_modes_have_no_height_and_keep_their_moment() {
     let cases = reference();
@@ -132,7 +132,7 @@ fn the_reference_box_is_reproduced_on_both_axes() {
     assert_eq!(data.modes, axes.x.modes);
 }
 
-/// The closed form of the annular cylinder sums 100 terms and estimates the remainder, with an error of 1e-11 m R^2.
+/// The closed form sums 100 terms and estimates the remainder; the tolerance is 1e-11 m R^2.
 #[test]
 fn the_reference_annulus_is_reproduced_in_closed_form() {
     let cases = reference();

@@ -10,8 +10,9 @@ use hubslosh_tank::{Fill, Tank};
 
 const RHO: f64 = 1000.0;
 
-/// Returns the volume and the rotating liquid of a tank of 1 m radius that is filled to the fraction `share` of its volume.
-/// `flatness` is the spin number Omega^2 R/g with g = 1 m/s²; if `weightless` is true, g is 0.
+/// Spins a tank that is filled to the fraction `share` of its volume, under 1 m/s², or without
+/// gravity if `weightless` is true, and with Omega^2 R/g = `flatness` for R = 1 m and g = 1 m/s².
+/// Returns the mass of the liquid and its steady rotation.
 fn spin_tank(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Spin) {
     let tank = Tank::from_shape(shape, RHO).unwrap();
     let data = tank.solve(tank.fill_height(Fill::Share(share)).unwrap(), 1).unwrap();
@@ -23,8 +24,8 @@ fn close(found: f64, expected: f64, error: f64) {
     assert!((found - expected).abs() <= error, "{found} is not {expected} within {error}");
 }
 
-/// The free surface in an upright cylinder of radius 1 m is a paraboloid with closed forms, as long as the whole floor is wet
-/// and the surface stays below the lid.
+/// The surface is a paraboloid with closed forms as long as the whole floor is wet and the surface
+/// stays below the lid.
 #[test]
 fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
@@ -37,8 +38,8 @@ fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     }
 }
 
-/// Without thrust the surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 - f^(2/3)) in a
-/// sphere filled to the fraction f.
+/// The surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 -
+/// f^(2/3)) in a sphere filled to the fraction f.
 #[test]
 fn weightless_liquid_in_a_spinning_tank_lies_at_the_wall() {
     let (m, found) = spin_tank(Shape::Cylinder { radius: 1.0, height: 2.0 }, 0.3, 1.0, true);
@@ -54,8 +55,9 @@ fn weightless_liquid_in_a_spinning_tank_lies_at_the_wall() {
     }
 }
 
-/// If both poles of the sphere are dry, the wall's pressure acts everywhere through the centre of the sphere. Equilibrium in
-/// the rotating frame therefore puts the centre of mass at z_cg = -g/Omega^2 from the centre, for any fill.
+/// If both poles are dry, the wall's pressure acts everywhere through the centre of the sphere.
+/// Equilibrium in the rotating frame therefore puts the centre of mass at z_cg = -g/Omega^2 from
+/// the centre, for any fill.
 #[test]
 fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     for (share, flatness) in [(0.25, 5.0), (0.25, 10.0), (0.5, 5.0), (0.5, 30.0)] {
@@ -65,9 +67,9 @@ fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     }
 }
 
-/// The other program computed the expected values to 8 digits by integration over the section. Each row has the fraction of
-/// the volume, Omega^2 R/g, z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), and the heights of the apex and of the
-/// contact line.
+/// An independent program computed the expected values to 8 digits by integration over the section.
+/// Each row has the fraction of the volume, Omega^2 R/g, z_cg/R from the centre, I_axis/(m R^2),
+/// I_cg/(m R^2), and the heights of the apex and of the contact line.
 #[test]
 fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     let rows = [
@@ -86,8 +88,8 @@ fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     }
 }
 
-/// At every spin the mass must equal the mass at rest. At a spin of almost 0, centre of mass and inertias must also equal
-/// their values at rest.
+/// At every spin the mass equals the mass at rest. At a spin of almost 0, centre of mass and
+/// inertias also equal their values at rest.
 #[test]
 fn spin_keeps_the_mass_and_a_slow_spin_also_keeps_centre_and_inertia() {
     let shapes = [
@@ -107,8 +109,9 @@ fn spin_keeps_the_mass_and_a_slow_spin_also_keeps_centre_and_inertia() {
     }
 }
 
-/// The expected frequencies come from a solution that is valid for any spin rate. They are the frequencies in the rotating
-/// frame of the tank, in units of sqrt(g/R), for waves that run against the spin and with the spin.
+/// The expected frequencies come from a solution that is valid for any spin rate. They are in the
+/// rotating frame of the tank, in units of sqrt(g/R), for waves that run against the spin and with
+/// the spin.
 #[test]
 fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liquid() {
     let rows = [
@@ -126,8 +129,8 @@ fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liqu
     }
 }
 
-/// The tank of radius 0.3 m is filled to 0.4 m, at 5 m/s² and 9 rad/s. The inertia about the axis is 5.09 kg·m² of the liquid
-/// at rest and 6.38 kg·m² of the rotating liquid, whose surface touches a lid at 0.6 m.
+/// The inertia about the axis is 5.09 kg·m² at rest and 6.38 kg·m² for the rotating liquid, whose
+/// surface touches the lid.
 #[test]
 fn liquid_that_spins_too_fast_for_a_pendulum_is_out_of_range() {
     let tank = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
@@ -150,8 +153,8 @@ fn liquid_that_spins_too_fast_for_a_pendulum_is_out_of_range() {
     assert!(sphere.in_range && sphere.warnings[0].contains("pendulum"), "{:?}", sphere.warnings);
 }
 
-/// The expected mass of the spinning liquid is computed by an independent integral over the radius, 2 pi rho int r
-/// (z_surface - z_floor) dr.
+/// The expected mass is an independent integral over the radius, 2 pi rho int r (z_surface -
+/// z_floor) dr.
 #[test]
 fn spin_bares_the_floor_of_an_annulus_at_its_inner_wall() {
     let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };
@@ -163,7 +166,8 @@ fn spin_bares_the_floor_of_an_annulus_at_its_inner_wall() {
     close(found.z_wall, 1.5 * u, 1e-9);
 }
 
-/// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it would lie in two pools.
+/// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it
+/// would lie in two pools.
 #[test]
 fn spin_that_would_divide_the_liquid_into_two_pools_is_refused() {
     let hourglass = "density = 1000\nprofile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 0.5] }, \
@@ -191,8 +195,8 @@ fn spin_is_refused_for_boxes_full_tanks_and_invalid_rates() {
     assert!(spin(&sphere, &full, 1.0, 5.0, None).unwrap_err().to_string().contains("full"));
 }
 
-/// In the parameter file, spin_decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright cylinder at
-/// h/R = 1 is 0.496.
+/// The spin decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright
+/// cylinder at h/R = 1 is 0.496.
 #[test]
 fn parameter_files_have_the_spin_decay_and_the_gyroscopic_coefficient() {
     let of = |shape: Shape, nu: Option<f64>, target: Target| {

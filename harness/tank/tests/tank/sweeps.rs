@@ -9,8 +9,8 @@ fn fills(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
 }
 
-/// Without liquid, and without a free surface, there must be no NaN. Liquid that fills a sphere does not rotate with the
-/// sphere: its effective inertia is 0, while rigid liquid would have 2/5 m R^2.
+/// Liquid that fills a sphere does not rotate with the sphere: I_eff is 0, while rigid liquid would
+/// have 2/5 m R^2.
 #[test]
 fn empty_and_full_tanks_have_no_modes() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -114,8 +114,7 @@ fn every_impossible_fill_of_a_sweep_is_reported() {
     assert!(sweep(&tank, &[], 2).is_err());
 }
 
-/// Compares the FMUs' interpolation, with the placed points, with solutions at eight other fills: frequency and mass within
-/// 0.5 %, hinge within 0.5 % of the radius.
+/// Compares the FMUs' interpolation between the placed points with solutions at eight other fills.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
@@ -193,7 +192,6 @@ fn a_placed_table_states_the_errors_between_its_points() {
     assert!(worst > 10.0 * placed, "{worst:e} {placed:e}");
 }
 
-/// Covers names and values of a fill table for both six-axis FMUs, and the fills and models that are refused.
 #[test]
 fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -248,8 +246,8 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     assert!(fill_table::place(&tank, 0.1, 1.0, 3).is_err());
 }
 
-/// In a cone of 45 degrees only the first mode has mass. In a sphere all modes have mass, and Spacecraft and SloshTank keep
-/// three of them.
+/// In a cone of 45 degrees only the first mode has mass. In a sphere all modes have mass, and
+/// Spacecraft and SloshTank keep three of them.
 #[test]
 fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
     let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
@@ -272,8 +270,8 @@ fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
     }
 }
 
-/// The parameter set states the interpolation errors of the table as percentages, and the test has them as fractions (0.001
-/// is 0.1 %). If an error is above 0.5 %, a warning says that the table has too few points.
+/// The parameter set states the errors as percentages, and the test has them as fractions. If an
+/// error is above 0.5 %, a warning says that the table has too few points.
 #[test]
 fn the_parameters_state_the_errors_between_a_table_s_points() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");

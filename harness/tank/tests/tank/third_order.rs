@@ -7,8 +7,8 @@ use hubslosh_tank::third_order::Overlaps;
 /// 1e-7.
 const COUNT: usize = 40;
 
-/// The tank is the bench's, R = 81.5 mm. The expected values come from an independent derivation and have three digits; the
-/// tolerance is half a unit of the last digit.
+/// The tank is the bench's, R = 81.5 mm. The expected values have three digits, and the tolerance
+/// is half a unit of the last digit.
 #[test]
 fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     let all = Overlaps::new(COUNT);
@@ -23,8 +23,9 @@ fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     }
 }
 
-/// Planar motion softens above a certain h/R and hardens below it. With one excited mode of each azimuthal number this depth
-/// is 0.5058, which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
+/// Above a certain depth h/R planar motion softens, below it hardens. With one excited mode of each
+/// azimuthal number it is 0.5058, which the literature rounds to 0.506; with more excited modes it
+/// falls to 0.5031.
 #[test]
 fn planar_hardening_begins_at_a_lower_depth_with_more_excited_modes() {
     let begins = |count: usize| {
@@ -42,7 +43,8 @@ fn planar_hardening_begins_at_a_lower_depth_with_more_excited_modes() {
     }
 }
 
-/// At these depths the frequency of the excited modes (0,1), (2,2) and (0,2) is twice the frequency of the first mode.
+/// At these depths the frequency of the excited modes (0,1), (2,2) and (0,2) is twice the frequency
+/// of the first mode.
 #[test]
 fn secondary_resonances_occur_at_the_predicted_depths() {
     let found = resonances(&Overlaps::new(5));
@@ -58,8 +60,8 @@ fn secondary_resonances_occur_at_the_predicted_depths() {
     assert_eq!(all.secondary_resonance(1.2), None);
 }
 
-/// The closed form in `formulas` uses Bessel functions and eight modes of each azimuthal number, whose overlap integrals have
-/// 15 digits.
+/// The closed form in `formulas` uses Bessel functions and eight modes of each azimuthal number,
+/// whose overlap integrals have 15 digits.
 #[test]
 fn upright_cylinders_have_the_coefficients_of_the_closed_form() {
     let all = Overlaps::round(0.0, 0.5, 8);
@@ -72,8 +74,8 @@ fn upright_cylinders_have_the_coefficients_of_the_closed_form() {
     }
 }
 
-/// The expected values are those of Tadjbakhsh and Keller, J. Fluid Mech. 8 (1960) 442: the frequency to third order and the
-/// elevation to second order.
+/// Compares with Tadjbakhsh and Keller, J. Fluid Mech. 8 (1960) 442: the frequency to third order
+/// and the elevation to second order.
 #[test]
 fn boxes_have_the_third_order_waves_of_tadjbakhsh_and_keller() {
     let length = 0.7;
@@ -95,9 +97,9 @@ fn boxes_have_the_third_order_waves_of_tadjbakhsh_and_keller() {
     }
 }
 
-/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel: its planar wave equals the
-/// wave in a box of length pi R, and its circular wave is Stokes's wave with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k
-/// a)^2/(8 T^4)].
+/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel:
+/// its planar wave equals the wave in a box of length pi R, and its circular wave is Stokes's wave
+/// with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
 #[test]
 fn annular_tanks_have_the_limits_of_a_circle_and_of_a_channel() {
     let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
