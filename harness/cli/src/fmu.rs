@@ -7,14 +7,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use pack::Fmi;
 
-/// Folders in which the project's FMUs may be, relative to the folder of the command: this folder itself, the command's
-/// data folder, and the Python package in which the command was installed.
+/// Folders, relative to the folder of this command, in which FMUs of this project may be installed:
+/// the folder of the command itself, its data folders, and the Python package with which the
+/// command was installed.
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 
-/// Returns the file of an FMU. `name` is a file, or the name of one of this project's FMUs. An FMU of this project is
-/// searched in the folder `dist`, to which `hubslosh pack` writes, then among the files installed with this command,
-/// then in `dist` of the source from which the command was built. If that source exists, a missing FMU is packed there.
+/// Returns the file of an FMU. `name` is a file, or the name of an FMU of this project. An FMU of
+/// this project is searched first in the folder `dist`, to which `hubslosh pack` writes, then among
+/// the files installed with this command, then in `dist` of the source from which the command was
+/// built. If that source exists, a missing FMU is packed there.
 ///
 /// # Errors
 ///
@@ -58,8 +60,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     Ok(packed)
 }
 
-/// Lists the FMUs that [`find`] finds without building one: first the files in `dist`, then the files installed with
-/// this command.
+/// Lists the FMUs that [`find`] finds without packing any: first the files in `dist`, then the
+/// files installed with this command.
 pub fn all() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for folder in ["dist".into()].into_iter().chain(folders()) {
@@ -77,7 +79,8 @@ pub fn find_installed(file: &str) -> Option<PathBuf> {
     folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
 }
 
-/// Returns a folder, such as `examples`, of the Python package in which this command was installed.
+/// Returns the folder with the name `folder`, for example `examples`, of the Python package with
+/// which this command was installed, or `None` if it was installed without the package.
 pub fn shipped_folder(folder: &str) -> Option<PathBuf> {
     let packages = folders().into_iter().filter(|fmus| fmus.ends_with("hubslosh/fmus"));
     packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())

@@ -1,18 +1,21 @@
 //! The command line `hubslosh`.
 
-/// Prints a line to stdout. If the reader of stdout has closed the pipe (`hubslosh variables | head`), this macro ends
-/// the program, whereas the macro of the standard library panics.
+/// Prints a line to stdout. If the reader of stdout has closed the pipe (as in `hubslosh variables
+/// | head`), the program ends without an error, whereas the macro of the standard library would
+/// panic.
 macro_rules! println {
     () => { crate::terminal::print("\n".into()) };
     ($($arguments:tt)*) => { crate::terminal::print(format!("{}\n", format_args!($($arguments)*))) };
 }
 
-/// Prints a text without a line break to stdout, and ends the program if the reader of stdout has closed the pipe.
+/// Prints a text without a line break to stdout. If the reader of stdout has closed the pipe, the
+/// program ends without an error.
 macro_rules! print {
     ($($arguments:tt)*) => { crate::terminal::print(format!($($arguments)*)) };
 }
 
-/// Prints a line about what was done, which is not a result; `--quiet` suppresses it.
+/// Prints a line that tells the user what was done, for example which file was written. It is not a
+/// result, so that `--quiet` suppresses it.
 macro_rules! done {
     ($($arguments:tt)*) => {
         crate::terminal::done(format_args!($($arguments)*))
@@ -66,7 +69,8 @@ struct Cli {
 }
 
 impl Cli {
-    /// Returns the FMU that the command loads into its own process, as the command line names it.
+    /// Returns the FMU that the command loads into its own process, as the command line names it, or
+    /// `None` for a command that loads no FMU there.
     fn fmu(&self) -> Option<&Path> {
         use Command::*;
         match self.command.as_ref()? {
@@ -81,8 +85,8 @@ impl Cli {
         }
     }
 
-    /// Returns true if the command's memory and files are limited. They are limited for commands that do little
-    /// else than simulate FMUs.
+    /// Returns `true` if memory and files of the command are limited. This is so for commands that
+    /// do little else than simulate FMUs.
     fn has_memory_limit(&self) -> bool {
         matches!(
             self.command,
@@ -135,8 +139,8 @@ enum Command {
     Book(book::BookArgs),
 }
 
-/// Returns the command line parser. It accepts negative numbers such as `-1` in `--fill -1` as values, so that the
-/// error message can state the allowed range.
+/// Returns the parser of the command line. It accepts negative numbers as values, for example in
+/// `--fill -1`, so that the error message can state the allowed range.
 fn command_line() -> clap::Command {
     fn with_negative_numbers(command: clap::Command) -> clap::Command {
         let of = |arg: clap::Arg| match arg.get_action().takes_values() {
@@ -148,8 +152,8 @@ fn command_line() -> clap::Command {
     with_negative_numbers(Cli::command()).color(terminal::color_of_arguments())
 }
 
-/// Makes SIGINT and SIGTERM end the guarded processes and remove temporary files before they end this program. SIGHUP
-/// is left alone, so that nohup works.
+/// Lets SIGINT and SIGTERM end the guarded processes and remove temporary files before they end
+/// this program. SIGHUP is left alone, so that nohup works.
 #[cfg(unix)]
 fn clean_up_on_signals() {
     use signal_hook::consts::{SIGINT, SIGTERM};
@@ -208,7 +212,8 @@ fn main() -> ExitCode {
     code.into()
 }
 
-/// Returns true if `cargo run` started this program; cargo sets the variable.
+/// Returns `true` if `cargo run` started this program, because only Cargo sets this environment
+/// variable.
 fn is_run_by_cargo() -> bool {
     std::env::var_os("CARGO_MANIFEST_DIR").is_some()
 }
@@ -286,8 +291,8 @@ fn run_command(cli: Cli) -> u8 {
     }
 }
 
-/// Runs the default job of `cargo run --release` with the FMU that it has packed: the campaign of the thesis
-/// and its report.
+/// Runs the campaign of the thesis and writes its report. Without a subcommand this is the job of
+/// `cargo run --release`, which has packed the FMU before.
 fn run_default_job() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();

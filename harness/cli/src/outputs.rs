@@ -9,8 +9,9 @@ use clap::parser::ValueSource;
 use files::input;
 use files::output::{self, Destination};
 
-/// Options whose values are files or directories that a command writes: command, option, and the endings of the files
-/// that it writes. All other values that name a file are inputs.
+/// Options whose values are files or directories that a command writes: name of the command, name
+/// of the option, and the endings of the files that are written. All other values that name a file
+/// are inputs.
 const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
@@ -38,8 +39,9 @@ const OUTPUTS: [(&str, &str, &[&str]); 22] = [
 
 const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat", "json", "svg"];
 
-/// Protects the inputs that the command line names. Refuses an output that would replace one of them, that looks like
-/// an input, or that is the same file as another output.
+/// Protects the inputs that the command line names from being overwritten. It refuses an output
+/// that would replace an input, that looks like an input, or that is the same file as another
+/// output.
 ///
 /// # Errors
 ///
@@ -98,8 +100,8 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     Ok(())
 }
 
-/// Protects a file from being overwritten and, for a plan or a tank, also the files that it names:
-/// recordings, torques, drawings.
+/// Protects the file `path` from being overwritten. For a plan or a tank, the recordings, torques
+/// and drawings that it names are protected, too.
 fn protect(path: &Path) {
     input::protect(path);
     if path.extension().is_none_or(|ending| ending != "toml") || !path.is_file() {
@@ -124,8 +126,8 @@ fn protect(path: &Path) {
     }
 }
 
-/// Lists the paths that a value may name: the value itself, and the text after each colon or sign of equality, as
-/// in `2:fuel.toml` and `file:path=torque.csv,hold=true`.
+/// Lists the paths that the value of an option may name: the value itself, and the text after each
+/// colon or equals sign, as in `2:fuel.toml` and `file:path=torque.csv,hold=true`.
 fn files_in(value: &OsStr) -> Vec<PathBuf> {
     let mut paths = vec![PathBuf::from(value)];
     let text = value.to_str().unwrap_or_default();
@@ -137,8 +139,8 @@ fn files_in(value: &OsStr) -> Vec<PathBuf> {
     paths
 }
 
-/// Returns the file to which a path leads after its links are followed; the file need not exist. `None` for a device or
-/// a pipe, to which several outputs may be written.
+/// Returns the file to which `path` leads after its links are followed; the file need not exist.
+/// The result is `None` for a device or a pipe, to which several outputs may be written.
 fn place(path: &Path) -> Option<PathBuf> {
     let Ok(Destination::File(file)) = output::destination(path) else { return None };
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());

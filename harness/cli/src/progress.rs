@@ -37,7 +37,8 @@ pub fn show_line(bar: &ProgressBar, line: &str) {
     }
 }
 
-/// Returns a progress bar; it is hidden with `--quiet`, or if stderr is not a terminal.
+/// Returns a progress bar with the style `template`. It is hidden with `--quiet`, or if stderr is
+/// not a terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
     if terminal::has_reader() {
@@ -57,8 +58,8 @@ fn bar(template: &str) -> Result<ProgressBar> {
     Ok(bar)
 }
 
-/// A terminal with a single line, for [`TermLike`]. It sends each line that the progress bar draws as a message to the
-/// program that started this one.
+/// A terminal with a single line. Each line that the progress bar draws on it is sent as a message
+/// to the program that started this one.
 #[derive(Debug, Default)]
 struct Messages {
     line: Mutex<String>,

@@ -48,21 +48,22 @@ pub fn is_quiet() -> bool {
     terminal().quiet
 }
 
-/// Returns true if the program that started this one reads messages (option `--messages`, used by the Python
-/// package).
+/// Returns `true` if the program that started this one reads messages. The Python package asks for
+/// messages by the option `--messages`.
 pub fn has_reader() -> bool {
     terminal().messages
 }
 
-/// Sends a message to the program that started this one. `value` is JSON and may have several lines.
+/// Sends the message `name` to the program that started this one. `value` is JSON and may have
+/// several lines.
 pub fn message(name: &str, value: &str) {
     // Line breaks inside a string are escaped, so that all line breaks are layout and can be removed.
     let value: String = value.lines().map(str::trim).collect();
     print(format!("\u{1e}{{{name:?}:{value}}}\n"));
 }
 
-/// Finds the value of `--color` before the command line is parsed, for messages about the command line
-/// itself.
+/// Finds the value of `--color` in the arguments before the command line is parsed, because
+/// messages about a wrong command line must have the right colours, too.
 pub fn color_of_arguments() -> ColorChoice {
     let arguments: Vec<_> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     let flags = arguments.iter().take_while(|argument| *argument != "--");
@@ -79,21 +80,22 @@ pub fn error(text: impl std::fmt::Display) {
     print_to_stderr(format!("{} {text}\n", with_style("error:", *Styles::styled().get_error())));
 }
 
-/// Prints a warning. With `--strict` a warning makes the exit code 1.
+/// Prints a warning to stderr. With the option `--strict` a warning makes the exit code 1.
 pub fn warn(text: impl std::fmt::Display) {
     WARNINGS.fetch_add(1, Ordering::Relaxed);
     let style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
     print_to_stderr(format!("{} {text}\n", with_style("warning:", style)));
 }
 
-/// Prints a line about progress to stderr; `--quiet` suppresses it.
+/// Prints a line about progress to stderr, unless the option `--quiet` is given.
 pub fn note(text: impl std::fmt::Display) {
     if !is_quiet() {
         print_to_stderr(format!("{text}\n"));
     }
 }
 
-/// Returns the exit code of a command that has done its work: 0, or 1 if `--strict` makes warnings errors.
+/// Returns the exit code of a command that has done its work: 0, or 1 if there were warnings and
+/// `--strict` makes them errors.
 pub fn code() -> u8 {
     match WARNINGS.load(Ordering::Relaxed) {
         0 => 0,
@@ -116,8 +118,8 @@ fn with_style(word: &str, style: Style) -> String {
     }
 }
 
-/// Decides whether messages have colours. In a guarded process the decision depends on the stderr of the
-/// program that started it.
+/// Decides if messages have colours. In a guarded process this depends on the stderr of the program
+/// that started the process, because its own stderr is a pipe.
 fn choice() -> anstream::ColorChoice {
     let auto = || match guard::streams() {
         Some((_, stderr)) => AutoStream::choice(stderr),
@@ -137,7 +139,8 @@ pub fn print(text: String) {
     }
 }
 
-/// Prints a value as JSON. Afterwards [`done`] writes to stderr, so that stdout contains only the JSON.
+/// Prints a value as JSON to stdout. Later calls of [`done`] write to stderr, so that stdout
+/// contains only the JSON.
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print_text_as_json(serde_json::to_string_pretty(value)? + "\n");
     Ok(())
@@ -148,7 +151,8 @@ pub fn print_text_as_json(text: String) {
     print(text);
 }
 
-/// Prints a line that names a written file, unless `--quiet` is given: to stdout, or to stderr if JSON was printed.
+/// Prints a line that names a written file, unless `--quiet` is given. It goes to stdout, or to
+/// stderr if JSON was printed to stdout.
 pub fn done(text: std::fmt::Arguments) {
     match JSON.load(Ordering::Relaxed) {
         _ if is_quiet() => {}
@@ -157,7 +161,7 @@ pub fn done(text: std::fmt::Arguments) {
     }
 }
 
-/// Returns the original stdout of the program, which a guarded FMU cannot write to.
+/// Returns the original stdout of the program, to which an FMU in a guarded process cannot write.
 pub fn stdout() -> Box<dyn Write> {
     match guard::streams() {
         Some((stdout, _)) => Box::new(stdout),
@@ -165,8 +169,8 @@ pub fn stdout() -> Box<dyn Write> {
     }
 }
 
-/// Prints a text to stderr. In a guarded process it is printed to the original stderr, which the
-/// FMU cannot reach.
+/// Prints a text to stderr. A guarded process prints to the original stderr, which the FMU cannot
+/// reach.
 fn print_to_stderr(text: String) {
     // A closed stderr means that nobody wants to read the messages.
     let _ = match guard::streams() {
@@ -175,14 +179,16 @@ fn print_to_stderr(text: String) {
     };
 }
 
-/// Ends the program intentionally: the guard is informed, so that it does not report a crash.
+/// Ends the program with the exit code `code`. The parent of a guarded process is informed before,
+/// so that it does not report a crash.
 fn exit(code: u8) -> ! {
     guard::done(code);
     std::process::exit(code.into())
 }
 
-/// Ends the program with exit code 0 if writing failed because the reader of the output has closed the pipe (for example
-/// `hubslosh variables | head`). Any other error is returned.
+/// Ends the program with exit code 0 if `written` failed because the reader of the output has
+/// closed the pipe, as in `hubslosh variables
+/// | head`. Any other error is returned.
 pub fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T> {
     written.map_err(|error| {
         let error = error.into();

@@ -83,8 +83,8 @@ impl AnalyseArgs {
         campaign::drive(&fmu, &campaign, store, Vec::new())
     }
 
-    /// Returns the plan that the command line describes: every recording is a run with the amplitude of its own torque,
-    /// and is simulated with every slosh model.
+    /// Returns the plan that the command line describes: every recording is a run with the
+    /// amplitude of its own torque, and is simulated with every slosh model for comparison.
     fn draft(&self) -> Result<Draft> {
         let profile: Written = self.profile.parse()?;
         let torque = profile.torque()?;

@@ -72,7 +72,6 @@ pub struct AnyFmuArgs {
     solver: Stepped,
 }
 
-/// The solver that simulates the FMU, and the relative tolerance of the FMU's own solver.
 #[derive(Clone, Copy)]
 struct Stepped {
     solver: Solver,
@@ -99,8 +98,8 @@ fn solver(text: &str) -> Result<Stepped> {
     }
 }
 
-/// Number of random starts within the bounds. They are tried if the search from the user's start values ends without a good
-/// fit.
+/// Number of random starts within the bounds. They are tried if the search from the start values of
+/// the user ends without a good fit.
 const STARTS: usize = 8;
 
 /// Options that request the likelihood at given points instead of a fit.
@@ -115,7 +114,8 @@ pub struct PointsArgs {
     found: Option<PathBuf>,
 }
 
-/// Options that `identify --free` and `design --free` share with the other kinds of recordings.
+/// Options that `identify --free` and `design --free` have in common with the other kinds of
+/// recordings.
 pub struct Request<'a> {
     pub data: &'a [PathBuf],
     pub settings: &'a [(String, String)],
@@ -125,8 +125,9 @@ pub struct Request<'a> {
     pub json: bool,
 }
 
-/// Parses the items of a flag that may be given several times, with commas between items. A wrong item adds its error
-/// to `problems`, so that one message can list all of them.
+/// Parses all items of `flags`, an option that may be given several times with commas between
+/// items. The error of a wrong item is added to `problems`, so that one message can list all of
+/// them.
 fn read<T: std::str::FromStr<Err = anyhow::Error>>(
     flags: &[String],
     problems: &mut Vec<String>,
@@ -145,7 +146,8 @@ impl Request<'_> {
 }
 
 impl AnyFmuArgs {
-    /// Returns true if `--free` names unknowns, so that any FMU is fitted instead of the bench model.
+    /// Returns `true` if `--free` names unknowns, so that any FMU is fitted instead of the model of
+    /// the bench.
     pub fn is_asked(&self) -> bool {
         !self.free.is_empty()
     }
@@ -205,8 +207,9 @@ impl AnyFmuArgs {
         Ok(model)
     }
 
-    /// Fits the unknowns to the recordings, writes the result to the files of `out` and prints it. With
-    /// `--points` it writes −2 ln L at the given points instead.
+    /// Fits the unknowns to the recordings, writes the result to the files of `out` and prints it.
+    /// With the option `--points` no fit is made; −2 ln L, with the likelihood L, is written at the
+    /// given points instead.
     pub fn identify(&self, request: &Request, points: &PointsArgs, out: &Out) -> Result<()> {
         let question = self.question(request)?;
         let model = self.model(request, &question)?;
@@ -248,8 +251,9 @@ impl AnyFmuArgs {
         out.finish(&found.json()?, is_trusted, || print_result(&found), || any_fmu::page(&found))
     }
 
-    /// Predicts the standard deviations that a fit to recordings with these inputs would have (Cramér–Rao
-    /// bound), and prints them. `noise` has items `OUTPUT=STD,…`, the noise of one row in the output's unit.
+    /// Predicts the standard deviations that a fit to recordings with these inputs would have
+    /// (Cramér–Rao bound), and prints them. `noise` has items `OUTPUT=STD,…`: the standard
+    /// deviation of the noise in one row, in the unit of the output.
     pub fn design(&self, request: &Request, noise: &[String]) -> Result<()> {
         let question = self.question(request)?;
         let model = self.model(request, &question)?;

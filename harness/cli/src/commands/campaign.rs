@@ -68,7 +68,8 @@ pub struct CampaignArgs {
     replace: bool,
 }
 
-/// Longest name of a default results directory, bytes. A longer name is replaced by one with a hash of the flags.
+/// Longest name of a default results directory, bytes. In a longer name the flags are replaced by
+/// their hash.
 const LONGEST: usize = 100;
 
 /// Growth of the frequency of `campaign`'s sweep.
@@ -130,8 +131,8 @@ impl CampaignArgs {
         drive(&fmu, &campaign, store, Vec::new())
     }
 
-    /// Returns the results directory for these flags: `dist/campaign` for the default campaign, otherwise a directory whose
-    /// name states the flags that differ from the default.
+    /// Returns the results directory for these flags. The default campaign has `dist/campaign`; for
+    /// other flags the name of the directory states the flags that differ from the default.
     fn directory(&self) -> PathBuf {
         let numbers =
             |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join("-");
@@ -188,7 +189,8 @@ impl CampaignArgs {
     }
 }
 
-/// Runs a campaign and writes its tables and its report, which begins with `chapters`.
+/// Simulates and analyses the runs of a campaign, and writes its tables and its report, which
+/// begins with `chapters`.
 pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter>) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();

@@ -102,10 +102,12 @@ pub struct DesignArgs {
 
 /// Time between two rows of the planned torque, s.
 const STEP: f64 = 0.02;
-/// Slosh angle, rad, at which the wave at the wall, 2 α R/(ξ² − 1) with the slosh angle α, the
-/// tank's radius R and the zero ξ = 1.841 of J₁', reaches 0.15 R. Linear theory ends there.
+/// Slosh angle at which linear theory ends, rad. The wave at the wall is 2 α R/(ξ² − 1) with the
+/// slosh angle α, the tank's radius R and the zero ξ = 1.841 of J₁'; at this angle it reaches 0.15
+/// R.
 const LINEAR: f64 = 0.18;
-/// Number of columns of the table from which the Cramér–Rao bound is computed; with it the memory for the table is estimated.
+/// Number of columns of the table from which the Cramér–Rao bound is computed. The memory for the
+/// table is estimated with it.
 const COLUMNS: usize = 20;
 
 impl DesignArgs {
@@ -169,8 +171,9 @@ impl DesignArgs {
         Ok(())
     }
 
-    /// Returns the planned torque at the rows of the plan: time (s), torque (N·m), and the factor by which it
-    /// was reduced to respect the limits of the reaction wheel.
+    /// Returns the planned torque, which is reduced if it would exceed the limits of the reaction
+    /// wheel `wheel`: times of the rows (s), torques (N·m), and the factor of the reduction. `real`
+    /// returns the value of a parameter of the FMU.
     fn torque(
         &self,
         wheel: &Wheel,
@@ -215,8 +218,8 @@ impl DesignArgs {
         Ok((time, tau, factor))
     }
 
-    /// Computes the bounds for a linear sweep with the peak `peak`, N·m, which is reduced if the slosh angle
-    /// would exceed its limit.
+    /// Computes the bounds for a linear sweep with the peak `peak`, N·m, at the times `time`, s.
+    /// The peak is reduced if the slosh angle would exceed its limit.
     fn sweep(&self, bench: &Bench, time: &[f64], peak: f64) -> Result<Sweep> {
         let (f0, f1) = (self.band[0], self.band[1]);
         let written = |peak: f64| {
@@ -233,11 +236,12 @@ impl DesignArgs {
     }
 }
 
-/// Checks that straight lines between the rows `time` (s) and `tau` (N·m) reproduce the torque between the rows.
+/// Checks that straight lines between the rows with the times `time`, s, and the torques `tau`,
+/// N·m, reproduce the planned torque.
 ///
 /// # Errors
 ///
-/// If they do not; a torque with slower changes, or with edges at the rows, helps.
+/// If they do not. A torque that changes more slowly, or that has its edges at the rows, helps.
 fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     let history = torque.history(STEP, time[time.len() - 1], false)?;
     let lines = History::new(time.to_vec(), tau.to_vec(), None, false)?;
@@ -262,12 +266,12 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
 
 struct Bench<'f> {
     fmu: &'f Fmu,
-    /// Settings of the FMU, with the damping ratio that the user set or, without one, the ratio of the correlation.
+    /// Settings of the FMU, with the damping ratio that the user has set, or otherwise the damping
+    /// ratio of the correlation.
     setup: Setup,
-    /// True if delay, gyro bias and friction asymmetry are also unknown.
     sensor_errors: bool,
     noise: Noise,
-    /// Largest slosh angle that `--slosh-angle` allows, rad.
+    /// Largest slosh angle that the option `--slosh-angle` allows, rad; `None` without a limit.
     limit: Option<f64>,
 }
 
@@ -311,8 +315,9 @@ impl<'f> Bench<'f> {
     }
 }
 
-/// Returns the standard deviation of the gyro's white noise in one sample, rad/s: the angle random walk times the
-/// square root of the sampling rate.
+/// Returns the standard deviation of the gyro's white noise in one sample, rad/s: the angle random
+/// walk times the square root of the sampling rate. `real` returns the value of a parameter of the
+/// FMU.
 fn white_noise(real: &mut dyn FnMut(&str) -> Result<f64>) -> Result<f64> {
     let white = real(imu::ARW)? * real(imu::RATE)?.sqrt();
     ensure!(
@@ -326,25 +331,23 @@ type Bounds = Vec<(String, f64, f64)>;
 
 struct Sweep {
     profile: String,
-    /// Largest slosh angle that the sweep causes, rad.
     angle: f64,
     bounds: Bounds,
 }
 
 struct Plan {
     factor: f64,
-    /// Largest torque of the plan, N·m.
     peak: f64,
-    /// Largest slosh angle that the planned torque causes, rad.
     angle: f64,
-    /// Lowest and highest speed of the reaction wheel, rad/s.
+    /// Lowest and highest speed of the reaction wheel that turns the hub, rad/s.
     speeds: (f64, f64),
     bounds: Bounds,
     sweep: Option<Sweep>,
 }
 
 impl Plan {
-    /// Returns the plain sweep if it determines the parameters more precisely than the planned torque, otherwise `None`.
+    /// Returns the plain sweep if it determines the parameters more precisely than the planned
+    /// torque, otherwise `None`.
     fn more_precise_sweep(&self) -> Option<&Sweep> {
         let merit = design::merit(&self.bounds);
         self.sweep.as_ref().filter(|sweep| design::merit(&sweep.bounds) < merit)
@@ -443,9 +446,10 @@ impl Plan {
 }
 
 impl DesignArgs {
-    /// Prints the torque amplitude of a sine for which the gyro's samples have the signal-to-noise ratio `snr`, dB: at
-    /// both ends of the band, at resonance and antiresonance, and for a rigid hub. `limit` is the largest torque of the
-    /// wheel, N·m (thesis 8.6.1).
+    /// Prints the torque amplitude of a sine for which the gyro's samples have the signal-to-noise
+    /// ratio `snr`, dB: at both ends of the band, at resonance and antiresonance, and for a rigid
+    /// hub (thesis 8.6.1). `limit` is the largest torque of the reaction wheel, N·m, and `real`
+    /// returns the value of a parameter of the FMU.
     fn torque_for(
         &self,
         snr: f64,
@@ -497,8 +501,9 @@ impl DesignArgs {
     }
 }
 
-/// Returns the expected bench as a linear model. Its viscous friction dissipates the same power as the dry friction, at
-/// the rate that a torque with this peak (crest factor 3) causes far from resonance.
+/// Returns the expected bench as a linear model. Its viscous friction dissipates the same power as
+/// the dry friction, at the rate that a torque with the peak `peak`, N·m (crest factor 3), causes
+/// far from resonance.
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
     let arm = real(tank::R)?;
     let mode = Mode {

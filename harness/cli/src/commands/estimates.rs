@@ -16,7 +16,8 @@ pub struct Out<'a> {
 }
 
 impl Out<'_> {
-    /// Runs a search and shows its progress as a spinner.
+    /// Runs the search `search` and shows its progress, which the search reports to its argument,
+    /// as a spinner.
     ///
     /// # Errors
     ///
@@ -31,8 +32,8 @@ impl Out<'_> {
         found
     }
 
-    /// Writes a result, JSON, to the result file. If another program (the Python package) has started this one to read
-    /// its messages, also sends the result to it.
+    /// Writes the JSON text of a result to the result file. If the Python package has started this
+    /// program, the result is also sent to the package as a message.
     ///
     /// # Errors
     ///
@@ -47,8 +48,9 @@ impl Out<'_> {
         }
     }
 
-    /// Saves the JSON `text` of a result, prints its tables by `tables`, and writes its report. If the result cannot be
-    /// trusted, prints a warning, which `--strict` makes an error.
+    /// Saves the JSON text `text` of a result, calls `tables` to print its tables, and writes the
+    /// report that `page` returns. If the result cannot be trusted, a warning is printed, which the
+    /// option `--strict` makes an error.
     ///
     /// # Errors
     ///
@@ -88,8 +90,8 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     }
 }
 
-/// Formats a predicted standard deviation for a table. An infinite one or NaN is written as "unknown", because the
-/// inputs carry no information about this parameter.
+/// Formats a predicted standard deviation for a table. If it is infinite or NaN, the inputs carry
+/// no information about the parameter, and the text is "unknown".
 pub(super) fn deviation(std: f64) -> String {
     if std.is_finite() { format!("{std:.2e}") } else { "unknown".into() }
 }

@@ -172,8 +172,8 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     ]
 }
 
-/// Lists the noise parameters of a recording with their confidence intervals, and a verdict on the fit of its Allan
-/// deviation, as pairs of name and text.
+/// Lists the noise parameters of a recording with their confidence intervals, and a sentence that
+/// states if the model fits the Allan deviation. Each row is a pair of a name and a text.
 pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     let stated = |Estimate { value, low, high, .. }: &Estimate, unit: &str| match (*low, *high) {
         (low, high) if low.is_nan() || high.is_nan() => {

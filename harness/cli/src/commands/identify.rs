@@ -207,11 +207,12 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
-/// Options of older versions and values of `--method` that were removed, each with its replacement.
+/// List of the options of older versions, and of the values of `--method`, that were removed, each
+/// with its replacement.
 const REMOVED: &str = include_str!("removed.txt");
 
-/// Adds the kind of recording to `identify DATA`, which names no kind: `fmu` if `--free` is given, otherwise `bench`.
-/// Returns other command lines unchanged.
+/// Adds the kind of recording to a command line `identify DATA`, which names no kind: `fmu` if
+/// `--free` is given, otherwise `bench`. Other command lines are returned unchanged.
 ///
 /// # Errors
 ///
@@ -363,7 +364,8 @@ impl FrictionArgs {
 }
 
 impl DecayArgs {
-    /// Reads free decays, which must be recordings of the same signal, and fits frequency and damping.
+    /// Reads free decays, which must be recordings of the same signal, fits frequency and damping
+    /// to them, and prints and writes the result.
     fn run(&self) -> Result<()> {
         self.data.check()?;
         let source = self.data.source(trim(&self.trim)?)?;
@@ -389,7 +391,8 @@ impl DecayArgs {
 }
 
 impl KnownArgs {
-    /// Collects the properties of the bench that the options state, under the names of the FMU's parameters.
+    /// Collects the known properties of the bench that the options state, under the names of the
+    /// FMU's parameters.
     fn options(&self) -> Result<Options> {
         let (tolerances, gyro_scale) = tolerances(&self.tolerances)?;
         let (known, starts): (Vec<_>, Vec<_>) =
@@ -444,7 +447,8 @@ impl KnownArgs {
 }
 
 impl DataArgs {
-    /// Splits `--columns` into the columns and the sampling rate, `rate=HZ`.
+    /// Splits the value of `--columns` into the names of columns and the sampling rate, which is
+    /// given as `rate=HZ`.
     fn columns(&self) -> Result<(String, Option<f64>)> {
         let (mut columns, mut rate) = (Vec::new(), None);
         for item in self.columns.split(',') {

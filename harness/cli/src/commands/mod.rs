@@ -31,7 +31,6 @@ pub mod torque;
 pub mod variables;
 pub mod view;
 
-/// Name of the FMU that commands use unless `--fmu` names another.
 pub const DEFAULT_FMU: &str = "HubSlosh";
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
@@ -46,19 +45,20 @@ pub struct RunsArgs {
     pub fmu: PathBuf,
 }
 
-/// Opens the FMU that `--fmu` names. A library that changes this process when it is loaded, such as its
-/// rounding mode, causes a warning.
+/// Opens the FMU that the option `--fmu` names. If its library changes a setting of this process
+/// while it is loaded, such as the rounding mode, a warning is printed.
 pub fn open(name: &Path) -> Result<Fmu> {
     open_with(name, &[])
 }
 
-/// Opens an FMU as [`open`] does. Arrays of FMI 3.0 have the sizes that structural parameters among the
-/// settings give them.
+/// Opens the FMU `name` as [`open`] does. Arrays of FMI 3.0 get the sizes that structural
+/// parameters among the settings determine.
 pub fn open_with(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
     opened(Fmu::open_with(crate::fmu::find(name)?, settings)?)
 }
 
-/// Opens an FMU as [`open_with`] does, but also one that only offers Model Exchange.
+/// Opens the FMU `name` as [`open_with`] does, and also accepts an FMU that only offers Model
+/// Exchange.
 pub fn open_to_run(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
     opened(Fmu::open_to_run(crate::fmu::find(name)?, settings)?)
 }
@@ -84,7 +84,7 @@ fn setting(text: &str) -> Result<(String, String)> {
 ///
 /// # Errors
 ///
-/// If the name neither ends in .csv or .parquet nor is `-`.
+/// If the name neither ends in .csv or .parquet nor is `-`, which means stdout.
 fn check_table_name(out: &Path) -> Result<()> {
     if out == Path::new("-") { Ok(()) } else { table::check_ending(out) }
 }

@@ -109,8 +109,8 @@ impl PackArgs {
         Ok(())
     }
 
-    /// Returns the limits that `--tanks`, `--modes` and `--appendages` put on all sizes of the FMU; empty without these
-    /// options.
+    /// Returns the limits that `--tanks`, `--modes` and `--appendages` put on the sizes of the
+    /// FMU's arrays. The list is empty without these options.
     fn limits(&self) -> Result<Vec<Limit<'static>>> {
         let sizes = match self.model.name {
             "HubSlosh" => names::hubslosh::SIZES,

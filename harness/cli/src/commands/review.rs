@@ -84,8 +84,9 @@ impl ReviewArgs {
     }
 }
 
-/// Returns the Python programs to try: that in the folder of this command (its environment), then those on
-/// PATH.
+/// Returns the Python programs that may have the package: first the program in the folder of this
+/// command, because the command may be installed in a Python environment, then the programs on
+/// PATH. `own` is the path of this command.
 fn python_candidates(own: &Path) -> Vec<PathBuf> {
     let near = own.with_file_name(if cfg!(windows) { "python.exe" } else { "python3" });
     [near, "python3".into(), "python".into()].to_vec()

@@ -227,9 +227,9 @@ impl RunArgs {
     }
 }
 
-/// Returns the columns to record by default: four signals for the bench; all numeric outputs and the slosh angles for
-/// another FMU, as in a campaign. `hubslosh view` also needs the states of the bench's modes after the first, and the
-/// liquid left in draining tanks.
+/// Returns the columns to record by default. For the bench these are four signals; for another FMU
+/// they are all numeric outputs and the slosh angles, as in a campaign. `hubslosh view` also needs
+/// the states of the bench's modes after the first mode, and the liquid left in draining tanks.
 fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -244,7 +244,8 @@ fn default_columns(
     names
 }
 
-/// Joins parts of a text that was split at commas, where the comma belongs to an index, as in `inertia[1,2]`.
+/// Joins the parts of a list that was split at commas again where the comma belongs to an index, as
+/// in `inertia[1,2]`.
 fn whole_names(parts: Vec<String>) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for part in parts {

@@ -191,8 +191,9 @@ impl TankArgs {
         }
     }
 
-    /// Returns the path of `--parameters` and the text of the file, in the format of the path's ending; `None` without
-    /// the option. `make` computes the parameters for a target FMU.
+    /// Returns the path of `--parameters` and the text for this file, in the format of the path's
+    /// ending. The result is `None` without the option. `make` computes the parameters for an FMU
+    /// and a liquid.
     fn set_file(
         &self,
         make: impl Fn(Target, Liquid) -> Result<ParameterSet, Problems>,

@@ -28,11 +28,10 @@ pub struct VariablesArgs {
     pub fmu: PathBuf,
 }
 
-/// Width to which the cells of a column are padded, characters. A longer cell is printed in full and moves the rest of its
-/// line to the right.
+/// Largest width of a column of the table, characters. A longer cell is printed in full and moves
+/// the rest of its line to the right.
 const WIDEST: usize = 80;
 
-/// Largest number of items of an enumeration that the table lists.
 const ITEMS: usize = 50;
 
 impl VariablesArgs {

@@ -111,12 +111,12 @@ impl ViewArgs {
     }
 }
 
-/// Makes the page of a run that a campaign has stored in `file`. The parameters come from the file's
-/// metadata.
+/// Returns the page that shows a run which a campaign has stored in `file`. The parameters come
+/// from the metadata of the file, and `title` becomes the title of the page.
 ///
 /// # Errors
 ///
-/// If the file cannot be read or the metadata of the file are damaged.
+/// If the file cannot be read or its metadata are damaged.
 pub fn page_of_stored_run(
     description: &ModelDescription,
     file: &Path,
@@ -142,8 +142,8 @@ fn stored_parameters(
         .with_context(|| format!("{}: the metadata of the file are damaged", file.display()))
 }
 
-/// Reads those columns of the run's file that are variables of the FMU. Readings of sensors are not
-/// variables, so that the page does not draw them.
+/// Reads those columns of the run's file that are variables of the FMU. Other columns, such as
+/// readings of sensors, are not read, because the page does not draw them.
 fn variables_of_run(
     description: &ModelDescription,
     file: &Path,
@@ -187,10 +187,11 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     Ok(Table::new(table.names().to_vec(), table.names().iter().map(column).collect()))
 }
 
-/// Number of points on a segment of a drawn contour, and of masses at which the surface's height is computed.
+/// Number of intervals into which each segment of a drawn contour is divided. The height of the
+/// surface is computed for four times as many masses of the liquid.
 const POINTS: usize = 24;
 
-/// Number of steps of the radius at which the surface of a mode is given.
+/// Number of equal steps of the radius at which the surface of a mode is given to the page.
 const STEPS: usize = 80;
 
 fn drawing(text: &str) -> Result<(usize, Drawing)> {
@@ -238,8 +239,9 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
     })
 }
 
-/// Interpolates the surface elevation of a mode at equal steps of the radius, divided by the elevation at the outer
-/// wall. `shape` has pairs of radius and elevation.
+/// Interpolates the surface elevation of a mode at equal steps of the radius, divided by the
+/// elevation at the outer wall. `shape` has pairs of radius and elevation, in ascending order of
+/// the radius.
 fn equally_spaced(shape: &[[f64; 2]]) -> Vec<f64> {
     let (first, last) = (shape[0], shape[shape.len() - 1]);
     let at = |i: usize| {

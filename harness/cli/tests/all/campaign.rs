@@ -46,8 +46,8 @@ fn with_viscous_friction_the_antiresonance_equals_that_of_the_exact_transfer_fun
     }
 }
 
-/// Two campaigns with the same plan run in one directory. The second simulates nothing, and the tables begin with the
-/// documented columns.
+/// Two campaigns with the same plan run in one directory. The second simulates nothing, and the
+/// tables begin with the documented columns.
 #[test]
 fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     let directory = tempfile::tempdir().unwrap();
@@ -92,8 +92,7 @@ fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     assert!(String::from_utf8_lossy(&campaign(directory, &other).stdout).contains("0 reused"));
 }
 
-/// The first run has an empty tank, which the FMU refuses, and the second has 0.1 m of liquid. The command fails after the
-/// second run is stored.
+/// The FMU refuses the run with an empty tank; the run at 0.1 m is stored before the command fails.
 #[test]
 fn a_failed_run_is_named_and_the_other_runs_are_completed() {
     let directory = tempfile::tempdir().unwrap();
@@ -111,8 +110,8 @@ fn a_failed_run_is_named_and_the_other_runs_are_completed() {
     assert!(page.contains("linear_0mm_100"));
 }
 
-/// Without --out, campaigns with different flags are written to directories with different default names. A directory that
-/// holds the campaign of another plan is not overwritten.
+/// Without --out, campaigns with different flags are written to directories with different default
+/// names.
 #[test]
 fn other_flags_get_a_directory_of_their_own_and_another_plan_is_not_overwritten() {
     let directory = tempfile::tempdir().unwrap();
@@ -149,7 +148,8 @@ fn other_flags_get_a_directory_of_their_own_and_another_plan_is_not_overwritten(
     assert!(done && error.contains("held the campaign of another plan"), "{error}");
 }
 
-/// The plan has a wave gauge and a force sensor. A second campaign with the same plan simulates nothing.
+/// The plan has a wave gauge and a force sensor; a second campaign with the same plan simulates
+/// nothing.
 #[test]
 fn runs_of_a_plan_with_sensors_contain_the_readings_and_are_reused() {
     let directory = tempfile::tempdir().unwrap();
@@ -222,8 +222,8 @@ fn runs_of_a_plan_with_sensors_contain_the_readings_and_are_reused() {
     }
 }
 
-/// At an axial acceleration of 0.1 m/s² the Bond number of the bench is 9.2, so that surface tension matters. The table of
-/// runs contains the number, and the command prints a warning.
+/// At an axial acceleration of 0.1 m/s² the Bond number of the bench is 9.2, so that surface
+/// tension matters.
 #[test]
 fn a_weightless_liquid_is_reported_in_the_tables_and_at_the_end() {
     let directory = tempfile::tempdir().unwrap();

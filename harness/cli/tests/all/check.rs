@@ -44,7 +44,8 @@ fn a_check_that_skips_every_selected_rule_fails_with_exit_code_2() {
     }
 }
 
-/// Returns an archive that contains only our model description, in which hub.I is -1 and therefore below its minimum.
+/// Returns an archive that contains only our model description, in which the start value of hub.I
+/// is -1, below its minimum.
 fn with_a_start_out_of_range() -> Vec<u8> {
     let xml = Archive::open(packed_for_tests()).unwrap().description().unwrap();
     let (head, tail) = xml.split_at(xml.find("name=\"hub.I\"").unwrap());

@@ -28,8 +28,8 @@ fn files(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Asserts that a command fails with a line that contains all of `words`, and that it leaves the directory unchanged. Another
-/// line, which lists the columns in use, may come before.
+/// Asserts that a command fails with a line that contains all of `words`, and leaves the directory
+/// unchanged. Another line, which lists the columns in use, may come before.
 fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     let before = files(directory);
     let output = output();
@@ -126,8 +126,8 @@ fn the_error_of_an_unknown_name_suggests_a_similar_name() {
     );
 }
 
-/// For example, an unknown item of an enumeration, a text in place of a number, a value for an output, or a value for the
-/// input that the profile drives.
+/// Each case sets a value of the wrong kind, for example an unknown item of an enumeration, a text
+/// in place of a number, a value for an output, or a value for the input that the profile drives.
 #[test]
 fn a_value_of_the_wrong_kind_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -146,7 +146,6 @@ fn a_value_of_the_wrong_kind_is_refused() {
     }
 }
 
-/// The depth of the liquid is 0, negative or NaN. The message names tank.h.
 #[test]
 fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -160,7 +159,6 @@ fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
     }
 }
 
-/// The message of a run of 5e13 steps, for example, states the number of steps that was asked for.
 #[test]
 fn runs_that_need_more_memory_than_any_computer_has_are_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -188,7 +186,6 @@ fn runs_that_need_more_memory_than_any_computer_has_are_refused() {
     }
 }
 
-/// For example, a plan with 9e18 random runs is refused before any memory is allocated for them.
 #[test]
 fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_allocation() {
     let directory = tempfile::tempdir().unwrap();
@@ -256,8 +253,8 @@ fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_alloca
     assert!(said.contains("100000 runs at once (allowed: 1 to 512)"), "{said}");
 }
 
-/// `hubslosh design` refuses a torque of 0, a torque below the dry friction, a gyro without noise and a record of two rows,
-/// and says what to change.
+/// The cases are a torque of 0, a torque below the dry friction, a gyro without noise, and a record
+/// of two rows.
 #[test]
 fn an_experiment_without_information_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -290,8 +287,8 @@ fn warnings_of_the_fmu_are_printed() {
     assert_eq!(said(&["--profile", "zero"]), "");
 }
 
-/// The command refuses a CSV file with two columns tau_cmd, an output that is listed twice, and two options that name one
-/// output file.
+/// The cases are a file with two columns tau_cmd, an output that is listed twice, and two options
+/// that name one output file.
 #[test]
 fn a_parameter_or_output_given_twice_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -367,8 +364,7 @@ fn files_that_cannot_be_read_or_written_are_named() {
     }
 }
 
-/// The GUID, and then other parts, of modelDescription.xml are changed in an FMU; the message of `hubslosh run` names the
-/// difference.
+/// The GUID, and then other parts, of modelDescription.xml are edited in an FMU.
 #[test]
 fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -414,8 +410,6 @@ fn the_output_of_each_command_on_the_scaling_page_equals_the_printed_output() {
     assert_eq!(commands, 4);
 }
 
-/// `hubslosh run --input` gets files with the columns tau_ext and g_axial, and a file with a column that is no input of the
-/// FMU.
 #[test]
 fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -462,7 +456,6 @@ fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_ref
     );
 }
 
-/// With `--out -` the table is written to stdout, and no file is written.
 #[test]
 fn a_table_goes_to_stdout_and_a_closed_pipe_ends_the_program_quietly() {
     let directory = tempfile::tempdir().unwrap();
@@ -565,7 +558,6 @@ fn messages_are_coloured_on_request_and_not_by_default_in_files() {
     assert!(String::from_utf8(wrong.stderr).unwrap().contains("\u{1b}[31merror:"));
 }
 
-/// The option --quiet suppresses only progress and summaries. With --strict a warning of the FMU makes the command fail.
 #[test]
 fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     let directory = tempfile::tempdir().unwrap();
@@ -623,8 +615,8 @@ fn every_command_that_prints_a_table_also_prints_json() {
     assert!(json(&gyro)["B, rad/s"]["specified"].is_f64());
 }
 
-/// The command is copied to bin/ and an FMU to the folder of the Python package; `hubslosh run` without --fmu, started in
-/// another directory, finds the FMU.
+/// The command is copied to bin/ and an FMU to the folder of the Python package. `hubslosh run`
+/// without --fmu, started in another directory, finds the FMU.
 #[test]
 fn an_installed_command_finds_the_fmus_that_came_with_it() {
     let directory = tempfile::tempdir().unwrap();
@@ -674,8 +666,8 @@ fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
     assert!(files(directory.path()).is_empty());
 }
 
-/// FMUs, Parquet, JSON, SSV and CSV files are truncated or contain text. The messages must not contain terms of the libraries
-/// that read them.
+/// FMUs, Parquet, JSON, SSV and CSV files are truncated or contain text. The messages must contain
+/// no terms of the libraries that read them.
 #[test]
 fn damaged_input_files_are_refused_in_words_for_users() {
     let directory = tempfile::tempdir().unwrap();
@@ -731,8 +723,8 @@ fn damaged_input_files_are_refused_in_words_for_users() {
     }
 }
 
-/// `hubslosh review plan.toml --python PROGRAM` runs PROGRAM with `-m hubslosh.project plan.toml`, and fails if the program
-/// does not exist.
+/// `hubslosh review plan.toml --python PROGRAM` runs PROGRAM with `-m hubslosh.project plan.toml`,
+/// and fails if it does not exist.
 #[test]
 fn hubslosh_review_starts_the_python_package() {
     let directory = tempfile::tempdir().unwrap();

@@ -18,8 +18,8 @@ fn expect_refusal(directory: &Path, arguments: &[&str]) -> String {
     String::from_utf8(done.stderr).unwrap()
 }
 
-/// Settings of a hub that turns without friction and with rigid liquid. Its rate is the integral of the torque divided by the
-/// inertia, so that only the rounding errors of a sum remain.
+/// Settings of a hub that turns without friction and with rigid liquid. Its rate is the integral of
+/// the torque divided by the inertia, so that only the rounding errors of a sum remain.
 const FREE: [&str; 4] = ["--set", "slosh.model=frozen", "--set", "friction.model=none"];
 
 fn run(directory: &Path, arguments: &[&str]) -> [Vec<f64>; 3] {
@@ -71,8 +71,8 @@ fn write(directory: &Path, rows: impl Iterator<Item = (f64, f64)>) {
     std::fs::write(directory.join("in.csv"), format!("time,tau_cmd\n{}", rows.concat())).unwrap();
 }
 
-/// The file has rows 5 ms apart, with a pulse of 30 ms every 0.25 s, and lines join the rows. The momentum of the hub must be
-/// the integral of the torque for every output step.
+/// The file has rows 5 ms apart, with a pulse of 30 ms every 0.25 s. The momentum of the hub must
+/// follow the integral of the torque.
 #[test]
 fn a_torque_file_has_the_same_impulse_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
@@ -113,7 +113,7 @@ fn a_torque_file_has_the_same_impulse_with_any_output_step() {
     assert!((total - 0.008).abs() < 1e-9, "{total} N·m·s of 8 ms");
 }
 
-/// The hub's rate is the integral of the torque, ∫ sin 2πft = (1 − cos 2πft)/2πf. Straight lines between rows h = 1 ms apart
+/// The integral of the torque is (1 − cos 2πft)/2πf. Straight lines between rows h = 1 ms apart
 /// give (π f h)²/3 = 0.8 % less at 49 Hz.
 #[test]
 fn a_sine_of_49_hz_in_a_file_has_the_same_impulse_with_any_output_step() {
@@ -124,8 +124,8 @@ fn a_sine_of_49_hz_in_a_file_has_the_same_impulse_with_any_output_step() {
     follows(folder.path(), &["--input", "in.csv"], &integral, 0.02 / w);
 }
 
-/// The profiles are sines from 24.9 to 333 Hz and a pulse of 10 ms. The momentum of the hub must be the integral of the
-/// torque, also if output steps are longer than a period.
+/// The profiles are sines from 24.9 to 333 Hz and a pulse of 10 ms. Some output steps are longer
+/// than a period.
 #[test]
 fn a_profile_has_the_same_impulse_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
@@ -154,7 +154,6 @@ fn a_profile_has_the_same_impulse_with_any_output_step() {
     follows("lin-sweep:amplitude=1,f0=1,f1=60,duration=2", &integral, 1e-4);
 }
 
-/// The torque always follows straight lines between its values; `--sample` only changes their distance in time.
 #[test]
 fn the_option_sample_only_changes_the_interval_between_commands() {
     let folder = tempfile::tempdir().unwrap();
@@ -186,7 +185,7 @@ fn the_option_sample_only_changes_the_interval_between_commands() {
     assert!(said.contains("reaches 30 Hz") && said.contains("below 1.667e-2 s"), "{said}");
 }
 
-/// Steps that do not meet the edges must still get the impulse of the profile from the table that `hubslosh torque` writes.
+/// For steps that do not meet the edges, the table must have the impulse of the profile.
 #[test]
 fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,8 +215,8 @@ fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     assert!(said.contains("commands until 2700 s") && said.contains("is possible"), "{said}");
 }
 
-/// The rows of a campaign must be close enough to show the torque; between the rows the FMU follows the torque as in
-/// `hubslosh run`.
+/// The rows of a campaign must be close enough to show the torque. Between the rows the FMU follows
+/// the torque as in `run`.
 #[test]
 fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     let folder = tempfile::tempdir().unwrap();
@@ -259,8 +258,8 @@ fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     }
 }
 
-/// `hubslosh design` predicts from rows at the output step. It therefore refuses a sine of 50 Hz, pulses shorter than a row,
-/// and files with such pulses.
+/// `hubslosh design` predicts from rows at the output step, so that it refuses a sine of 50 Hz and
+/// pulses shorter than a row.
 #[test]
 fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     let folder = tempfile::tempdir().unwrap();
@@ -284,9 +283,8 @@ fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     assert!(said.contains("commands until 2700 s"), "{said}");
 }
 
-/// If an input that changes linearly were held at its value at the start of each step, it would be late by half a step, and a
-/// row would pair an input with the response to the previous input. Therefore the command refuses straight lines for an FMU
-/// that cannot interpolate.
+/// If an input that changes linearly were held at its value at the start of each step, it would be
+/// late by half a step. Therefore the command refuses straight lines for such an FMU.
 #[test]
 fn an_fmu_that_cannot_interpolate_has_inputs_that_are_constant_between_rows() {
     let folder = tempfile::tempdir().unwrap();

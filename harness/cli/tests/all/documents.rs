@@ -7,8 +7,7 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(pack::root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// The first 40 lines must lead a newcomer to a first plot, to the tools with which the FMUs were tested, and to the commands
-/// for building from source. Each of these two commands stands on a line of its own, ready to copy.
+/// The commands are cargo run and cargo test, and each stands on a line of its own, ready to copy.
 #[test]
 fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
     let readme = read("README.md");
@@ -29,8 +28,8 @@ fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
     }
 }
 
-/// The wrapper that OpenModelica's importFMU writes drops the start values of inputs, so that an input that is not set is 0.
-/// With `g_axial` = 0 the tank would be weightless.
+/// The wrapper that OpenModelica's importFMU writes drops the start values of inputs, so that an
+/// input that is not set is 0. With `g_axial` = 0 the tank would be weightless.
 #[test]
 fn the_script_for_openmodelica_sets_every_input() {
     let script = read("harness/hosts/openmodelica.mos");

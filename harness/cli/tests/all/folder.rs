@@ -68,8 +68,8 @@ fn is_consistent(directory: &Path) {
     }
 }
 
-/// One bit of each stored run of a campaign of 50 runs is flipped. The next campaign must simulate these runs again and write
-/// the same tables.
+/// One bit of each of 50 stored runs is flipped. The next campaign simulates these runs again and
+/// has the tables of the first.
 #[test]
 fn every_flipped_bit_in_a_stored_run_is_noticed() {
     const RUNS: usize = 50;
@@ -112,7 +112,6 @@ fn every_flipped_bit_in_a_stored_run_is_noticed() {
     }
 }
 
-/// A bit of a stored run is flipped and its line is removed from the manifest. The next campaign must simulate the run again.
 #[test]
 fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
     let directory = tempfile::tempdir().unwrap();
@@ -153,7 +152,6 @@ fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
     assert!(published(directory) == before);
 }
 
-/// The campaign has more runs than the report draws curves for; runs.csv has a row for every run.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
@@ -202,7 +200,7 @@ fn a_second_campaign_in_a_directory_is_refused_with_the_name_of_the_first() {
     successful(campaign(directory, plan));
 }
 
-/// A plan whose campaign can be interrupted: a run of one second, then runs of an hour.
+/// A plan whose campaign can be interrupted: it has a run of one second, then runs of an hour.
 #[cfg(unix)]
 const INTERRUPTED: &str = "profile = \"zero\"\n[vary]\nprofile = [\"sine:duration=1\", \
     \"exp-sweep:duration=40000,amplitude=0.05\", \"exp-sweep:duration=40000,amplitude=0.06\", \
@@ -264,7 +262,8 @@ fn with_file_size_limit(command: &Command, blocks: usize) -> Command {
     shell
 }
 
-/// A limit on file size makes the report of a second campaign fail in the directory of a completed campaign.
+/// A limit on file size makes the report of a second campaign fail in the directory of a completed
+/// campaign.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_gives_an_error_with_the_file_and_leaves_the_last_results() {

@@ -31,8 +31,8 @@ fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     pack::archive::write(&files, path).unwrap();
 }
 
-/// The input follows straight lines, which the callback intermediateUpdate sets. Mutant 35 of the model passes its instance
-/// to the callbacks instead of the environment.
+/// The callback intermediateUpdate sets an input that follows straight lines. Mutant 35 of the
+/// model passes its instance to the callbacks instead of the environment.
 #[test]
 fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     for mutant in [0, 35] {
@@ -43,8 +43,7 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     }
 }
 
-/// Without Co-Simulation the command integrates the FMU. A message names the clock of the FMU, because the command does not
-/// activate it.
+/// The command integrates the FMU itself. It does not activate the FMU's clock, and says so.
 #[test]
 fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,7 +97,7 @@ fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> Strin
     String::from_utf8(done.stderr).unwrap()
 }
 
-/// The output `counter` of this model is 100 while its Boolean is true.
+/// The output `counter` of this model is 100 while its Boolean input is true.
 #[test]
 fn booleans_are_driven_from_a_file_and_held() {
     let folder = tempfile::tempdir().unwrap();

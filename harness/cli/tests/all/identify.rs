@@ -59,8 +59,6 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     assert!((off / clean.len() as f64).sqrt() < 1e-4, "{off}");
 }
 
-/// `identify --free` and `design --free` run with a single unknown, with an unknown that ends at its bound, and without an
-/// input.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
@@ -137,7 +135,7 @@ fn hubslosh_run_accepts_the_friction_that_identify_friction_has_estimated() {
     hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
 }
 
-/// The requested multisine has a peak of 0.5 N·m. The plan has a peak of 0.26 N·m, the limit of the wheel's torque.
+/// The requested peak of 0.5 N·m exceeds the limit of the wheel, 0.26 N·m.
 #[test]
 fn a_designed_multisine_is_within_the_wheels_limits() {
     let folder = tempfile::tempdir().unwrap();

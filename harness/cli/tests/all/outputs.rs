@@ -17,7 +17,7 @@ fn expect_refusal(directory: &Path, arguments: &[&str]) -> String {
     said
 }
 
-/// Commands with an input IN and an output OUT, one for each option that names an output.
+/// Command lines with an input IN and an output OUT, one for each option that names an output.
 const CASES: [&str; 15] = [
     "run --input IN --out OUT",
     "run --profile zero --parameters IN --out OUT",
@@ -36,8 +36,8 @@ const CASES: [&str; 15] = [
     "analyse IN --fmu IN --out OUT",
 ];
 
-/// The output has the path of an input, a hard link, a symbolic link or another spelling of the path. The command must fail,
-/// and the input must keep its content.
+/// The output has the path of an input, a hard link, a symbolic link or another spelling of the
+/// path.
 #[cfg(unix)]
 #[test]
 fn no_output_option_replaces_an_input_under_any_of_its_names() {
@@ -65,7 +65,8 @@ fn no_output_option_replaces_an_input_under_any_of_its_names() {
     }
 }
 
-/// The file tank.toml names drawing.svg as its drawing; `hubslosh tank --picture drawing.svg` must not overwrite this file.
+/// The file tank.toml names drawing.svg as its drawing, which `hubslosh tank --picture drawing.svg`
+/// must not overwrite.
 #[test]
 fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
     let directory = tempfile::tempdir().unwrap();
@@ -79,7 +80,8 @@ fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
     assert!(said.contains("it is the input"), "{said}");
 }
 
-/// `check --json A.fmu B.fmu` takes A.fmu as the name of its output; the command refuses to replace an existing .fmu file.
+/// `check --json A.fmu B.fmu` takes A.fmu as the name of its output. The command refuses to replace
+/// an existing .fmu file.
 #[test]
 fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
     let directory = tempfile::tempdir().unwrap();
@@ -120,7 +122,8 @@ const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campai
     campaign --compare, design --fmu, example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, \
     run --parameters, run --fmu, pack --parameters, variables --fmu, view --parameters, view --fmu, book --theme";
 
-/// Options with FILE or FOLDER in their help must be in one of two lists, so that no output can replace an input.
+/// Each option with FILE or FOLDER in its help must be in one of two lists, so that no output can
+/// replace an input.
 #[test]
 fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     let source = include_str!("../../src/outputs.rs");
@@ -150,8 +153,8 @@ fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     assert!(unknown.is_empty(), "neither in INPUTS here nor in OUTPUTS of outputs.rs: {unknown:?}");
 }
 
-/// Returns the examples in a help text. Continued lines are joined, and the rest of a line after a pipe or a redirection is
-/// left out.
+/// Returns the commands of the examples in a help text. Continued lines are joined, and the rest of
+/// a line after a pipe or a redirection is left out.
 fn examples(text: &str) -> Vec<String> {
     let joined = text.replace("\\\n", " ");
     let lines = joined.lines().filter(|line| line.starts_with("  hubslosh "));
@@ -163,7 +166,8 @@ fn examples(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Beginnings of those examples that take at most a second each and can run in a folder with the files that they name.
+/// Beginnings of those examples that take at most a second each, and run in a folder with the files
+/// that they name.
 const CHEAP: [&str; 7] = [
     "hubslosh scale",
     "hubslosh tank",
@@ -263,8 +267,8 @@ fn a_draining_tank_gets_the_damping_of_every_fill() {
     );
 }
 
-/// A named pipe without a writer is given as recording, parameters, plan or tank of each command. The command must fail
-/// instead of waiting.
+/// A named pipe without a writer is given as recording, parameters, plan or tank of each command.
+/// The command must fail instead of waiting.
 #[cfg(unix)]
 #[test]
 fn a_named_pipe_is_refused_as_any_input() {
@@ -296,7 +300,8 @@ fn a_named_pipe_is_refused_as_any_input() {
     }
 }
 
-/// One command for each kind of output is run with a symbolic link, and with a named pipe, as the output.
+/// One command for each kind of output is run with a symbolic link, and with a named pipe, as the
+/// output.
 #[cfg(unix)]
 #[test]
 fn an_output_follows_links_and_is_written_to_a_pipe() {
@@ -443,8 +448,8 @@ fn units_of_a_parameter_set_are_converted_or_refused() {
     }
 }
 
-/// Returns a recording of a torque sweep from 1 to 3 Hz in 100 s and of a response to it. Its times and values are multiplied
-/// by the factors `times` and `values`.
+/// Returns the text of a recording of a torque sweep from 1 to 3 Hz in 100 s and of a response to
+/// it. Its times are multiplied by `times`, its rates by `values`.
 fn sweep(times: f64, values: f64) -> String {
     let mut text = String::from("time,tau_cmd,omega\n");
     for k in 0..=5000 {
@@ -456,7 +461,8 @@ fn sweep(times: f64, values: f64) -> String {
     text
 }
 
-/// Times in milliseconds or nanoseconds without a stated unit, dates in the far future, and values of 1e300 are refused.
+/// The recordings have times in milliseconds or nanoseconds without a stated unit, dates in the far
+/// future, or values of 1e300.
 #[test]
 fn a_recording_in_another_unit_or_of_absurd_values_is_refused_at_once() {
     let directory = tempfile::tempdir().unwrap();

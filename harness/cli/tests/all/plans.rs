@@ -84,8 +84,8 @@ fn a_killed_campaign_continues_with_its_stored_runs() {
     }
 }
 
-/// `campaign --list` prints the inputs and parameters of each run. Another program makes the runs from this list and stores
-/// them in the directory of the campaign.
+/// `campaign --list` prints the inputs and parameters of each run. Another importer simulates and
+/// stores the runs of this list.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn runs_by_another_importer_give_the_same_tables() {
@@ -243,8 +243,8 @@ fn a_wrong_plan_writes_nothing_and_reports_every_fault() {
     assert!(said.contains("--plan") && said.contains("--fills"), "{said}");
 }
 
-/// The output directory has quotes, spaces and `$(…)` in its name. A shell that runs the report's command must see this name
-/// as one argument.
+/// The output directory has quotes, spaces and `$(…)` in its name. A shell that runs the report's
+/// command must see one argument.
 #[test]
 fn the_command_in_the_report_is_quoted_for_the_shell() {
     let directory = tempfile::tempdir().unwrap();

@@ -29,7 +29,8 @@ fn rows(path: &Path) -> Vec<HashMap<String, String>> {
     reader.deserialize().map(|row| row.unwrap()).collect()
 }
 
-/// Columns of the table of features that must be the same for a recording and for the run from which it was made.
+/// Columns of the table of features that must be equal for a recording and for the run from which
+/// the recording was made.
 const SAME: [&str; 22] = [
     "fill_m",
     "amplitude_nm",

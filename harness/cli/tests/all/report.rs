@@ -34,7 +34,8 @@ const SWEEPS: &str = "title = \"Sweeps & <models>\"\n\
     [set]\nimu.enabled = true\n\
     [count]\nimu.seed = 1\n";
 
-/// Results of ten sweeps of the thesis (10 cm of water, gyro noise on), computed once for all tests in this file.
+/// Results of ten sweeps of the thesis (10 cm of water, with gyro noise), computed once for all
+/// tests in this file.
 static TEN: LazyLock<(String, Rows, Rows)> = LazyLock::new(|| {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -54,7 +55,7 @@ fn spread(values: &[f64]) -> f64 {
     top - values.iter().copied().fold(f64::MAX, f64::min)
 }
 
-/// In sweeps of the bench with the slosh model `linear`, both frequencies vary by less than 4 mHz between 0.05 and 0.25 N·m.
+/// Between 0.05 and 0.25 N·m both frequencies vary by less than 4 mHz.
 #[test]
 fn a_linear_liquid_keeps_antiresonance_and_resonance_from_0_05_newton_metres_on() {
     let (_, swept, spa) = &*TEN;
@@ -249,8 +250,8 @@ fn a_report_of_random_draws_has_histograms_and_scatter_plots() {
     assert!(rho.len() == 2 && rho[1] < -0.95, "{rho:?}");
 }
 
-/// Asserts that all elements of the page are closed in the order of their nesting, that attributes are quoted, and that no
-/// text contains unescaped markup.
+/// Asserts that all elements of the page are closed in the order of their nesting, that attributes
+/// are quoted, and that no text contains unescaped markup.
 fn well_formed(page: &str) {
     let page = &text_of(page);
     let mut open = Vec::new();

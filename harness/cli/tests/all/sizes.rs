@@ -98,7 +98,8 @@ scale numbers --radius 0 --acceleration 0 --velocity 0
 review none.toml --out review.html
 ";
 
-/// Each command runs with 0 and with 1 rows, modes, runs or points, in its options and in its files.
+/// Each command runs with 0 and with 1 rows, modes, runs or points, in its options and in its
+/// files.
 #[test]
 fn options_with_sizes_0_and_1_give_a_result_or_one_error() {
     let folder = tempfile::tempdir().unwrap();

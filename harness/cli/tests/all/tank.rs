@@ -12,8 +12,8 @@ fn tank(arguments: &[&str]) -> (bool, String, String) {
     (done.status.success(), text(done.stdout), text(done.stderr))
 }
 
-/// The sphere is half full. The dimensionless frequency lambda_1 R and the mass ratio m_1/m_liq are compared with Budiansky
-/// (1960); all hinges are at the centre of the sphere.
+/// The eigenvalue lambda_1 R and m_1/m_liq are compared with Budiansky (1960); all hinges are at
+/// the centre of the sphere.
 #[test]
 fn a_half_full_sphere_has_its_published_first_mode() {
     let folder = tempfile::tempdir().unwrap();
@@ -43,8 +43,8 @@ fn an_invalid_tank_is_refused_in_a_sentence_without_a_file() {
     assert!(!out.exists());
 }
 
-/// The bench's cylinder gets its parameters from a drawing, through a TOML and an SSV file, or from its dimensions. Masses
-/// and lengths agree to 1e-11; the tolerance of 1e-9 rad/s is about 1e-8 of the rates.
+/// The bench's cylinder gets its parameters from a drawing (through a TOML and an SSV file) or from
+/// its dimensions. Masses and lengths agree to 1e-11; 1e-9 rad/s is about 1e-8 of the rates.
 #[test]
 fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
     let folder = tempfile::tempdir().unwrap();
@@ -91,8 +91,6 @@ fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
     assert_ne!(other.column("omega").unwrap(), toml.column("omega").unwrap());
 }
 
-/// The parameter files for SloshTank and for a tank of Spacecraft contain fixed mass, its height and inertia, and the modes
-/// of the JSON result, under the names of the FMUs.
 #[test]
 fn parameters_of_the_six_axis_fmus_have_their_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,9 +136,9 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
     }
 }
 
-/// The FMU, with the parameter file, must compute the frequency Omega_1^2 = 21.4397 of the meniscus table at Bo = 10 and a
-/// contact angle of 30 degrees. On the bench this wetting liquid has a negative stiffness, which the FMU does not accept, and
-/// the command says so.
+/// The frequency belongs to omega_1^2 rho R^3/sigma = 21.4397 at Bo = 10 and 30 degrees, a value of
+/// the meniscus table. On the bench this wetting liquid has a negative stiffness, which the FMU
+/// does not accept.
 #[test]
 fn the_fmu_has_the_frequency_of_a_curved_meniscus_and_negative_stiffnesses_are_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -195,7 +193,7 @@ fn the_fmu_has_the_frequency_of_a_curved_meniscus_and_negative_stiffnesses_are_r
     }
 }
 
-/// Half a sphere of 1 m is 1 m of height, 50 % of the volume, and 2094.395 kg of water; --sweep accepts metres and per cent.
+/// Half a sphere of 1 m is 1 m of height, 50 % of the volume, and 2094.395 kg of water.
 #[test]
 fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     let folder = tempfile::tempdir().unwrap();
@@ -225,8 +223,8 @@ fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     }
 }
 
-/// Without gravity the frequencies in the table are 0. A parameter file has the stiffness by capillarity, but no damping
-/// ratios, because there is no specific force at which they would hold.
+/// Without gravity the frequencies in the table are 0. A parameter file has the stiffness by
+/// capillarity, but no damping ratios, because there is no specific force at which they would hold.
 #[test]
 fn without_gravity_only_surface_tension_restores_the_liquid() {
     let folder = tempfile::tempdir().unwrap();
@@ -256,8 +254,8 @@ fn without_gravity_only_surface_tension_restores_the_liquid() {
     }
 }
 
-/// In a sphere of 1 m at 1e-6 m/s² the first-order correction by capillarity is larger than the value that it corrects, so
-/// that the file is written only with --force.
+/// In a sphere of 1 m at 1e-6 m/s² the first-order correction by capillarity is larger than the
+/// value that it corrects.
 #[test]
 fn a_stiffness_far_outside_its_formula_is_written_only_with_the_option_force() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,9 +316,9 @@ fn invalid_parameter_files_are_refused_in_a_sentence() {
     }
 }
 
-/// At Bo = 3.6 and 30 degrees the frequency Omega_1^2 rho R^3/sigma must lie between 9.1 and 21.4, the rows Bo = 3 and 10 of
-/// the meniscus table; gravity alone would give 6.6. Table, picture and JSON contain it. For a sphere there is no formula, so
-/// that the frequency is unknown there, and null in JSON.
+/// At Bo = 3.6 and 30 degrees omega_1^2 rho R^3/sigma is between 9.1 and 21.4 (rows Bo = 3 and 10
+/// of the meniscus table); gravity alone gives 6.6. For a sphere there is no formula: the frequency
+/// is stated as unknown, and is null in JSON.
 #[test]
 fn frequencies_include_the_surface_tension_if_it_is_given() {
     let folder = tempfile::tempdir().unwrap();

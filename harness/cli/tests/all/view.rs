@@ -86,7 +86,8 @@ fn column(run: &serde_json::Value, name: &str) -> Vec<f64> {
     bytes.chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
 }
 
-/// With each slosh model, a sweep excites three modes over the first two frequencies. The page stores numbers with 32 bits.
+/// With each slosh model, a sweep excites three modes over the first two frequencies. The page
+/// stores numbers with 32 bits.
 #[test]
 fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -154,9 +155,9 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 1);
 }
 
-/// Liquid that stands higher on one side has its centre of mass on this side: rho int eta r cos^2 dA = m l per angle, where
-/// eta is the surface of a mode. In linear theory this holds exactly for every mode and every tank. The surface of a
-/// cylinder, drawn in this sphere, would differ by a tenth.
+/// Liquid that stands higher on one side has its centre of mass on this side: rho int eta r cos^2
+/// dA = m l per angle with the elevation eta. In linear theory this holds exactly for every mode
+/// and every tank. The surface of a cylinder, drawn in this sphere, would differ by a tenth.
 #[test]
 fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum_does() {
     let directory = tempfile::tempdir().unwrap();
@@ -206,8 +207,8 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
     }
 }
 
-/// `hubslosh tank` writes the parameters for HubSlosh so that the modes along a box's first side move in the tangential
-/// direction, the y axis of the tank.
+/// `hubslosh tank` writes HubSlosh's parameters so that the modes along a box's first side move in
+/// the tangential direction, the y axis of the tank.
 #[test]
 fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     let directory = tempfile::tempdir().unwrap();
@@ -255,8 +256,8 @@ fn default_columns_of_a_draining_tank_are_enough_for_its_page() {
     assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
 }
 
-/// A run with a column whose unit is HTML markup must be drawn as usual. In HTML, `</script>` after `<!--<script` does not
-/// end a script element, so that the rest of the page would be lost.
+/// In HTML, `</script>` after `<!--<script` does not end a script element, so that the rest of the
+/// page would be lost.
 #[test]
 fn a_unit_that_contains_html_markup_does_not_break_the_page() {
     const UNIT: &str = "<!--<script></script>&\u{2028}";

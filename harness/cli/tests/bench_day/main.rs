@@ -186,8 +186,8 @@ fn bench_day_reports_a_missing_log_file_in_its_chapter() {
     assert!(said.contains("day.toml is needed"), "{said}");
 }
 
-/// The clock of the log is wrong by 300 ppm, and 3 % of its rows are lost. They must not be mistaken for another profile or
-/// for a torque of the wrong sign.
+/// The clock and the lost rows must not be mistaken for another profile or for a torque of the
+/// wrong sign.
 #[test]
 fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {
     let folder = tempfile::tempdir().unwrap();

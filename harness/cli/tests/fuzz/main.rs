@@ -292,8 +292,8 @@ macro_rules! targets {
         }
     )*
 
-        /// Fuzzes the readers that HUBSLOSH_FUZZ_TARGETS names, or all of them. HUBSLOSH_FUZZ_INPUTS is the number of inputs
-        /// for each reader.
+        /// Fuzzes the readers that the environment variable HUBSLOSH_FUZZ_TARGETS names, or all of
+        /// them. HUBSLOSH_FUZZ_INPUTS is the number of inputs for each reader.
         #[test]
         #[ignore = "takes long: .ci/fuzz-readers"]
         fn fuzz_campaign() {

@@ -36,7 +36,8 @@ impl Sandbox {
         self.path("temporary")
     }
 
-    /// Runs a command to its end, and asserts that it leaves neither a process nor a temporary file.
+    /// Runs a command to its end, and asserts that it leaves neither a process nor a temporary
+    /// file.
     fn hubslosh(&self, arguments: &[&str]) -> Output {
         let temporary = self.temporary();
         let marker = format!("HOSTILE={}", self.directory.path().display());
@@ -360,7 +361,7 @@ fn ends_its_own_process(when: &str) {
     memory_was_enough();
 }
 
-/// The binaries crash, exit, loop or fill the memory while they are loaded. Each command must then print an error.
+/// FMU binaries crash, exit, loop or fill the memory while they are loaded.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_says_so() {
@@ -393,7 +394,7 @@ fn messages_that_an_fmu_forges_in_the_pipe_of_its_process_are_refused() {
     }
 }
 
-/// An FMU fills temporary files, memfd or mapped memory beyond `--memory 48`; the run ends with an error.
+/// An FMU fills temporary files, memfd or mapped memory beyond `--memory 48`.
 #[test]
 fn temporary_files_and_shared_memory_count_against_the_memory_limit() {
     const FIRST: u32 = 15;
@@ -408,8 +409,8 @@ fn temporary_files_and_shared_memory_count_against_the_memory_limit() {
     }
 }
 
-/// The binary of an FMU changes the floating-point control word while it is loaded; `hubslosh check` reports a finding and
-/// `hubslosh run` warns.
+/// The binary of an FMU changes the floating-point control word while it is loaded. `hubslosh
+/// check` reports it and `hubslosh run` warns.
 #[test]
 fn changes_of_the_process_by_loading_an_fmu_are_reported() {
     const FLUSH: u32 = 13;

@@ -24,7 +24,8 @@ use super::super::gyro::noise_rows;
 use super::{Day, Item, Kind};
 use crate::terminal;
 
-/// Friction parameters and hub inertia in Table 5.5 of Rubaga's thesis, SI.
+/// Friction parameters and hub inertia of Table 5.5 in Rubaga's thesis, in SI units, under their
+/// names in the FMU.
 const THESIS: [(&str, f64); 5] = [
     (friction::B, 0.03793),
     (friction::C, 0.003498),
@@ -32,20 +33,21 @@ const THESIS: [(&str, f64); 5] = [
     (friction::OMEGA_S, 0.08581),
     (hub::I, 0.322414),
 ];
-/// Radius of Centaur's oxygen tank, m (thesis 7.2.1).
+/// Radius of the oxygen tank of the upper stage Centaur, m (thesis 7.2.1).
 const CENTAUR: f64 = 2.0425;
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;
-/// Largest rate in the report's figure of the friction near rest, in multiples of the Stribeck
-/// speed ω_s.
+/// Largest rate in the report's figure of the friction near rest, as a multiple of the Stribeck
+/// speed.
 const NEAR: f64 = 5.0;
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
 const CHUNKS: f64 = 8.0;
 
-/// Computes the chapters of the report, and the fit of friction and inertia if there are recordings for it.
-/// `problems` receives one message for each recording that cannot be used, `found` the parameters of hub and
-/// bearing as settings for the simulation of the sweeps.
+/// Computes the chapters of the report on a bench day, and the fit of friction and inertia if there
+/// are recordings for it. A message for each recording that cannot be used is added to `problems`.
+/// The fitted parameters of hub and bearing are added to `found`, as settings for the simulation of
+/// the sweeps.
 pub fn chapters(
     day: &Day,
     fmu: &Fmu,
@@ -121,8 +123,8 @@ fn missing_chapter(title: &str, kind: Kind, problems: &[String]) -> Chapter {
     }
 }
 
-/// Reads all recordings of one kind with torque and rate. A recording that cannot be read adds a message to
-/// `problems` and is left out.
+/// Reads the torque and the rate of all recordings of one kind. A recording that cannot be read is
+/// left out, and a message is added to `problems`.
 fn bench_recordings(day: &Day, kind: Kind, problems: &mut Vec<String>) -> Vec<Recording> {
     let mut all = Vec::new();
     for item in day.items_of_kind(kind) {
@@ -152,8 +154,8 @@ fn illustration(chart: Chart, thesis: &'static str, caption: impl Into<String>) 
     Illustration { chart, thesis, caption: caption.into(), equal: false }
 }
 
-/// Returns the value of a real parameter in SI units: from the manifest if it sets the parameter, otherwise
-/// the FMU's start value.
+/// Returns the value of the real parameter `name` in SI units: from day.toml if it sets the
+/// parameter, otherwise the start value of the FMU.
 fn value(day: &Day, fmu: &Fmu, name: &str) -> Result<f64> {
     let set = day.settings.iter().find(|(other, _)| other == name).map(|(_, value)| value.clone());
     let start = fmu.description().variable(name)?.attributes().start.clone();
@@ -208,7 +210,7 @@ fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
     })
 }
 
-/// Thins points to at most [`POINTS`] by taking every n-th one, because a figure with all samples of a
+/// Keeps every n-th of `points`, at most [`POINTS`] in all, because a figure with all samples of a
 /// recording would be slow to draw.
 fn thin_out(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
     points.iter().copied().step_by(points.len().div_ceil(POINTS).max(1))

@@ -152,8 +152,9 @@ impl Day {
         self.items.iter().filter(move |item| item.kind == kind)
     }
 
-    /// Returns a plan for a campaign, in which each sweep is a recording that is simulated with every slosh model.
-    /// `found` are parameters from the friction runs; the simulations use them unless day.toml sets them.
+    /// Returns a plan for a campaign, in which each sweep is a recording that is simulated with
+    /// every slosh model. `found` are parameters from the friction runs; the simulations use them
+    /// unless day.toml sets them.
     fn plan(self, found: Vec<(String, String)>) -> Result<Plan> {
         let read = |item: &Item| recorded::read(&item.recorded, &mut |_| {}).ok();
         let Some((step, _)) = self.items_of_kind(Kind::Sweep).find_map(read) else {
@@ -177,8 +178,9 @@ impl Day {
     }
 }
 
-/// Appends the values of nested tables to `values` under dotted names, as the FMU names its parameters: `[tank] h
-/// = 0.08` becomes `tank.h`.
+/// Appends the values of nested tables to `values` under dotted names, as the FMU names its
+/// parameters: `[tank] h = 0.08` becomes `tank.h`. `prefix` is the name of the outer tables, with a
+/// full stop at its end.
 fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>) {
     for (key, value) in table {
         let name = format!("{prefix}{key}");
@@ -190,8 +192,9 @@ fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>
     }
 }
 
-/// Analyses the day in `directory`, and writes its tables and report to `out` (default: a folder in dist with
-/// the name of `directory`).
+/// Analyses the bench day in `directory`, and writes its tables and report to `out`, by default to
+/// a folder in dist with the name of `directory`. At most `jobs` runs are simulated at the same
+/// time.
 pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> Result<()> {
     let day = Day::read(directory)?;
     let fmu = open(fmu)?;
