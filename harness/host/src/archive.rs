@@ -291,12 +291,12 @@ mod tests {
     }
 
     #[test]
-    fn an_ordinary_archive_is_unpacked() {
+    fn the_files_of_a_valid_archive_are_unpacked() {
         assert_eq!(unpacked(&[("a", b"1"), ("b/", b""), ("b/c", b"2")], 0), Ok(()));
     }
 
     #[test]
-    fn an_existing_file_is_never_overwritten() {
+    fn unpacking_an_archive_never_overwrites_an_existing_file() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a"), "1").unwrap();
         let file = archive(&[("a", b"2")], 0);

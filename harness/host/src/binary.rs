@@ -520,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn random_bytes_are_not_a_binary() {
+    fn damaged_bytes_are_refused_as_a_binary() {
         for bytes in
             [&b""[..], b"MZ", b"\x7fELF\x02\x01\x01", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]]
         {

@@ -969,7 +969,7 @@ mod tests {
 </fmiModelDescription>"#;
 
     #[test]
-    fn names_types_and_enumerations_are_read() {
+    fn names_types_and_enumeration_items_of_a_model_description_are_read() {
         let d = ModelDescription::from_xml(XML).unwrap();
         assert_eq!(d.co_simulation.as_ref().unwrap().model_identifier, "M");
         assert_eq!(d.default_experiment.stop_time, Some(10.5));
@@ -1013,7 +1013,7 @@ mod tests {
     }
 
     #[test]
-    fn all_missing_attributes_are_reported_with_their_lines() {
+    fn all_missing_attributes_of_a_model_description_are_reported_with_their_lines() {
         let broken = XML
             .replace(" guid=\"{1}\"", "")
             .replace("valueReference=\"3\"", "valueReference=\"x\"");
@@ -1057,7 +1057,7 @@ mod tests {
     }
 
     #[test]
-    fn structural_parameters_set_the_size_of_arrays_whose_start_values_then_do_not_apply() {
+    fn declared_start_values_do_not_apply_to_an_array_that_a_structural_parameter_resizes() {
         let set = BTreeMap::from([(7, Value::Integer(3))]);
         let mut d = ModelDescription::from_xml_with(XML3, &set).unwrap();
         assert_eq!(d.variable("n").unwrap().attributes().start.as_deref(), Some("3"));
@@ -1094,7 +1094,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_name_brings_suggestions() {
+    fn the_error_about_a_misspelt_variable_suggests_similar_names() {
         let d = ModelDescription::from_xml(XML).unwrap();
         let error = d.variable("slosh.modle").unwrap_err().to_string();
         assert!(error.contains("did you mean \"slosh.model\""), "{error}");

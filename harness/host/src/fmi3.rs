@@ -930,7 +930,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_fmu_of_fmi_3_exports_75_functions() {
+    fn an_fmu_3_must_export_75_functions() {
         let mut all = Fmu::symbols();
         all.sort_unstable();
         all.dedup();

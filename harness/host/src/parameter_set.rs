@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn values_of_toml_have_their_types() {
+    fn numbers_booleans_and_texts_of_a_parameter_file_in_toml_are_read() {
         let found = from_toml("a = 1_000.5\nb.c = 0x10\nd = true\ne = 'x'\nf = inf").unwrap();
         let texts: Vec<_> = found.parameters.iter().map(|p| (&*p.name, text(&p.value))).collect();
         let expected = [("a", "1000.5"), ("b.c", "16"), ("d", "true"), ("e", "x"), ("f", "inf")];

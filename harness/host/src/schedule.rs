@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_history_is_piecewise_linear_and_may_jump() {
+    fn an_input_history_is_piecewise_linear_and_may_jump() {
         let lines = |hold| {
             let (time, values) = (vec![0.0, 1.0, 1.0, 3.0], vec![0.0, 2.0, 5.0, 1.0]);
             History::new(time, values, None, hold).unwrap()
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_histories_and_too_many_points_are_refused() {
+    fn invalid_input_histories_and_too_many_communication_points_are_refused() {
         for (time, word) in [
             (vec![0.0], "the table of inputs has 1 rows (allowed: at least two)"),
             (vec![0.0, 1.0, 0.5], "row 3: time goes from 1 to 0.5 s; it must not go back"),

@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn entities_and_endless_nesting_are_refused() {
+    fn xml_with_entities_or_too_deep_nesting_is_refused() {
         let bomb = "<!DOCTYPE a [<!ENTITY x \"y\">]><a>&x;</a>";
         assert!(Element::parse(bomb.as_bytes()).unwrap_err().to_string().contains("DTD"));
         let nested = |depth: usize| "<a>".repeat(depth) + &"</a>".repeat(depth);
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_read_as_xml_doubles() {
+    fn numbers_in_xml_files_are_read_as_the_type_double_of_xml() {
         assert_eq!(double(" 1.5e3 "), Some(1500.0));
         assert_eq!(double("-INF"), Some(f64::NEG_INFINITY));
         for wrong in ["1,5", "inf", "nan", "infinity", "0x10", "", "1.0d"] {
