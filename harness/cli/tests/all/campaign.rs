@@ -113,7 +113,7 @@ fn a_failed_run_is_named_and_the_other_runs_are_completed() {
 /// Without --out, campaigns with different flags are written to directories with different default
 /// names.
 #[test]
-fn other_flags_get_a_directory_of_their_own_and_another_plan_is_not_overwritten() {
+fn campaigns_with_different_flags_have_different_directories_and_never_overwrite_another_plan() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -225,7 +225,7 @@ fn runs_of_a_plan_with_sensors_contain_the_readings_and_are_reused() {
 /// At an axial acceleration of 0.1 m/s² the Bond number of the bench is 9.2, so that surface
 /// tension matters.
 #[test]
-fn a_weightless_liquid_is_reported_in_the_tables_and_at_the_end() {
+fn a_low_bond_number_is_reported_in_the_tables_of_a_campaign_and_as_a_warning() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     // Bond number 1000 · 0.1 · 0.0815²/0.072 = 9.2

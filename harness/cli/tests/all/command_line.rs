@@ -111,7 +111,7 @@ fn a_torque_file_gives_the_same_motion_as_csv_and_as_parquet() {
 }
 
 #[test]
-fn the_error_of_an_unknown_name_suggests_a_similar_name() {
+fn the_error_about_an_unknown_variable_suggests_a_similar_name() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     refuses(
@@ -160,7 +160,7 @@ fn a_tank_without_liquid_is_refused_with_the_message_of_the_fmu() {
 }
 
 #[test]
-fn runs_that_need_more_memory_than_any_computer_has_are_refused() {
+fn runs_that_need_more_memory_than_any_machine_has_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -256,7 +256,7 @@ fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_alloca
 /// The cases are a torque of 0, a torque below the dry friction, a gyro without noise, and a record
 /// of two rows.
 #[test]
-fn an_experiment_without_information_is_refused() {
+fn design_refuses_an_experiment_without_information_about_the_parameters() {
     let directory = tempfile::tempdir().unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
     for (plan, words) in [
@@ -275,7 +275,7 @@ fn an_experiment_without_information_is_refused() {
 }
 
 #[test]
-fn warnings_of_the_fmu_are_printed() {
+fn hubslosh_run_prints_the_warnings_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
     let said = |arguments: &[&str]| {
         let done = short_run(directory.path(), arguments);
@@ -340,7 +340,7 @@ fn a_torque_that_is_not_a_number_is_named_by_file_and_row() {
 }
 
 #[test]
-fn files_that_cannot_be_read_or_written_are_named() {
+fn the_error_about_a_file_that_cannot_be_read_or_written_names_the_file() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     std::fs::write(directory.join("not.fmu"), "no zip").unwrap();
@@ -502,7 +502,7 @@ fn variables_are_listed_with_unit_range_and_meaning() {
 }
 
 #[test]
-fn the_completions_for_shells_contain_every_command() {
+fn shell_completions_contain_every_command() {
     for shell in ["bash", "zsh", "fish", "powershell"] {
         let done = hubslosh(Path::new("."), &["completions", shell]);
         let script = String::from_utf8_lossy(&done.stdout).into_owned();

@@ -9,7 +9,7 @@ fn read(path: &str) -> String {
 
 /// The commands are cargo run and cargo test, and each stands on a line of its own, ready to copy.
 #[test]
-fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
+fn the_first_40_lines_of_readme_lead_to_a_plot_and_to_the_tests() {
     let readme = read("README.md");
     let first: Vec<&str> = readme.lines().take(40).collect();
     for command in ["cargo run --release", "cargo test --release"] {
@@ -31,7 +31,7 @@ fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
 /// The wrapper that OpenModelica's importFMU writes drops the start values of inputs, so that an
 /// input that is not set is 0. With `g_axial` = 0 the tank would be weightless.
 #[test]
-fn the_script_for_openmodelica_sets_every_input() {
+fn the_script_for_openmodelica_sets_every_input_of_hubslosh() {
     let script = read("harness/hosts/openmodelica.mos");
     let xml = read("modelDescription/HubSlosh/modelDescription.xml");
     let (_, set) = script.split_once("-override=").unwrap();

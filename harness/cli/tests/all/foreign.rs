@@ -34,7 +34,7 @@ fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
 /// The callback intermediateUpdate sets an input that follows straight lines. Mutant 35 of the
 /// model passes its instance to the callbacks instead of the environment.
 #[test]
-fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
+fn a_run_of_an_fmu_3_with_linear_inputs_equals_the_exact_solution() {
     for mutant in [0, 35] {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("Model3.fmu");
@@ -45,7 +45,7 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
 
 /// The command integrates the FMU itself. It does not activate the FMU's clock, and says so.
 #[test]
-fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
+fn a_run_of_an_fmu_with_only_model_exchange_equals_the_exact_solution() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Model3.fmu");
     let xml = std::fs::read_to_string(concat!(
@@ -99,7 +99,7 @@ fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> Strin
 
 /// The output `counter` of this model is 100 while its Boolean input is true.
 #[test]
-fn booleans_are_driven_from_a_file_and_held() {
+fn boolean_inputs_from_a_file_are_held_between_rows() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Model3.fmu");
     let changes = [

@@ -61,7 +61,7 @@ fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
 
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
+fn identify_and_design_accept_a_single_unknown_an_unknown_at_its_bound_and_no_input() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["hub.I=0.5"]);
@@ -190,7 +190,7 @@ fn the_error_of_a_removed_option_names_its_replacement() {
 }
 
 #[test]
-fn no_kind_of_recording_has_more_than_15_options() {
+fn each_kind_of_identify_has_at_most_15_options() {
     let folder = tempfile::tempdir().unwrap();
     for kind in ["bench", "fmu", "friction", "decay"] {
         let said = hubslosh(folder.path(), &["identify", kind, "--help"]).unwrap();

@@ -179,7 +179,7 @@ const CHEAP: [&str; 7] = [
 ];
 
 #[test]
-fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
+fn every_example_in_a_help_is_parsed_and_the_fast_examples_run() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     let tank = concat!(env!("CARGO_MANIFEST_DIR"), "/../tank/examples/capsule.toml");
@@ -218,7 +218,7 @@ fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
 }
 
 #[test]
-fn every_help_has_the_commands_own_options_first_and_an_example() {
+fn every_help_lists_the_commands_own_options_first_and_has_an_example() {
     let mut texts = Vec::new();
     helps(&[], &mut texts);
     assert!(texts.len() > 25, "{}", texts.len());
@@ -366,7 +366,7 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
 }
 
 #[test]
-fn a_driven_input_is_one_column_of_the_table() {
+fn a_driven_input_has_exactly_one_column_in_the_table() {
     let directory = tempfile::tempdir().unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
     let run = ["run", "--fmu", fmu, "--profile", "zero", "--stop", "0.1", "--out", "-"];

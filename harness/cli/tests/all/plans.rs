@@ -374,7 +374,7 @@ fn hubslosh_torque_writes_the_slope_of_each_row() {
 }
 
 #[test]
-fn an_fmu_that_is_not_the_bench_is_driven_and_stored_without_analysis() {
+fn a_campaign_with_another_fmu_than_the_bench_stores_runs_without_analysis() {
     // the description of the bench, with another name for one of the outputs that its analysis needs
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();

@@ -139,7 +139,7 @@ fn is_marked_yes(page: &str, quantity: &str, column: usize) -> bool {
 }
 
 #[test]
-fn the_page_is_well_formed_and_has_every_figure() {
+fn the_report_is_well_formed_html_and_has_every_figure() {
     let (page, ..) = &*TEN;
     well_formed(page);
     // The result comes first, warnings come later.
@@ -198,7 +198,7 @@ fn text_of(page: &str) -> String {
 }
 
 #[test]
-fn numbers_of_the_thesis_are_compared_with_the_runs() {
+fn the_report_compares_numbers_of_the_thesis_with_the_runs() {
     let (page, swept, _) = &*TEN;
     let (linear, spherical) = (0, 1);
     // 2.21 rad/s² were measured; the model has more than twice as much
@@ -325,7 +325,7 @@ fn the_report_names_runs_that_leave_the_range_of_the_model() {
 }
 
 #[test]
-fn the_report_names_the_axis_of_a_varied_parameter_of_the_torque_profile() {
+fn figure_axes_have_plain_words_for_varied_profile_parameters() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     campaign(
@@ -408,7 +408,7 @@ fn the_report_compares_two_campaigns_run_by_run() {
 }
 
 #[test]
-fn a_browser_hovers_zooms_and_switches_what_it_shows() {
+fn hovering_zooming_and_switching_figures_work_in_a_browser() {
     // `.ci/browser` installs what this test needs.
     let target = std::env::var_os("CARGO_TARGET_DIR").map(std::path::PathBuf::from);
     let target = target.unwrap_or_else(|| pack::root().join("target"));

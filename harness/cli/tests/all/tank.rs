@@ -92,7 +92,7 @@ fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
 }
 
 #[test]
-fn parameters_of_the_six_axis_fmus_have_their_names() {
+fn parameter_files_for_spacecraft_and_sloshtank_have_the_names_of_their_variables() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     std::fs::write(path("tank.toml"), "density = 1000\nshape = { sphere = { radius = 0.3 } }\n")

@@ -57,7 +57,7 @@ fn a_run_with_default_columns_becomes_a_page_with_the_run_s_parameters() {
 }
 
 #[test]
-fn runs_that_cannot_be_drawn_are_refused_without_a_page() {
+fn view_refuses_runs_that_cannot_be_drawn_and_writes_no_page() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let columns = ["--columns", "wave_height", "--out", "run.parquet"];
@@ -210,7 +210,7 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
 /// `hubslosh tank` writes HubSlosh's parameters so that the modes along a box's first side move in
 /// the tangential direction, the y axis of the tank.
 #[test]
-fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
+fn the_first_length_of_a_box_on_the_bench_is_drawn_along_the_tangent() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let text = "name = \"box\"\ndensity = 997.0\nbox = [0.3, 0.2]\n";

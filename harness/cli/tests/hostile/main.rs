@@ -364,12 +364,12 @@ fn ends_its_own_process(when: &str) {
 /// FMU binaries crash, exit, loop or fill the memory while they are loaded.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_says_so() {
+fn a_binary_that_does_harm_when_loaded_ends_only_its_own_process_and_every_command_reports_it() {
     ends_its_own_process("AT_LOAD");
 }
 
 #[test]
-fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says_so() {
+fn a_binary_that_does_harm_in_a_step_ends_only_its_own_process_and_every_command_reports_it() {
     ends_its_own_process("AT_STEP");
 }
 
@@ -436,7 +436,7 @@ fn a_call_that_never_returns_fails_the_run_at_the_call_limit() {
 }
 
 #[test]
-fn a_value_that_is_nan_and_a_run_without_values_are_failures() {
+fn a_run_with_nan_or_without_values_fails() {
     const NONE: u32 = 14;
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("a.fmu"), harmful(NONE, "AT_GET")).unwrap();
