@@ -472,7 +472,7 @@ mod tests {
     use crate::models::MODELS;
 
     #[test]
-    fn crates_of_std_are_found_by_name_and_version() {
+    fn crates_of_the_standard_library_are_found_in_a_binary_by_name_and_version() {
         let found = standard_crates(
             b"x/rust/deps/rustc-demangle-0.1.27/src/v0.rs\0/rust/deps\\gimli-0.32.3\\src",
         );

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn links_to_files_lead_to_the_repository_and_others_stay() {
+    fn wheel_metadata_links_files_to_the_repository_and_keeps_other_links() {
         let page = "See [a](b.md#c), [d](https://e.org), [f](#f).\n\n| [g](h/) |\n| --- |\n| x |\n\n\
                     [![i](j.svg)](k.html) `[l](m)`\n\n<img src=\"n.png\" width=\"9\">\n";
         let (blob, raw) =

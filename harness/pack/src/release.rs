@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_release_replaces_the_files_of_the_last_one_and_keeps_their_hashes() {
+    fn a_release_replaces_the_files_of_the_previous_release_and_keeps_their_hashes() {
         let folder = tempfile::tempdir().unwrap();
         let there = |name: &str| folder.path().join(name).exists();
         let old =

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn links_between_pages_become_links_within_the_page() {
+    fn links_between_documentation_pages_become_links_within_the_single_page() {
         let folder = folder(&[
             ("m/index.md", "# All\n\nSee [b](b.md#two-words).\n\n* [c](../c.md)\n* [b](b.md)\n"),
             ("m/b.md", "# B\n\n## Two `words`\n\n[up](#b) and [out](../README.md)\n"),
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn dead_links_and_missing_figures_are_named() {
+    fn rendering_the_documentation_names_dead_links_and_missing_figures() {
         let folder = folder(&[(
             "index.md",
             "# A\n\n[1](gone.md) [2](#nothing) ![3](none.svg) [4](index.md#a)\n",

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn equations_become_mathml_and_a_broken_one_is_reported() {
+    fn equations_become_mathml_and_a_broken_equation_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(
             folder.path().join("a.md"),

@@ -59,7 +59,7 @@ fn the_committed_sbom_equals_the_sbom_inside_the_released_fmu() {
 }
 
 #[test]
-fn release_folder_holds_one_version_and_the_hashes_of_all() {
+fn the_release_folder_has_the_files_of_one_version_and_the_hashes_of_all_versions() {
     let folder = pack::root().join("dist").join("release");
     let sums = std::fs::read_to_string(folder.join(release::MANIFEST)).unwrap();
     let mut versions = BTreeSet::new();
@@ -135,7 +135,7 @@ fn gather_release_files(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<Stri
 
 #[cfg(unix)]
 #[test]
-fn the_committed_release_files_have_the_hashes_of_the_manifest() {
+fn the_files_of_the_release_have_the_hashes_in_the_manifest() {
     let whole = tempfile::tempdir().unwrap();
     tree_with_a_release(whole.path());
     let found = gather_release_files(whole.path(), &["v1.2.3", "files"]).unwrap();
@@ -195,7 +195,7 @@ fn the_committed_release_has_a_check_report_without_errors() {
 }
 
 #[test]
-fn the_release_is_small_and_has_binaries_for_all_platforms() {
+fn the_released_fmus_are_small_and_have_binaries_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in committed_fmus() {
         let mut processors = 0;
         for Platform { folder, ending, .. } in &PLATFORMS {
