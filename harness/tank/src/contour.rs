@@ -710,7 +710,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lowest_and_the_highest_point_of_a_curve_are_between_its_samples() {
+    fn the_lowest_and_the_highest_point_of_a_curve_are_found_between_its_samples() {
         for (from, to) in [(-100.0, 63.0), (-123.4, 120.0), (-90.0, 90.0)] {
             let arc = Segment::arc([0.4, 0.2], 0.1, from, to);
             let (place, low) = extreme(&arc, 1.0);

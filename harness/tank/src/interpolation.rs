@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn curve_is_monotone_where_data_are_and_twice_differentiable() {
+    fn an_interpolated_curve_is_monotone_where_its_data_are_and_twice_differentiable() {
         let x = [0.0, 0.1, 0.2, 0.5, 0.6, 0.61, 0.9, 1.0, 1.3, 1.4, 1.5];
         let y = [0.0, 0.0, 0.01, 0.02, 1.0, 1.5, 1.51, 1.51, 1.51, 1.8, 3.0];
         for sign in [1.0, -1.0] {

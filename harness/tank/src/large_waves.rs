@@ -1012,7 +1012,7 @@ mod tests {
     /// The frequencies in tests/backbones.csv were computed by two other programs. One uses a
     /// variational method with other base functions, the other marches in time.
     #[test]
-    fn waves_in_cylinders_have_the_known_frequencies() {
+    fn large_waves_in_cylinders_have_the_frequencies_of_two_other_programs() {
         let known: Vec<[Option<f64>; 4]> = include_str!("../tests/backbones.csv")
             .lines()
             .skip(1)
@@ -1134,7 +1134,7 @@ mod tests {
 
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
-    fn the_table_of_spheres_holds_between_its_fills() {
+    fn the_coefficients_of_spheres_are_accurate_between_the_fills_of_their_table() {
         for fill in [0.25, 0.35, 0.85] {
             let [planar, circular] = waves(&sphere(), fill);
             let terms = sphere_waves::energy_terms(fill).unwrap();
@@ -1151,7 +1151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_side_ends_at_corners_and_goes_on_over_smooth_joints() {
+    fn the_smooth_side_of_a_wall_ends_at_corners_and_continues_over_smooth_joints() {
         let joined = Contour::new(vec![
             Segment::arc([0.0, 1.0], 1.0, -90.0, -20.0),
             Segment::arc([0.0, 1.0], 1.0, -20.0, 10.0),

@@ -358,7 +358,7 @@ mod tests {
     /// pi/2 has nu = 2/3. At a jump of the curvature the potential has a term rho^2 log rho, which
     /// is smooth if rho is proportional to v^3. A cusp gets the largest gamma.
     #[test]
-    fn corners_are_graded_by_their_angle() {
+    fn the_grading_of_panels_at_a_corner_follows_from_its_angle() {
         let at = |degrees: f64, many: bool| {
             let (sin, cos) = degrees.to_radians().sin_cos();
             grading_at([1.0, 0.0], [cos, sin], many)
@@ -387,7 +387,7 @@ mod tests {
     /// boundary; ds/dv is the derivative of the arc length; normals point outwards; the lengths of
     /// the panels add up to the length of the boundary.
     #[test]
-    fn panels_follow_one_another_along_the_whole_boundary() {
+    fn panels_cover_the_whole_boundary_without_gap_or_overlap() {
         let cap = 0.8 * 20f64.to_radians().cos();
         let gap = 2.0 * 0.5 * 20f64.to_radians().cos();
         for (wall, whole) in [
@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_between_points_near_a_corner_keep_their_digits() {
+    fn distances_between_points_near_a_corner_have_full_relative_accuracy() {
         let boundary = Boundary::new(&step());
         let panels = boundary.panels(3, false);
         let corner = |segment: usize, end: bool| {

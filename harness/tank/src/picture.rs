@@ -405,7 +405,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_reach_both_ends() {
+    fn axis_ticks_are_round_numbers_and_reach_both_ends_of_the_axis() {
         for unit in [1e-9, 1e-3, 1.0, 1e6] {
             for (range, count, first, step, number) in [
                 ([0.0, 3.0], 4, 0.0, 1.0, 4),

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_message_names_all_equal_points() {
+    fn the_error_about_equal_points_of_a_spline_names_all_of_them() {
         let p = [1.0, 0.5];
         let message = spline(&[p, p, [1.0, 1.0], p, p]).unwrap_err().to_string();
         assert!(message.contains("Points 1 and 2 are the same, (1, 0.5) m."), "{message}");

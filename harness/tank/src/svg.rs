@@ -187,7 +187,7 @@ mod tests {
     /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs: a quarter or three
     /// quarters of the ellipse, about one of two centres and in either direction.
     #[test]
-    fn the_four_arcs_between_two_points_have_their_turns_and_centres() {
+    fn the_four_svg_arcs_between_two_points_have_the_expected_turns_and_centres() {
         let (p, q) = ([2.0, 0.0], [0.0, 1.0]);
         for (large, up, center, turn) in [
             (false, true, [0.0, 0.0], 0.25 * TAU),
@@ -215,7 +215,7 @@ mod tests {
     /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it
     /// connects them.
     #[test]
-    fn an_arc_that_is_too_small_grows() {
+    fn an_svg_arc_that_is_too_small_is_enlarged() {
         let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);
         let Curve::Ellipse { center, a_r, a_z } = found.curve else { panic!() };
         assert_eq!((center, a_r, a_z), ([2.0, 0.0], 2.0, 1.0));
@@ -226,7 +226,7 @@ mod tests {
     /// previous curve is of another kind. (1, 0), (2, 1) ends with the slope (1, 1), so that the
     /// next control point is (3, 2).
     #[test]
-    fn short_svg_commands_equal_the_long_ones() {
+    fn short_commands_of_an_svg_path_equal_the_long_commands() {
         let read = |path: &str| segments(path, 0.5).unwrap();
         let start = "M 1 5 ";
         for (short, long) in [

@@ -321,7 +321,7 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
 /// Heights of a shape count from its lowest point, heights of a contour from the zero of its
 /// drawing.
 #[test]
-fn the_table_and_the_parameter_file_state_where_heights_are_zero() {
+fn table_and_parameter_file_state_from_where_heights_count() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
     let drawn = tank("density = 1.0\nprofile = [{ arc = [0, -0.5, 1, -90, 90] }]");
     for (tank, lowest, words) in [
@@ -597,7 +597,7 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
 /// Each dimension is set to its limit, which is refused, and to a value slightly above the limit,
 /// which is accepted.
 #[test]
-fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
+fn every_dimension_of_a_shape_has_a_limit_and_the_error_names_the_dimension() {
     let dome = |bottom: f64, top: f64| {
         format!(
             "domed_cylinder = {{ radius = 1.0, height = 0.5, bottom = {bottom:?}, top = {top:?} }}"
@@ -691,7 +691,7 @@ fn a_tank_drawn_far_above_its_zero_does_not_count_as_large() {
 }
 
 #[test]
-fn a_file_of_points_joins_at_most_201_by_lines() {
+fn a_contour_of_more_than_201_points_without_a_spline_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let read = |count: usize| {
         let angle = |i: usize| 3.0 * i as f64 / (count - 1) as f64;

@@ -82,7 +82,7 @@ fn the_methods_for_flat_bottoms_and_for_any_contour_agree_within_their_errors() 
 /// A scaled tank has the same coefficients, and a capsule that is filled only within its lower half
 /// sphere has the sphere's coefficients.
 #[test]
-fn large_wave_coefficients_depend_only_on_the_shape_of_the_liquid() {
+fn third_order_coefficients_depend_only_on_the_shape_of_the_liquid() {
     let sphere = coefficients_at("shape = { sphere = { radius = 1.0 } }", 0.5);
     let small = coefficients_at("shape = { sphere = { radius = 0.01 } }", 0.005);
     let capsule =
@@ -101,7 +101,7 @@ fn large_wave_coefficients_depend_only_on_the_shape_of_the_liquid() {
 /// Coefficients are left out for a ring with inclined walls, for a nearly full sphere, and at
 /// depths with secondary resonances.
 #[test]
-fn large_wave_coefficients_that_cannot_be_computed_are_left_out_with_a_reason() {
+fn coefficients_that_are_not_known_are_left_out_with_a_reason() {
     assert_unknown(
         "shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }",
         0.3,
@@ -173,7 +173,7 @@ fn limits_of_a_sphere_follow_from_its_forced_waves() {
 /// The FMU's test with forced waves reads its coefficients and limits from a file, and they must be
 /// those that `hubslosh tank` writes.
 #[test]
-fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
+fn the_forced_waves_test_uses_the_coefficients_and_limits_of_parameter_files() {
     let rows = include_str!("../../../../fmu/craft/tests/craft/forced_waves.csv").lines().skip(1);
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     let mut compared = Vec::new();
@@ -209,7 +209,7 @@ fn forced_waves_were_compared_with_the_coefficients_and_limits_of_the_file() {
 }
 
 #[test]
-fn files_for_the_fmus_have_the_angle_limits() {
+fn parameter_files_for_the_fmus_have_the_angle_limits() {
     let limit = |text: &str, fill: f64, target: Target, name: &str| {
         let tank = tank(&format!("density = 1000.0\n{text}"));
         let data = tank.solve(fill, 1).unwrap();
@@ -258,7 +258,7 @@ fn angle_limit(text: &str, share: f64, liquid: Liquid) -> (f64, bool) {
 /// Without coefficients the limit is the angle at which a pendulum differs from the liquid, and not
 /// the FMU's default of 45 degrees.
 #[test]
-fn files_have_an_angle_limit_for_every_shape_and_fill() {
+fn parameter_files_have_an_angle_limit_for_every_shape_and_fill() {
     let mut pendulums = 0;
     for text in [
         "shape = { sphere = { radius = 1.0 } }",
@@ -310,7 +310,7 @@ fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
 /// Coefficients of the wave's energy are known for h/R from 0.25 to 0.7. Files for HubSlosh and for
 /// draining tanks contain the third-order coefficients.
 #[test]
-fn files_have_the_energy_terms_where_they_are_known() {
+fn parameter_files_have_the_energy_terms_where_they_are_known() {
     let cylinder = tank("density = 1000.0\nshape = { cylinder = { radius = 0.1, height = 2.0 } }");
     let coefficients = |set: &ParameterSet| -> Vec<(String, f64)> {
         let number = |(name, value): &(String, Value)| match value {
@@ -511,7 +511,7 @@ const WATER: Liquid =
 /// Only mode 1 has coefficients (in a box: the first mode along each length). Files for HubSlosh
 /// contain none for a box.
 #[test]
-fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
+fn parameter_files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     let cylinder =
         tank("density = 1000.0\nshape = { cylinder = { radius = 0.0815, height = 0.2 } }");
     let data = cylinder.solve(0.1, 3).unwrap();
@@ -543,7 +543,7 @@ fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
 }
 
 #[test]
-fn parameter_files_without_large_wave_coefficients_state_the_reason() {
+fn parameter_files_without_coefficients_state_the_reason() {
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
     let low = Liquid { gravity: 0.01, sigma: Some(0.07), ..WATER };
     for (text, fill, liquid, why) in [
@@ -595,7 +595,7 @@ fn a_draining_tank_has_the_coefficients_of_every_fill() {
 /// In the sphere the third order has poles from 0.556 to 0.63 m, and the coefficients are not known
 /// above 0.85 m.
 #[test]
-fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
+fn a_fill_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let fills = [0.5, 0.56, 0.6, 0.7, 0.8, 0.88, 0.9];
     let table = sweep(&sphere, &fills, 1).unwrap();
@@ -643,14 +643,14 @@ fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
 }
 
 #[test]
-fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
+fn a_fill_table_of_a_cylinder_states_the_error_of_the_coefficients_between_its_points() {
     compare_placed_tables(&[("cylinder = { radius = 0.5, height = 1.5 }", 0.7, 1.4)]);
 }
 
 /// The modes of these shapes are computed by the boundary integral equation and not in closed form.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
-fn a_placed_table_of_a_cone_and_of_a_sphere_states_the_error_of_the_coefficients() {
+fn fill_tables_of_a_cone_and_of_a_sphere_state_the_error_of_the_coefficients() {
     compare_placed_tables(&[
         ("cone = { half_angle = 30, height = 1.0 }", 0.3, 0.9),
         ("sphere = { radius = 0.5 }", 0.1, 0.5),

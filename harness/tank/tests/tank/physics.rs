@@ -286,7 +286,7 @@ fn slosh_modes_scale_and_shift_with_the_contour_of_the_tank() {
 
 /// The angles between the segments are near the angle from which on two segments count as a corner.
 #[test]
-fn cutting_a_wall_into_more_segments_changes_nothing() {
+fn cutting_a_wall_into_more_segments_does_not_change_the_modes() {
     let one = solve("profile = [{ arc = [0, 1, 1, -90, 30] }]", 1.3, 5);
     let many = solve(
         "profile = [{ arc = [0, 1, 1, -90, -70] }, { arc = [0, 1, 1, -70, -3] }, { arc = [0, 1, 1, -3, 30] }]",
@@ -368,7 +368,7 @@ fn thin_liquids_and_small_details_are_solved_as_accurately_as_other_tanks() {
 /// A dome that bulges into the tank meets the cylinder in a cusp. The reference is a tank in which
 /// the last 1e-3 R of the cusp is filled up.
 #[test]
-fn a_cusp_at_the_edge_of_an_inverted_dome_hardly_changes_the_result() {
+fn a_cusp_at_the_edge_of_an_inverted_dome_hardly_changes_the_modes() {
     let cusp = solve(
         "shape = { domed_cylinder = { radius = 1.0, height = 1.0, bottom = -0.4, top = 0.0 } }",
         0.7,

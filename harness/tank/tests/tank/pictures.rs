@@ -83,7 +83,7 @@ fn a_sweep_with_equal_values_at_all_fills_can_be_drawn() {
 }
 
 #[test]
-fn the_example_tanks_can_be_drawn_and_tabulated() {
+fn every_example_tank_can_be_drawn_and_tabulated() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

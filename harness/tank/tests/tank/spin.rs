@@ -41,7 +41,7 @@ fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
 /// The surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 -
 /// f^(2/3)) in a sphere filled to the fraction f.
 #[test]
-fn weightless_liquid_in_a_spinning_tank_lies_at_the_wall() {
+fn weightless_spinning_liquid_lies_at_the_wall() {
     let (m, found) = spin_tank(Shape::Cylinder { radius: 1.0, height: 2.0 }, 0.3, 1.0, true);
     close(found.r_dry, 0.7_f64.sqrt(), 1e-12);
     close(found.i_axis / m, 0.5 * (1.0 + 0.7), 1e-12);
@@ -91,7 +91,7 @@ fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
 /// At every spin the mass equals the mass at rest. At a spin of almost 0, centre of mass and
 /// inertias also equal their values at rest.
 #[test]
-fn spin_keeps_the_mass_and_a_slow_spin_also_keeps_centre_and_inertia() {
+fn a_very_slow_spin_leaves_mass_centre_and_inertia_unchanged() {
     let shapes = [
         Shape::DomedCylinder { radius: 0.7, height: 1.0, bottom: -0.2, top: 0.3 },
         Shape::Annulus { inner_radius: 0.3, outer_radius: 1.0, height: 1.0 },
@@ -132,7 +132,7 @@ fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liqu
 /// The inertia about the axis is 5.09 kg·m² at rest and 6.38 kg·m² for the rotating liquid, whose
 /// surface touches the lid.
 #[test]
-fn liquid_that_spins_too_fast_for_a_pendulum_is_out_of_range() {
+fn a_fast_spin_is_out_of_the_range_of_the_model() {
     let tank = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
     let data = tank.solve(0.4, 1).unwrap();
     let found = spin(&tank, &data, 9.0, 5.0, None).unwrap();
@@ -156,7 +156,7 @@ fn liquid_that_spins_too_fast_for_a_pendulum_is_out_of_range() {
 /// The expected mass is an independent integral over the radius, 2 pi rho int r (z_surface -
 /// z_floor) dr.
 #[test]
-fn spin_bares_the_floor_of_an_annulus_at_its_inner_wall() {
+fn spin_dries_the_floor_of_an_annulus_at_its_inner_wall() {
     let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };
     let (m, found) = spin_tank(shape, 0.1, 3.0, false);
     // z = (r^2 - r_dry^2) Omega^2/(2 g) above the floor, from r_dry to the wall
@@ -169,7 +169,7 @@ fn spin_bares_the_floor_of_an_annulus_at_its_inner_wall() {
 /// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it
 /// would lie in two pools.
 #[test]
-fn spin_that_would_divide_the_liquid_into_two_pools_is_refused() {
+fn spin_is_refused_if_the_liquid_may_lie_in_two_pools() {
     let hourglass = "density = 1000\nprofile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 0.5] }, \
                      { line = [0.5, 0.5, 1.5, 0.5] }, { line = [1.5, 0.5, 1.5, 1.5] }]";
     let tank = Tank::parse(hourglass, ".".as_ref()).unwrap();
@@ -198,7 +198,7 @@ fn spin_is_refused_for_boxes_full_tanks_and_invalid_rates() {
 /// The spin decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright
 /// cylinder at h/R = 1 is 0.496.
 #[test]
-fn parameter_files_have_the_spin_decay_and_the_gyroscopic_coefficient() {
+fn parameter_sets_contain_the_spin_of_the_liquid() {
     let of = |shape: Shape, nu: Option<f64>, target: Target| {
         let tank = Tank::from_shape(shape, RHO).unwrap();
         let liquid = Liquid { gravity: 5.0, nu, sigma: None, contact_angle: 90.0, spin: Some(2.0) };

@@ -117,7 +117,7 @@ fn every_impossible_fill_of_a_sweep_is_reported() {
 /// Compares the FMUs' interpolation between the placed points with solutions at eight other fills.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
+fn a_fill_table_of_twelve_points_is_accurate_enough_for_tanks_of_many_shapes() {
     for shape in [
         "cylinder = { radius = 0.5, height = 1.5 }",
         "sphere = { radius = 0.5 }",
@@ -151,7 +151,7 @@ fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
 }
 
 #[test]
-fn a_placed_table_states_the_errors_between_its_points() {
+fn a_fill_table_states_the_errors_of_the_modes_between_its_points() {
     let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 0.5, height = 1.5 } }");
     let placed = fill_table::place(&tank, 0.03, 1.47, 1).unwrap();
     let rows = &placed.sweep.rows;
@@ -193,7 +193,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
 }
 
 #[test]
-fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
+fn a_fill_table_is_written_for_spacecraft_and_sloshtank() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let table = sweep(&tank, &[0.1, 0.4, 0.8], 3).unwrap();
     let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
@@ -249,7 +249,7 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
 /// In a cone of 45 degrees only the first mode has mass. In a sphere all modes have mass, and
 /// Spacecraft and SloshTank keep three of them.
 #[test]
-fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
+fn a_fill_table_has_the_modes_that_carry_liquid_at_every_fill() {
     let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
     for (shape, asked, kept) in [
         ("cone = { half_angle = 45.0, height = 1.5 }", 4, 1),
@@ -273,7 +273,7 @@ fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
 /// The parameter set states the errors as percentages, and the test has them as fractions. If an
 /// error is above 0.5 %, a warning says that the table has too few points.
 #[test]
-fn the_parameters_state_the_errors_between_a_table_s_points() {
+fn parameter_sets_state_the_errors_between_the_points_of_a_fill_table() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let table = sweep(&tank, &[0.1, 0.4, 0.8], 1).unwrap();
     let liquid =
