@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_above_a_budget_are_refused_with_the_allowed_size() {
+    fn sizes_above_a_limit_are_refused_with_the_allowed_size() {
         assert_eq!(steps(2700.0, 0.02).unwrap(), 135_000);
         assert_eq!(steps(1.0, 0.3).unwrap(), 4);
         assert!(reading(ROWS, 3, 0).is_ok() && reading(ROWS, 20, 1 << 30).is_ok());
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn parallel_jobs_together_stay_within_the_budget() {
+    fn parallel_jobs_together_stay_within_the_memory_limit() {
         assert_eq!(jobs(8, BYTES / 3).unwrap(), 3);
         assert_eq!(jobs(8, BYTES * 2).unwrap(), 1);
         assert_eq!(jobs(8, 0).unwrap(), 8);
