@@ -177,7 +177,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn white_noise_falls_with_the_root_of_the_averaging_time() {
+    fn the_allan_deviation_of_white_noise_falls_with_the_root_of_the_averaging_time() {
         let mut random = Random::new(1, 0);
         let samples: Vec<f64> = (0..100_000).map(|_| 3.0 * random.normal()).collect();
         for point in variances(0.02, &samples) {
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alternating_signal_appears_only_in_averages_of_odd_length() {
+    fn the_allan_deviation_of_an_alternating_signal_is_0_for_averages_of_even_length() {
         // +1, −1, ...: means of an odd number m of samples are ±1/m, of an even number 0
         let samples: Vec<f64> = (0..1000).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
         for point in variances(1.0, &samples) {

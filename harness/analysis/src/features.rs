@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn no_resonance_is_reported_if_the_band_contains_none() {
+    fn no_resonance_is_reported_if_the_band_contains_no_resonance() {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::find(&hub.frequency_response(&grid)), Features::default());

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_passes_the_tests_of_the_residual_and_noise_plus_a_part_of_the_torque_fails() {
+    fn white_noise_passes_the_tests_of_the_residual_and_noise_with_a_part_of_the_torque_fails() {
         let mut random = crate::random::Random::new(5, 0);
         let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();

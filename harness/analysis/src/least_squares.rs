@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_minimum_of_rosenbrocks_function_is_found() {
+    fn the_least_squares_search_finds_the_minimum_of_rosenbrocks_function() {
         let residuals = |x: &[f64]| vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let derivatives = |x: &[f64]| Some(differences(&residuals, x, &[1e-5, 1e-5]));
         let found = minimise(&residuals, &derivatives, &[-1.2, 1.0]);

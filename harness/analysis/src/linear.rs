@@ -191,7 +191,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn a_torque_jump_is_not_taken_for_a_slope() {
+    fn a_jump_of_the_torque_between_samples_is_not_simulated_as_a_slope() {
         // a free hub: 0.2 N·m for 1 s, 0 for 1 s, -0.2 N·m for 1 s; the jumps are between samples 0.1 s apart
         let hub = Linear { inertia: 0.4, arm: 0.2, ..Linear::default() };
         let torque: Vec<f64> = (0..40)
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exact_simulation_answers_a_sine_with_the_gain_of_the_response() {
+    fn the_simulated_response_to_a_sine_has_the_gain_of_the_frequency_response() {
         for stiffness in [0.0, 60.0] {
             let plant = Linear { friction: 2.0, stiffness, ..Linear::bench_10_cm(0.05) };
             let (step, f) = (0.002, 2.2);
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn both_estimators_find_the_antiresonance_and_the_sweep_shifts_the_resonance_upwards() {
+    fn both_estimators_find_the_antiresonance_and_an_upward_sweep_shifts_the_resonance_upwards() {
         let grid = logarithmic_grid(BAND, 2000);
         for (plant, f_dip, f_res) in [
             (Linear::bench_10_cm(0.0029757), 2.3431981, 2.4566022),

@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_of_one_seed_differ() {
+    fn random_streams_of_one_seed_differ() {
         let streams: Vec<Vec<f64>> = (0..4)
             .map(|stream| {
                 let mut random = Random::new(1, stream);

@@ -75,7 +75,7 @@ mod tests {
     use super::skewness_and_kurtosis;
 
     #[test]
-    fn skewness_and_kurtosis_of_a_sine_and_of_coin_tosses() {
+    fn skewness_and_kurtosis_of_a_sine_and_of_coin_tosses_are_exact() {
         let sine: Vec<f64> =
             (0..1000).map(|k| (std::f64::consts::TAU * k as f64 / 1000.0).sin()).collect();
         let (skewness, kurtosis) = skewness_and_kurtosis(&sine);

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn four_values_have_their_textbook_statistics() {
+    fn mean_variance_quantiles_and_correlation_of_four_values_are_exact() {
         let values = [1.0, -4.0, 2.0, 5.0];
         assert_eq!((mean(&values), variance(&values), peak(&values)), (1.0, 10.5, 5.0));
         assert_eq!((median(&values), quantile(&values, 0.2)), (Some(2.0), Some(-4.0)));

@@ -100,7 +100,7 @@ mod tests {
     const LAWS: [Law; 2] = [Law::Exponential, Law::Linear];
 
     #[test]
-    fn the_sweeps_have_the_cycles_of_the_thesis() {
+    fn sweeps_of_the_thesis_have_the_numbers_of_cycles_that_the_thesis_states() {
         // 5900.24 cycles (exponential) and 6412.5 cycles (linear) from 1.25 to 3.5 Hz in 2700 s, computed by
         // hand from the formulas
         for (law, cycles) in LAWS.into_iter().zip([5900.24, 6412.5]) {

@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn snr_is_the_ratio_of_the_powers() {
+    fn the_signal_to_noise_ratio_is_the_ratio_of_signal_power_to_noise_power() {
         let (u, v) = (noise(5, 900_000), noise(9, 900_000));
         let mixed: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + v / 10.0).collect();
         let spectra = Spectra::estimate(0.02, &u, &mixed, RESPONSE);
