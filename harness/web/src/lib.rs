@@ -32,7 +32,7 @@ mod tests {
     use sha2::{Digest, Sha256};
 
     #[test]
-    fn the_bundle_is_the_one_that_the_lock_file_makes() {
+    fn the_bundle_of_three_js_equals_the_bundle_of_the_lock_file() {
         let sum = |text: &str| base16ct::lower::encode_string(&Sha256::digest(text));
         let sums = format!("{}  LICENSE\n{}  three.min.js\n", sum(THREE_LICENSE), sum(THREE));
         assert_eq!(sums, include_str!("../three/SHA256SUMS"), "run harness/web/three/build");
@@ -57,7 +57,7 @@ mod tests {
     /// The bundle of three.js contains only the names in `used.js`. A missing name would cause an
     /// error only in the browser.
     #[test]
-    fn the_bundle_has_every_name_that_the_scene_uses() {
+    fn the_bundle_of_three_js_has_every_name_that_the_scene_uses() {
         let exported = include_str!("../three/used.js");
         for rest in SCENE.split("THREE.").skip(1) {
             let name: String = rest.chars().take_while(|c| c.is_alphanumeric()).collect();
