@@ -235,13 +235,16 @@ fn from_json(text: &str) -> Result<ParameterSet> {
     let mut warnings = Vec::new();
     if !found.decided_by_solver.is_empty() {
         warnings.push(
-            "the errors of the FMU's solver decided some of these parameters; see the verdict in the file"
+            "errors of the FMU's solver have influenced some of these parameters more than the recording; the \
+             verdict in the file names them"
                 .into(),
         );
     }
     if found.fits == Some(false) || found.converged == Some(false) {
         warnings.push(
-            "these parameters do not fit the recording that they are from; see its verdict".into(),
+            "with these parameters the FMU does not fit the recording from which they were estimated; the \
+             verdict in the file says why"
+                .into(),
         );
     }
     let mut parameters = Vec::new();
@@ -281,7 +284,7 @@ fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     }
     if !left_out.is_empty() {
         warnings.push(format!(
-            "{} belong to single recordings and are not set: --set NAME=VALUE sets the one of this run",
+            "{} belong to single recordings and are not set; --set NAME=VALUE sets the value for this run",
             left_out.join(", ")
         ));
     }

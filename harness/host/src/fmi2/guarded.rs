@@ -56,7 +56,7 @@ impl Guarded {
                 Some(format!("it writes up to {} bytes before its beginning", MARGIN - first))
             }
             (None, None) if self.input.as_ref().is_some_and(|input| *input != self.content()) => {
-                Some("it changes what it shall only read".into())
+                Some("it changes an array that it may only read".into())
             }
             (None, None) => None,
         }
@@ -288,6 +288,6 @@ mod tests {
         let mut array = Guarded::input(&[1.0, 2.0]);
         // SAFETY: the address is inside the array.
         unsafe { array.pointer::<f64>().write(3.0) };
-        assert_eq!(array.fault().as_deref(), Some("it changes what it shall only read"));
+        assert_eq!(array.fault().as_deref(), Some("it changes an array that it may only read"));
     }
 }
