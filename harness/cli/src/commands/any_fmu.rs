@@ -189,7 +189,7 @@ impl AnyFmuArgs {
         };
         let unread = |sensor: &&Sensor| !question.outputs.iter().any(|output| sensor.has(output));
         for sensor in self.sensors.iter().filter(unread) {
-            problems.push(format!("--sensor {}: it is not among the --outputs", sensor.name));
+            problems.push(format!("--sensor {}: this sensor is not among the recorded outputs (--outputs must list it)", sensor.name));
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
         Ok(question)

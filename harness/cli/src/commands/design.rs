@@ -308,7 +308,7 @@ impl<'f> Bench<'f> {
         let rows = (time.to_vec(), torque.to_vec());
         ensure!(
             time.len() > COLUMNS,
-            "the plan has {} rows at {STEP} s (allowed: more than {COLUMNS}); a longer duration has more",
+            "the plan has {} rows, {STEP} s apart (allowed: more than {COLUMNS} rows); a longer duration gives more rows",
             time.len()
         );
         design::cramer_rao(self.fmu, &self.setup.settings, rows, self.sensor_errors, self.noise)

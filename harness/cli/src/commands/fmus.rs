@@ -12,7 +12,10 @@ pub struct FmusArgs {}
 impl FmusArgs {
     pub fn run(self) -> Result<()> {
         let all = fmu::all();
-        ensure!(!all.is_empty(), "no FMU came with this command, and none is in dist");
+        ensure!(
+            !all.is_empty(),
+            "no FMU was found in dist or among the files installed with this command; `hubslosh pack` builds one in the project's source"
+        );
         for path in all {
             println!("{}", path.display());
         }

@@ -382,7 +382,7 @@ impl DecayArgs {
         let signal = signals[0];
         ensure!(
             signals.iter().all(|other| *other == signal),
-            "the recordings are of different signals: {}",
+            "the recordings have different signals: {} (allowed: one signal in all recordings of a fit)",
             signals.join(", ")
         );
         let task = Task { fmu: None, recordings: &recordings, validation: &[] };

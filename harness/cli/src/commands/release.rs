@@ -15,7 +15,7 @@ const DEFAULT_RELEASE: &str = "dist/release";
 /// which are removed from it.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
-    On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]
+    On Debian, harness/platforms/setup installs the tools that building for all platforms needs.")]
 pub struct ReleaseArgs {
     /// Releases only this FMU [default: all FMUs and the wheels].
     #[arg(long, value_name = "NAME", value_parser = pack::model)]

@@ -129,7 +129,7 @@ impl RunArgs {
                 })?;
                 let mut all = all.into_iter();
                 let Some((input, history)) = all.next() else {
-                    bail!("the file of inputs drives no input of the FMU")
+                    bail!("no column of {} has the name of an input of the FMU", path.display())
                 };
                 (Some(input), history, all.collect())
             }

@@ -23,7 +23,7 @@ use crate::terminal;
     --contact-angle 5 --parameters coast.toml\n  \
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --spin 3 --gravity 5\n  \
     hubslosh tank tank.toml --fill 1.2 --large-waves --model SloshTank --parameters tank-1.2.toml\n  \
-    hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
+    hubslosh run --parameters tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
     /// File that describes the tank: the density of the liquid, and the contour of a body of revolution or the sides of

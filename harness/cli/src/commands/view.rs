@@ -90,7 +90,10 @@ impl ViewArgs {
         let table = part(&whole, self.from, self.to)?;
         let drawings =
             self.tanks.iter().map(|text| drawing(text)).collect::<Result<BTreeMap<_, _>>>()?;
-        ensure!(drawings.len() == self.tanks.len(), "--tank names a tank twice");
+        ensure!(
+            drawings.len() == self.tanks.len(),
+            "--tank names a tank twice (allowed: one file for each tank)"
+        );
         let shown =
             self.run.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into());
         let page = view::page(&view::Run {

@@ -116,7 +116,7 @@ fn outputs_that_cannot_be_written_are_refused_before_the_search() {
         let flags = ["--parameters", "poor.json", "--profile", "zero", "--out", "out.csv"];
         let done = run(folder, &[&["run"][..], &flags].concat());
         let said = String::from_utf8_lossy(&done.stderr);
-        assert!(done.status.success() && said.contains("do not fit the recording"), "{said}");
+        assert!(done.status.success() && said.contains("does not fit the recording"), "{said}");
     }
 }
 

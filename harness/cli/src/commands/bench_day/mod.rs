@@ -141,7 +141,7 @@ impl Day {
         );
         ensure!(
             items.iter().any(|item| item.kind == Kind::Sweep),
-            "{name}: no [[recording]] has kind = \"sweep\"; friction runs alone: hubslosh identify friction"
+            "{name}: no [[recording]] has kind = \"sweep\"; without sweeps, fit the friction runs by hubslosh identify friction"
         );
         let mut settings = Vec::new();
         flatten("", &manifest.set, &mut settings);
