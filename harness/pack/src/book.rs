@@ -47,7 +47,7 @@ pub fn write(out: &Path) -> Result<()> {
         .stdout(Stdio::null())
         .status()
         .context("Sphinx cannot be run")?;
-    ensure!(done.success(), "Sphinx refused the book: its reasons are above");
+    ensure!(done.success(), "the book was not built, because Sphinx printed errors or warnings");
 
     for (name, bytes) in below(&site)? {
         let file = out.join(name);

@@ -290,7 +290,7 @@ impl Toolchain {
             .collect();
         bail!(
             "not all platforms can be built here, so nothing was packed; missing:{}\n\
-             On a Debian machine harness/platforms/setup gets all of it.",
+             On Debian, harness/platforms/setup installs all of them.",
             lines.concat()
         )
     }

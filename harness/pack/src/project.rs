@@ -31,7 +31,7 @@ pub fn has_source() -> bool {
 pub fn needs_source(what: &str) -> Result<()> {
     ensure!(
         has_source(),
-        "{what} is made from the project's source, which is not in the folder {}",
+        "{what} is made from the project's source, which is not in the folder {}; start the command in the folder of the source",
         root().display()
     );
     Ok(())

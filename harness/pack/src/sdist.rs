@@ -64,7 +64,11 @@ fn files() -> Result<Files> {
         }
     }
     let project = String::from_utf8(read(&root().join("harness/python/pyproject.toml"))?)?;
-    ensure!(project.contains(BACKEND[0]), "pyproject.toml does not say {}", BACKEND[0]);
+    ensure!(
+        project.contains(BACKEND[0]),
+        "pyproject.toml does not contain the line {}",
+        BACKEND[0]
+    );
     files.push(("pyproject.toml".into(), project.replace(BACKEND[0], BACKEND[1]).into_bytes()));
     files.push(("PKG-INFO".into(), metadata::text()?.into_bytes()));
     files.sort();
