@@ -393,7 +393,7 @@ impl Contour {
         let r_inner = if down.is_some() { start[0] } else { 0.0 };
         if end[0] - r_inner < 1e-6 * self.size {
             return Err(format!(
-                "At a fill of {fill} m the free surface is only {:.3e} m wide.",
+                "At a fill of {fill} m the free surface is only {:.3e} m wide, too narrow for modes; take another fill.",
                 end[0] - r_inner
             )
             .into());
@@ -732,7 +732,10 @@ mod tests {
             Contour::new(walls).unwrap().cut(1.0)
         };
         let refused = gap(1e-6).unwrap_err().to_string();
-        assert_eq!(refused, "At a fill of 1 m the free surface is only 1.000e-6 m wide.");
+        assert_eq!(
+            refused,
+            "At a fill of 1 m the free surface is only 1.000e-6 m wide, too narrow for modes; take another fill."
+        );
         let wall = gap(2e-6).unwrap();
         assert!((wall.r_outer - wall.r_inner - 2e-6).abs() < 1e-15);
         let tip = |radius: f64| {

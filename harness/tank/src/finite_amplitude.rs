@@ -280,7 +280,7 @@ enum NoEnergy {
     )]
     NoWaves,
     #[error(
-        "the shift of omega^2 of small waves, over the square of the slosh angle, differs by {0:.2} from that of the third order \
+        "the shift of omega^2 per squared slosh angle of small waves differs by {0:.2} from the shift by third-order theory \
          (allowed: {LARGEST_SHIFT_ERROR}): deep liquid and strong resonances need more functions"
     )]
     OtherThirdOrder(f64),
@@ -523,7 +523,7 @@ fn box_coefficients(
         if known.is_ok() {
             warnings.push(format!(
                 "finite amplitude: in a square box omega^2 shifts by {:.4} A^2 in planar motion along a side, and by {:.4} A^2 along a \
-                 diagonal. s and kappa are those of a side and of circular motion",
+                 diagonal. s and kappa belong to motion along a side and to circular motion",
                 shifts[0], shifts[1]
             ));
         }

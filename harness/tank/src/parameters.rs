@@ -1,7 +1,7 @@
 //! A tank's modal parameters under the names of the FMUs' variables, and files with these parameters.
 //!
 //! A set file is TOML with lines `"name" = value`, with the names in quotes. The SSV form is the parameter set of SSP
-//! 1.0. `hubslosh run --set-file` and the Python package read both; other SSP tools read the SSV form.
+//! 1.0. `hubslosh run --parameters` and the Python package read both; other SSP tools read the SSV form.
 
 use names::hubslosh::{self, DampingLaw, SloshSource, slosh};
 use names::{sloshtank, spacecraft};
@@ -169,7 +169,7 @@ fn with_capillarity(
         }
         _ => set.warnings.push(format!(
             "capillarity: the meniscus at a contact angle of {angle} degrees is known only for an upright \
-             cylinder (shape = {{ cylinder = … }}); k is that of a flat surface, 90 degrees"
+             cylinder (shape = {{ cylinder = … }}); k has the value for a flat surface, 90 degrees"
         )),
     }
     for (n, Capillary { outside, unknown, .. }) in (1..).zip(&all) {
@@ -378,7 +378,7 @@ impl ParameterSet {
             chosen.iter().map(|&(axis, n)| of_axes[axis][n].clone()).collect();
         if let Some(spin) = &data.spin {
             set.notes.push(format!(
-                "masses, lengths and heights are those of the liquid at rest; turning with the tank at {} rad/s its centre of mass is at \
+                "masses, lengths and heights hold for liquid at rest; when the liquid turns with the tank at {} rad/s, its centre of mass is at \
                  z = {:.6} m and its inertia about the axis {} kg·m²",
                 significant(spin.omega),
                 spin.z_cg,
