@@ -643,7 +643,8 @@ impl Calls {
         calls
     }
 
-    /// Begins a call of a binary that ends when the returned value is dropped.
+    /// Marks the beginning of a call of a loaded binary, so that the parent can detect a call that
+    /// does not return. The call ends when the returned value is dropped.
     pub(crate) fn one() -> Calls {
         let calls = Calls::new();
         calls.begin();

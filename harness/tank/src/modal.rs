@@ -247,10 +247,11 @@ pub struct ModalData {
     pub rest: Vec<Rest>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
-    /// Estimated error of all values except `beta` and the fixed mass's inertia. For lambda and l
-    /// it is relative to their values. For other values it is relative to a reference: m_liq for
-    /// masses; m_liq R for moments m H; m_liq R^2 for inertias; R for waves and z_cg, where R is
-    /// the outer radius of the free surface.
+    /// Estimated error of all values except `beta` and the inertia of the fixed mass. For lambda
+    /// and the length of the pendulum it is relative to their values. For other values it is
+    /// relative to a reference with the mass of the liquid m_liq and the outer radius R of the free
+    /// surface: m_liq for masses, m_liq R for moments of mass, m_liq R^2 for inertias, and R for
+    /// waves and the centre of mass.
     pub error: f64,
     /// Estimated error of the fixed mass's inertia I_0, relative to m_liq R^2. It can be larger
     /// than `error`: for example, the fixed mass of a shallow dish is far above the dish, and this

@@ -354,9 +354,10 @@ mod tests {
         vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
     }
 
-    /// A corner where the liquid has an angle of pi/2 has nu = 2, and a re-entrant corner with 3
-    /// pi/2 has nu = 2/3. At a jump of the curvature the potential has a term rho^2 log rho, which
-    /// is smooth if rho is proportional to v^3. A cusp gets the largest gamma.
+    /// nu is the exponent of the potential near a corner, and gamma the exponent that concentrates
+    /// points there. An angle of pi/2 in the liquid has nu = 2, a re-entrant corner with 3 pi/2 has
+    /// nu = 2/3. A cusp gets the largest gamma. At a jump of the curvature gamma is 3, because the
+    /// term rho^2 log rho of the potential is then smooth.
     #[test]
     fn the_grading_of_panels_at_a_corner_follows_from_its_angle() {
         let at = |degrees: f64, many: bool| {

@@ -222,9 +222,8 @@ mod tests {
         assert!((found.to - found.from - PI).abs() < 1e-15);
     }
 
-    /// A smooth curve begins with the mirrored last control point, or with its own start if the
-    /// previous curve is of another kind. (1, 0), (2, 1) ends with the slope (1, 1), so that the
-    /// next control point is (3, 2).
+    /// The short form of a curve begins with the mirrored last control point, or with its own start
+    /// if the previous curve is of another kind.
     #[test]
     fn short_commands_of_an_svg_path_equal_the_long_commands() {
         let read = |path: &str| segments(path, 0.5).unwrap();
