@@ -79,13 +79,15 @@ pub fn place(name: &str) -> String {
     name.trim_end_matches('/').split('/').map(part).collect::<Vec<_>>().join("/")
 }
 
+/// An archive whose list of files has been read.
+///
+/// - `entries`: files and folders in the order of the zip directory. If a name occurs twice, both
+///   entries are listed. If the directory has a fault, the list ends before the fault.
+/// - `fault`: error in the zip directory, or the limit that the archive exceeds. If there is a
+///   fault, no file of the archive should be unpacked.
 pub struct Archive {
     file: File,
-    /// Files and folders in the order of the zip directory. If a name occurs twice, both entries
-    /// are listed. If the directory has a fault, the list ends before the fault.
     pub entries: Vec<Entry>,
-    /// Error in the zip directory, or the limit that the archive exceeds. If there is a fault, no
-    /// file of the archive should be unpacked.
     pub fault: Option<String>,
 }
 

@@ -87,6 +87,11 @@ impl fmt::Display for Kind {
     }
 }
 
+/// Properties of a binary that decide if a host can load it.
+///
+/// - `needs`: newest version of glibc (Linux) or macOS that the binary needs.
+/// - `signature`: fault in the code signature, as part of a sentence. Without a valid signature
+///   macOS kills a process that loads code for arm64.
 #[derive(Clone, Debug)]
 pub struct Binary {
     pub kind: Kind,
@@ -94,11 +99,8 @@ pub struct Binary {
     pub architectures: Vec<&'static str>,
     pub libraries: Vec<String>,
     pub search_paths: Vec<String>,
-    /// Newest version of glibc (Linux) or macOS that the binary needs.
     pub needs: Option<Version>,
     pub exports: Vec<String>,
-    /// Fault in the code signature, as part of a sentence. Without a valid signature macOS kills a
-    /// process that loads code for arm64.
     pub signature: Option<String>,
 }
 
@@ -143,8 +145,6 @@ impl Binary {
         })
     }
 
-    /// Lists the reasons why the binary could not be loaded on machines with the processors
-    /// `architectures`, for example `x86_64` or `arm64`, that have no development tools.
     pub fn loading_faults_for(&self, architectures: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
         let (libraries, newest): (&[&str], _) = match self.kind {
@@ -202,7 +202,6 @@ impl Binary {
     }
 }
 
-/// Writes for example `1104600 bytes, x86_64, glibc 2.14, 44 functions, needs libc.so.6, …`.
 impl fmt::Display for Binary {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} bytes, {}", self.size, self.architectures.join(" + "))?;

@@ -19,15 +19,17 @@ use crate::symbol::readable;
 
 pub mod version;
 
+/// Status that a call of the FMU returned.
+///
+/// - `Discard`: the FMU has refused the step, because it cannot compute it.
+/// - `Pending`: the step continues in the background, which only FMI 2.0 allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     Ok,
     Warning,
-    /// The FMU has refused the step, because it cannot compute it.
     Discard,
     Error,
     Fatal,
-    /// The step continues in the background, which only FMI 2.0 allows.
     Pending,
 }
 

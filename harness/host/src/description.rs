@@ -14,6 +14,12 @@ use crate::archive::Archive;
 use crate::causality::{Causality, Variability};
 use crate::xml::Element;
 
+/// Content of modelDescription.xml.
+///
+/// - `variables`: the variables in the order of the file. An array of FMI 3.0 is listed as one
+///   variable for each element, in row-major order.
+/// - `derivatives`: pairs of value references: the derivative of a continuous state, and the state.
+/// - `sizes`: numbers of continuous states and event indicators that an FMU 2.0 declares.
 #[derive(Clone, Debug)]
 pub struct ModelDescription {
     pub fmi_version: String,
@@ -27,12 +33,8 @@ pub struct ModelDescription {
     pub units: Vec<Unit>,
     pub types: Vec<SimpleType>,
     pub default_experiment: DefaultExperiment,
-    /// The variables in the order of the file. An array of FMI 3.0 is listed as one variable for
-    /// each element, in row-major order.
     pub variables: Vec<Variable>,
-    /// Pairs of value references: the derivative of a continuous state, and the state.
     pub derivatives: Vec<(u32, u32)>,
-    /// Numbers of continuous states and event indicators that an FMU 2.0 declares.
     pub(crate) sizes: (usize, usize),
     arrays: BTreeMap<u32, Array>,
     elements: BTreeMap<u32, ArrayElement>,
@@ -90,7 +92,6 @@ pub struct BaseUnit {
 }
 
 impl BaseUnit {
-    /// Base units of FMI and SSP, which are the base units of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
     /// Reads the child `BaseUnit` of the XML element `unit`. Returns `None` if the child is missing
@@ -132,18 +133,22 @@ pub struct Item {
     pub value: i64,
 }
 
+/// A variable of an FMU, or one element of an array variable.
+///
+/// - `reference`: value reference, the number by which an FMU identifies a variable. An element of
+///   an array has no value reference in FMI, so that the host assigns a number that no other
+///   variable has.
+/// - `variability`: variability; [`Variability::Other`] with an empty text if the attribute is
+///   missing.
+/// - `intermediate`: true if a host may set the variable (an input) or read it (an output) within a
+///   step; FMI 3.0 only.
 #[derive(Clone, Debug)]
 pub struct Variable {
     pub name: String,
-    /// Value reference, the number by which an FMU identifies a variable. An element of an array
-    /// has no value reference in FMI, so that the host assigns a number that no other variable has.
     pub reference: u32,
     pub causality: Causality,
-    /// Variability; [`Variability::Other`] with an empty text if the attribute is missing.
     pub variability: Variability,
     pub description: String,
-    /// True if a host may set the variable (an input) or read it (an output) within a step; FMI 3.0
-    /// only.
     pub intermediate: bool,
     c_type: CType,
     kind: Type,
@@ -298,7 +303,6 @@ impl Variable {
         self.c_type
     }
 
-    /// Returns true for a structural parameter of FMI 3.0, which can be set only in configuration mode.
     pub fn is_structural(&self) -> bool {
         self.causality == Causality::StructuralParameter
     }
@@ -654,11 +658,6 @@ impl ModelDescription {
         Ok((text, description))
     }
 
-    /// Checks that this program can run the FMU's version of FMI, which must be 2.0 or 3.x.
-    ///
-    /// # Errors
-    ///
-    /// If it is another version, for example 1.0.
     pub fn check_version(&self) -> Result<()> {
         let version = quote_short(&self.fmi_version).replace('"', "");
         ensure!(
@@ -699,12 +698,6 @@ impl ModelDescription {
         }
     }
 
-    /// Parses the text of modelDescription.xml.
-    ///
-    /// # Errors
-    ///
-    /// If the text is not well-formed, is of another version of FMI, or lacks data that a host needs; the message
-    /// names the missing data.
     pub fn from_xml(text: &str) -> Result<Self> {
         ModelDescription::from_xml_with(text, &BTreeMap::new())
     }
@@ -780,11 +773,6 @@ impl ModelDescription {
         Ok(description)
     }
 
-    /// Finds a variable by name.
-    ///
-    /// # Errors
-    ///
-    /// If there is no variable with this name; the message suggests similar names.
     pub fn variable(&self, name: &str) -> Result<&Variable> {
         self.variables.iter().find(|v| v.name == name).with_context(|| {
             let names = self.variables.iter().map(|v| v.name.as_str());

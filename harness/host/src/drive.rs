@@ -29,10 +29,11 @@ const TOLERANCE: f64 = 1e-6;
 const JUMP: f64 = 1e-9;
 
 /// Values and slopes of the inputs until the next communication point, in the order of [`Inputs`].
+///
+/// - `slopes`: time derivatives until the next communication point, per s. They are ignored if the
+///   FMU cannot interpolate its inputs or if the inputs are held.
 pub struct Course<'a> {
     pub values: &'a mut [f64],
-    /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot interpolate its
-    /// inputs or if the inputs are held.
     pub slopes: &'a mut [f64],
 }
 

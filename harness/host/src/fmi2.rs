@@ -579,7 +579,6 @@ impl<'fmu> Instance<'fmu> {
         self.read(self.functions().get_boolean, references, values)
     }
 
-    /// Sets Booleans from C integers. FMI allows 0 and 1; tests may pass any number.
     pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Called {
         self.write(self.functions().set_boolean, references, values)
     }
@@ -712,7 +711,6 @@ impl<'fmu> Instance<'fmu> {
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, state.0.cast()) })
     }
 
-    /// Calls fmi2FreeFMUstate with NULL and with a pointer to NULL, both of which must succeed.
     pub fn free_state_null(&mut self) -> Called {
         // SAFETY: the same as in `get_real_null`.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, null_mut()) })?;

@@ -159,8 +159,6 @@ fn as_text(value: &Value) -> &str {
     if let Value::String(text) = value { text } else { "" }
 }
 
-/// Converts an integer of any C type to a [`Value`]. A number above the largest i64 becomes the
-/// largest i64.
 fn integer(n: impl TryInto<i64>) -> Value {
     Value::Integer(n.try_into().unwrap_or(i64::MAX))
 }
@@ -178,7 +176,6 @@ exchanged! {
     u64, get_uint64 set_uint64, integer, as_integer;
 }
 
-/// Evaluates an expression once for the Rust type that belongs to a numeric C type of FMI 3.0.
 macro_rules! numbers {
     ($c_type:expr, $type:ident => $do:expr, $($others:tt)*) => {
         match $c_type {
@@ -600,12 +597,13 @@ pub struct Instantiation<'a> {
 
 /// Results of fmi3DoStep in addition to its status: the bytes as the FMU wrote them, or
 /// [`UNWRITTEN`].
+///
+/// - `last_time`: lastSuccessfulTime, s; NaN if the FMU has not written it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     pub event: u8,
     pub terminate: u8,
     pub early_return: u8,
-    /// lastSuccessfulTime, s; NaN if the FMU has not written it.
     pub last_time: f64,
 }
 
@@ -624,12 +622,14 @@ pub struct EventInfo {
     pub next_event_time: f64,
 }
 
+/// Dependency of one variable of the FMU, or of one of its elements, on another.
+///
+/// - `element`: element of the dependent variable, from 1; 0 means all elements.
+/// - `independent_element`: element of the independent variable, from 1; 0 means all elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dependency {
-    /// Element of the dependent variable, from 1; 0 means all elements.
     pub element: usize,
     pub independent: u32,
-    /// Element of the independent variable, from 1; 0 means all elements.
     pub independent_element: usize,
     pub kind: i32,
 }
@@ -828,7 +828,6 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables as the description has them
 
-    /// Calls fmi3FreeFMUState with a pointer to NULL, which must succeed.
     pub fn free_state_null(&mut self) -> Called {
         self.free_state(FmuState(null_mut()))
     }

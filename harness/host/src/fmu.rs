@@ -119,7 +119,6 @@ impl Fmu {
     }
 }
 
-/// Declares methods of [`Instance`] that call the equally named method for FMI 2.0 or for FMI 3.0.
 macro_rules! passed_on {
     ($($(#[$doc:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
         impl Instance<'_> {$(

@@ -64,11 +64,8 @@ pub struct Limits {
 pub enum Cause {
     Done(u8),
     Ended(ExitStatus),
-    /// The process was killed because a call of the FMU did not return in time.
     EndlessCall,
-    /// The process was killed because it took longer than [`Limits::total`].
     TooLong,
-    /// The process was killed because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
     Flood,
     /// The process was killed because its temporary files or its shared memory exceeded [`Limits::memory`].
     Hoard,
@@ -444,8 +441,6 @@ impl<F: FnMut(&[u8])> Messages<F> {
     }
 }
 
-/// Beginning of the output that a process wrote to a pipe, with the number of further bytes that
-/// were not stored.
 #[derive(Default)]
 struct Printed {
     kept: Vec<u8>,

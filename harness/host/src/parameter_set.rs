@@ -65,8 +65,6 @@ impl ParameterSet {
 }
 
 impl Parameter {
-    /// Creates a parameter that does not come from a file, for example from an argument of the
-    /// command line.
     pub fn new(name: &str, value: Value, unit: Option<Unit>) -> Parameter {
         Parameter { name: name.into(), value, unit, line: 0 }
     }

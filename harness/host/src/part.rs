@@ -14,16 +14,18 @@ use crate::description::{ModelDescription, Value};
 
 pub const START_VALUES: &str = "resources/start_values.txt";
 
+/// Number of elements, for example of tanks, that a reduced description keeps of some arrays.
+///
+/// - `has_indicators`: true if each element of the arrays has its own event indicators.
+/// - `arrays`: the arrays whose size the parameter determines. Each is listed with the position of
+///   the index that counts up to the parameter, for example 0 for the tank and 1 for the mode of
+///   `tank[1].p[2,3]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit<'a> {
     pub parameter: &'a str,
     pub size: usize,
     pub most: usize,
-    /// True if each element of the arrays has its own event indicators.
     pub has_indicators: bool,
-    /// The arrays whose size the parameter determines. Each is listed with the position of the
-    /// index that counts up to the parameter, for example 0 for the tank and 1 for the mode of
-    /// `tank[1].p[2,3]`.
     pub arrays: &'a [(&'a str, usize)],
 }
 

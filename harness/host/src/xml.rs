@@ -5,12 +5,11 @@ use std::borrow::Cow;
 use roxmltree::{Document, Error, Node};
 
 pub const DEEPEST: usize = 256;
-/// Size of the largest XML file that is read, bytes. This limit and the next two allow a hundred
+/// Size of the largest XML file that is read, bytes. This and the following limits allow a hundred
 /// thousand variables, whose description has 27 MB and takes 0.6 GB of memory.
 pub const LONGEST: usize = 32 << 20;
 pub const MOST: usize = 400_000;
 pub const MOST_ATTRIBUTES: usize = 1_000_000;
-/// Largest number of attributes of one element. FMI uses up to 13.
 pub const MOST_OF_ONE: usize = 200;
 pub const LONGEST_NAME: usize = 1000;
 /// Longest value of an attribute, bytes. The longest values in FMI are lists of dependencies.
@@ -33,8 +32,6 @@ pub enum Fault {
     Doctype(String),
 }
 
-/// An XML element with its attributes and child elements. The text between elements is left out,
-/// because FMI does not use it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
     pub name: Cow<'static, str>,
@@ -149,14 +146,10 @@ impl Element {
         self.attributes.iter().find(|(name, _)| name == attribute).map(|(_, value)| &**value)
     }
 
-    /// Returns the value of the numeric attribute `attribute`, or `None` if it is missing or not a
-    /// number.
     pub fn number(&self, attribute: &str) -> Option<f64> {
         self.get(attribute).and_then(double)
     }
 
-    /// Returns `true` if the Boolean attribute `attribute` is true or 1, and `false` if it is
-    /// anything else or missing.
     pub fn flag(&self, attribute: &str) -> bool {
         matches!(self.get(attribute).map(str::trim), Some("true" | "1"))
     }

@@ -436,8 +436,6 @@ impl<V: Version> Fmu<V> {
         unsafe { copy_text((self.common.get_version.call)()) }
     }
 
-    /// Returns true if the Reals with these value references can be exchanged in one call, because
-    /// all are scalars of type Float64.
     fn is_plain(&self, references: &[u32]) -> bool {
         self.is_plain || references.iter().all(|r| self.plain.binary_search(r).is_ok())
     }

@@ -201,8 +201,6 @@ impl Process {
         (Process { end: Mutex::new(end), nonce }, std::array::from_fn(number))
     }
 
-    /// Sends a message with its kind and content to the parent process. If the parent has ended,
-    /// the message is lost.
     pub fn send(&self, kind: u8, content: &[u8]) {
         let length = (content.len() as u32).to_le_bytes();
         let message = [&self.nonce, &[kind][..], &length, content].concat();
