@@ -8,8 +8,6 @@ macro_rules! println {
     ($($arguments:tt)*) => { crate::terminal::print(format!("{}\n", format_args!($($arguments)*))) };
 }
 
-/// Prints a text without a line break to stdout. If the reader of stdout has closed the pipe, the
-/// program ends without an error.
 macro_rules! print {
     ($($arguments:tt)*) => { crate::terminal::print(format!($($arguments)*)) };
 }
@@ -212,8 +210,6 @@ fn main() -> ExitCode {
     code.into()
 }
 
-/// Returns `true` if `cargo run` started this program, because only Cargo sets this environment
-/// variable.
 fn is_run_by_cargo() -> bool {
     std::env::var_os("CARGO_MANIFEST_DIR").is_some()
 }
@@ -291,8 +287,6 @@ fn run_command(cli: Cli) -> u8 {
     }
 }
 
-/// Runs the campaign of the thesis and writes its report. Without a subcommand this is the job of
-/// `cargo run --release`, which has packed the FMU before.
 fn run_default_job() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();

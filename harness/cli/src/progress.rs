@@ -37,8 +37,6 @@ pub fn show_line(bar: &ProgressBar, line: &str) {
     }
 }
 
-/// Returns a progress bar with the style `template`. It is hidden with `--quiet`, or if stderr is
-/// not a terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
     if terminal::has_reader() {

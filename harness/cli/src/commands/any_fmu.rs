@@ -146,8 +146,6 @@ impl Request<'_> {
 }
 
 impl AnyFmuArgs {
-    /// Returns `true` if `--free` names unknowns, so that any FMU is fitted instead of the model of
-    /// the bench.
     pub fn is_asked(&self) -> bool {
         !self.free.is_empty()
     }

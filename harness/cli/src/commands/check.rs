@@ -42,8 +42,6 @@ pub struct CheckArgs {
     rules: bool,
 }
 
-/// The error that no selected rule could be checked. Its exit code is 2, so that scripts can
-/// distinguish it from an FMU with errors.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Unchecked(String);

@@ -90,8 +90,6 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     }
 }
 
-/// Formats a predicted standard deviation for a table. If it is infinite or NaN, the inputs carry
-/// no information about the parameter, and the text is "unknown".
 pub(super) fn deviation(std: f64) -> String {
     if std.is_finite() { format!("{std:.2e}") } else { "unknown".into() }
 }

@@ -364,8 +364,6 @@ impl FrictionArgs {
 }
 
 impl DecayArgs {
-    /// Reads free decays, which must be recordings of the same signal, fits frequency and damping
-    /// to them, and prints and writes the result.
     fn run(&self) -> Result<()> {
         self.data.check()?;
         let source = self.data.source(trim(&self.trim)?)?;
@@ -391,8 +389,6 @@ impl DecayArgs {
 }
 
 impl KnownArgs {
-    /// Collects the known properties of the bench that the options state, under the names of the
-    /// FMU's parameters.
     fn options(&self) -> Result<Options> {
         let (tolerances, gyro_scale) = tolerances(&self.tolerances)?;
         let (known, starts): (Vec<_>, Vec<_>) =

@@ -194,7 +194,6 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
 /// surface is computed for four times as many masses of the liquid.
 const POINTS: usize = 24;
 
-/// Number of equal steps of the radius at which the surface of a mode is given to the page.
 const STEPS: usize = 80;
 
 fn drawing(text: &str) -> Result<(usize, Drawing)> {

@@ -22,16 +22,18 @@ use crate::terminal;
 
 const MANIFEST: &str = "day.toml";
 
+/// Kind of a recording that day.toml lists.
+///
+/// - `Friction`: A ramp, step or sweep of the torque with the tank empty (thesis 5.2).
+/// - `Decay`: A push and the free decay after it with the tank empty and an encoder (thesis 5.4).
+/// - `Rest`: A recording of the gyro while the hub stands still (thesis 5.5).
+/// - `Sweep`: A sine sweep with liquid (thesis 6 and 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
-    /// A ramp, step or sweep of the torque with the tank empty (thesis 5.2).
     Friction,
-    /// A push and the free decay after it with the tank empty and an encoder (thesis 5.4).
     Decay,
-    /// A recording of the gyro while the hub stands still (thesis 5.5).
     Rest,
-    /// A sine sweep with liquid (thesis 6 and 7).
     Sweep,
 }
 
