@@ -49,11 +49,6 @@ fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> 
     archive::write_small(&files(model, fmi, &binaries)?, out)
 }
 
-/// Returns the path of the packed FMU HubSlosh for tests; see [`packed_model_for_tests`].
-///
-/// # Panics
-///
-/// If it cannot be built.
 pub fn packed_for_tests() -> &'static Path {
     packed_model_for_tests(HUBSLOSH)
 }

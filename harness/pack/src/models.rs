@@ -28,11 +28,6 @@ pub const MODELS: [Model; 3] = [
 
 pub const HUBSLOSH: &Model = &MODELS[0];
 
-/// Finds an FMU of this project by its name, for example `Spacecraft`.
-///
-/// # Errors
-///
-/// If there is no FMU with this name; the message lists the names.
 pub fn model(name: &str) -> Result<&'static Model> {
     MODELS.iter().find(|model| model.name == name).with_context(|| {
         let names = MODELS.iter().map(|model| model.name);

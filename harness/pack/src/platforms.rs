@@ -17,13 +17,15 @@ use host::fmi2::Fmu;
 use crate::models::Model;
 use crate::project;
 
+/// A platform for which binaries of FMUs are built.
+///
+/// - `folder`: folder for this platform in `binaries/` of an FMU 2.0 (FMI 2.0.5, section 2.3).
+/// - `targets`: targets of Rust's compiler for this platform. If there are several, their binaries
+///   are joined into a universal binary.
 #[derive(Debug)]
 pub struct Platform {
-    /// Folder for this platform in `binaries/` of an FMU 2.0 (FMI 2.0.5, section 2.3).
     pub folder: &'static str,
     pub ending: &'static str,
-    /// Targets of Rust's compiler for this platform. If there are several, their binaries are
-    /// joined into a universal binary.
     pub targets: &'static [Target],
     tools: &'static [Tool],
     cargo: Cargo,
@@ -111,11 +113,6 @@ pub const PLATFORMS: [Platform; 4] = [
     },
 ];
 
-/// Finds a platform by its folder in `binaries/` of an FMU 2.0, for example `linux64`.
-///
-/// # Errors
-///
-/// If there is no such folder; the message lists the folders.
 pub fn platform(folder: &str) -> Result<&'static Platform> {
     PLATFORMS.iter().find(|platform| platform.folder == folder).with_context(|| {
         let all = PLATFORMS.each_ref().map(|platform| platform.folder);

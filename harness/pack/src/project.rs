@@ -100,8 +100,6 @@ pub(crate) fn program_arguments(command: &mut Command) -> Result<()> {
 
 pub(crate) const NATIVE: &str = "hubslosh-native";
 
-/// Adds the arguments of `cargo rustc` for the distributed library of the Python package. Arguments
-/// that follow go to the compiler.
 pub(crate) fn native_arguments(command: &mut Command) -> Result<()> {
     command.args(["--release", "--package", NATIVE, "--lib", "--crate-type", "cdylib"]);
     optimise_for_size(command)?;

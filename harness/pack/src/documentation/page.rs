@@ -55,8 +55,6 @@ impl Page {
         if slug.is_empty() { self.name.clone() } else { format!("{}--{slug}", self.name) }
     }
 
-    /// Returns the address by which a link leads to the heading `slug` of this page. If `slug` is
-    /// empty, it leads to the page itself.
     pub fn address(&self, slug: &str) -> String {
         format!("#{}", self.id(slug))
     }
