@@ -156,8 +156,6 @@ fn main() {
 
 const ZETA: f64 = 0.01;
 
-/// A tank at one fill, with two slosh masses that represent its liquid: one with third-order
-/// coefficients, and one with the coefficients that also give the energy of the wave.
 struct Filled {
     fill: f64,
     share: f64,

@@ -33,6 +33,15 @@ pub struct FiniteAmplitude {
 /// - `bridged`: true if the third-order theory has a pole near this fill, so that the coefficients
 ///   are interpolated over the fill across the pole.
 /// - `energy`: coefficients that also give the wave's energy, for a tank that keeps its liquid.
+/// - `angle_limit`: slosh angle up to which the equivalent mass represents the mode, rad. It is the
+///   smaller of two angles: the angle at which the error of the mass's frequency reaches 0.3 %, and
+///   the angle at which the error of a forced response reaches 3 %.
+/// - `swirl_limit`: slosh angle above which rotary motion is out of range, rad. There the error of
+///   a forced response reaches 3 %, or a secondary resonance folds the branch of rotary motion.
+///   `None` if `angle_limit` is smaller, or if rotary motion was not compared with potential flow.
+/// - `series_limit`: slosh angle at which the second-order wave is half of the first-order wave,
+///   rad, but at most 30 degrees. Above this angle the series is not valid; below it, the error of
+///   the series is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Coefficients {
     pub nonlinear_inertia: f64,
@@ -41,19 +50,10 @@ pub struct Coefficients {
     pub planar: f64,
     pub circular: Option<f64>,
     pub wave_second: f64,
-    /// Slosh angle up to which the equivalent mass represents the mode, rad. It is the smaller of
-    /// two angles: the angle at which the error of the mass's frequency reaches 0.3 %, and the
-    /// angle at which the error of a forced response reaches 3 %.
     pub angle_limit: f64,
     pub angle_limit_from: LimitSource,
     pub frequency_limit: Option<f64>,
-    /// Slosh angle above which rotary motion is out of range, rad. There the error of a forced
-    /// response reaches 3 %, or a secondary resonance folds the branch of rotary motion. `None` if
-    /// `angle_limit` is smaller, or if rotary motion was not compared with potential flow.
     pub swirl_limit: Option<f64>,
-    /// Slosh angle at which the second-order wave is half of the first-order wave, rad, but at most
-    /// 30 degrees. Above this angle the series is not valid; below it, the error of the series is
-    /// not known.
     pub series_limit: f64,
     pub bridged: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -88,8 +88,6 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// Returns the six coefficients s, kappa, s_2, kappa_2, t and t_2, each with the name of its
-    /// parameter in the FMUs.
     pub fn parameters(&self) -> [(&'static str, f64); 6] {
         [
             ("nonlinear_inertia", self.nonlinear_inertia),
@@ -122,17 +120,19 @@ impl EnergySource {
     }
 }
 
+/// Origin of the angle limit of a mode.
+///
+/// - `FreeWaves`: comparison of the equivalent mass's frequency with free waves of fully nonlinear
+///   potential flow in this tank.
+/// - `Estimate`: estimate, because no computed waves were available for a comparison. It is a
+///   fraction of the slosh angle at which the second-order wave is half of the first-order wave:
+///   the smallest fraction that was found in upright cylinders and spheres. The limit is never
+///   above the largest limit found in upright cylinders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
     PotentialFlow,
-    /// Comparison of the equivalent mass's frequency with free waves of fully nonlinear potential
-    /// flow in this tank.
     FreeWaves,
-    /// Estimate, because no computed waves were available for a comparison. It is a fraction of the
-    /// slosh angle at which the second-order wave is half of the first-order wave: the smallest
-    /// fraction that was found in upright cylinders and spheres. The limit is never above the
-    /// largest limit found in upright cylinders.
     Estimate,
 }
 

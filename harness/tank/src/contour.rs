@@ -201,8 +201,6 @@ impl Contour {
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
-    /// Returns the volume of the liquid, m³, if the free surface is at `fill`, m above the lowest
-    /// point. If the liquid forms several pools, the result is the sum of their volumes.
     fn volume_below(&self, fill: f64) -> f64 {
         let z = self.bottom + fill;
         let surface = |height: f64| if height < z { 0.0 } else { f64::INFINITY };
@@ -530,8 +528,6 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Returns the position between `first` and `second` at which the value of `holds` changes, by
-/// bisection.
 pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let here = holds(first);
     bisect_change([first, second], |at| holds(at) == here)[0]

@@ -187,8 +187,6 @@ impl Segment {
         }
     }
 
-    /// Returns the unit tangent in the direction of travel at the fraction `s` (0..1) of the
-    /// segment's parameter.
     pub fn tangent(&self, s: f64) -> Point {
         let sign = if self.to > self.from { 1.0 } else { -1.0 };
         let slope = self.curve.slope(self.from + s * (self.to - self.from));

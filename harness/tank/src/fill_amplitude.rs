@@ -44,8 +44,6 @@ impl<'a> AtFill<'a> {
 
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
-/// Columns of s and kappa of one mode in a fill table, with notes about their source, their errors
-/// and the fills at which they are not known.
 pub(crate) struct Columns {
     pub values: [Vec<f64>; 2],
     pub notes: Vec<String>,

@@ -29,7 +29,6 @@ const CANDIDATES: usize = 97;
 /// the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
-/// A fill table at fills that were chosen for small interpolation errors, with these errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     pub sweep: Sweep,
@@ -104,8 +103,6 @@ impl Curves {
     }
 }
 
-/// Returns the height of slosh mass number `n` at rest, m. A mode without mass has no height; for
-/// such a mode the height of the liquid's centre of mass is returned.
 fn bob_height(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }

@@ -53,8 +53,6 @@ const ESTIMATED_SHARE: f64 = 0.12;
 /// order counts as valid.
 const STEEPEST: f64 = 0.5;
 
-/// Largest relative error of the frequency that is accepted for a slosh mass that also gives the
-/// wave's energy.
 const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
 /// Largest accepted difference between two shifts of omega^2 per squared slosh angle: of the
 /// smallest computed waves, and by third-order theory. At 10 degrees this difference changes the
@@ -136,8 +134,6 @@ impl Coefficients {
         }
     }
 
-    /// Returns these coefficients with the limits of a sphere filled to h/R = `fill`, and with its
-    /// coefficients for large waves.
     fn sphere_coefficients(self, fill: f64) -> Coefficients {
         let tables = (sphere_waves::energy_terms(fill), sphere_waves::forced_limits(fill));
         let (Some(terms), Some([third, planar, rotary])) = tables else { return self };

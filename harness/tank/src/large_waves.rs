@@ -66,8 +66,6 @@ struct Resolution {
 /// Number of Gauss points between the surface at rest and the wave at each point of the surface.
 const DEPTHS: usize = 4;
 const STEPS: usize = 12;
-/// Largest change of the unknowns in a Newton step, relative to the amplitude, at which a wave
-/// counts as converged.
 const CONVERGED: f64 = 1e-9;
 /// Largest elevation of a wave that is computed, above or below the contact line, as a fraction of
 /// the distance from the contact line to the upper or lower end of the [`Side`].
@@ -109,8 +107,6 @@ impl Piece {
         Some(Piece { curve, t, z: t.map(|t| curve.point_at(t)[1]) })
     }
 
-    /// Returns the parameter of the curve at the height `z`, m, by Newton's method within bounds
-    /// that are bisected.
     fn parameter(&self, z: f64) -> f64 {
         let [mut low, mut high] = self.t;
         let mut t = low + (high - low) * (z - self.z[0]) / (self.z[1] - self.z[0]);
@@ -307,13 +303,10 @@ struct Solver<'a> {
     side: &'a Side,
     terms: Vec<Term>,
     resolution: Resolution,
-    /// Combinations of solid harmonics with orthonormal kinetic energies, for each azimuthal
-    /// number.
     combinations: Vec<DMatrix<f64>>,
     points: Points,
     elevation: DMatrix<f64>,
     rate: DMatrix<f64>,
-    /// Coefficients of the first mode's elevation.
     shape: DVector<f64>,
     potential: DVector<f64>,
     lambda: f64,
@@ -710,7 +703,6 @@ impl<'a> Solver<'a> {
 /// is needed because in each computation a few waves are wrong: a multiple of the wave's frequency
 /// happens to equal the frequency of a high mode of the truncated liquid.
 const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
-/// Largest azimuthal number in the expansion, which is also the largest multiple of the frequency.
 const ORDER: usize = 4;
 /// Slosh angles at which waves are computed, degrees.
 const ANGLES: [f64; 9] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
@@ -817,13 +809,9 @@ fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave
 pub(crate) struct Fit {
     pub terms: EnergyTerms,
     pub errors: [f64; 3],
-    /// Relative shifts of omega^2 per squared slosh angle in the limit of small waves, in planar
-    /// and in circular motion.
     pub shifts: [f64; 2],
 }
 
-/// Returns the intercept and the slope of the straight line that is fitted to the points (u, y)
-/// with the weights u^2.
 fn line(points: &[[f64; 2]]) -> [f64; 2] {
     let mut sums = [0.0; 5];
     for [u, y] in points {
@@ -866,8 +854,6 @@ fn restoring_stiffness(terms: &EnergyTerms, u: f64) -> f64 {
     1.0 / (1.0 - u).sqrt() + (terms.pair[1] - 1.0) * u / 2.0 + 0.375 * terms.next[1] * u * u
 }
 
-/// Returns the frequency of the slosh mass in circular motion with the amplitude `angle`, rad,
-/// divided by the frequency of small motion.
 fn circular_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let (u, [t, t_2]) = (angle.sin().powi(2), terms.rotary);
     (restoring_stiffness(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()

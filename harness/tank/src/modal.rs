@@ -271,49 +271,52 @@ pub struct ModalData {
     pub wall: Option<Wall>,
 }
 
+/// Steady rotation of the liquid of a tank about the tank's axis at a specific force along the
+/// axis.
+///
+/// - `omega`: rate at which tank and liquid rotate about the axis, rad/s.
+/// - `z_cg`: height of the centre of mass of the rotating liquid, m from the zero of the contour.
+/// - `i_axis`: inertia of the rotating liquid about the tank's axis, kg·m².
+/// - `i_cg`: inertia of the rotating liquid across the axis about its centre of mass, kg·m².
+/// - `z_apex`: height of the surface on the axis, m from the zero of the contour; `None` if the
+///   axis is dry.
+/// - `z_wall`: height up to which the outer wall is wet, m from the zero of the contour.
+/// - `r_dry`: radius inside which the floor is dry, m: the radius of the surface at the height of
+///   the lowest point. It is 0 if the floor is wet.
+/// - `flatness`: flatness of the tank under spin, Omega^2 R/g with the spin rate Omega and the
+///   outer radius R of the surface at rest; `None` without gravity.
+/// - `ratio`: spin ratio 2 Omega/omega_0 with the spin rate Omega and the frequency omega_0 of the
+///   first mode without spin; `None` without a mode.
+/// - `frequencies`: frequencies of the first mode of an upright cylinder in the rotating frame of
+///   the tank, Hz: of the wave that runs against the spin, and of the wave that runs with the spin.
+/// - `gyroscopic`: gyroscopic coefficient of the first mode of an upright cylinder, by which the
+///   spin couples its two directions.
+/// - `decay`: rate at which the laminar layer at the floor of an upright cylinder brings the liquid
+///   to the rate of its tank, 1/s; `None` if the viscosity is not given.
+/// - `in_range`: true if the parameters of the liquid at rest still describe the motion of the
+///   rotating liquid.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spin {
-    /// Rate at which tank and liquid rotate about the axis, rad/s.
     pub omega: f64,
     pub gravity: f64,
-    /// Height of the centre of mass of the rotating liquid, m from the zero of the contour.
     pub z_cg: f64,
-    /// Inertia of the rotating liquid about the tank's axis, kg·m².
     #[serde(rename = "I_axis")]
     pub i_axis: f64,
-    /// Inertia of the rotating liquid across the axis about its centre of mass, kg·m².
     #[serde(rename = "I_cg")]
     pub i_cg: f64,
-    /// Height of the surface on the axis, m from the zero of the contour; `None` if the axis is
-    /// dry.
     pub z_apex: Option<f64>,
-    /// Height up to which the outer wall is wet, m from the zero of the contour.
     pub z_wall: f64,
-    /// Radius inside which the floor is dry, m: the radius of the surface at the height of the
-    /// lowest point. It is 0 if the floor is wet.
     pub r_dry: f64,
-    /// Flatness of the tank under spin, Omega^2 R/g with the spin rate Omega and the outer radius R
-    /// of the surface at rest; `None` without gravity.
     #[serde(rename = "Omega2_R_g")]
     pub flatness: Option<f64>,
-    /// Spin ratio 2 Omega/omega_0 with the spin rate Omega and the frequency omega_0 of the first
-    /// mode without spin; `None` without a mode.
     #[serde(rename = "2Omega_omega")]
     pub ratio: Option<f64>,
-    /// Frequencies of the first mode of an upright cylinder in the rotating frame of the tank, Hz:
-    /// of the wave that runs against the spin, and of the wave that runs with the spin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequencies: Option<[f64; 2]>,
-    /// Gyroscopic coefficient of the first mode of an upright cylinder, by which the spin couples
-    /// its two directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyroscopic: Option<f64>,
-    /// Rate at which the laminar layer at the floor of an upright cylinder brings the liquid to the
-    /// rate of its tank, 1/s; `None` if the viscosity is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decay: Option<f64>,
-    /// True if the parameters of the liquid at rest still describe the motion of the rotating
-    /// liquid.
     pub in_range: bool,
     pub warnings: Vec<String>,
 }
@@ -444,10 +447,6 @@ impl ModalData {
         )
     }
 
-    /// Returns the fixed mass that remains when the first `modes` modes are modelled as pendulums.
-    ///
-    /// # Panics
-    /// If the data have fewer modes.
     pub fn rest(&self, modes: usize) -> Rest {
         rest(self.m_liq, self.z_cg, self.i_eff_cg, &self.modes[..modes])
     }

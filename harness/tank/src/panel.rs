@@ -56,8 +56,6 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    /// Creates the boundary of the liquid from the wetted wall, which runs from the axis or the
-    /// inner contact line to the outer contact line.
     pub(crate) fn new(wall: &[Segment]) -> Boundary {
         let mut segments = wall.to_vec();
         let (inner, outer) = (wall[0].start(), wall[wall.len() - 1].end());
@@ -168,8 +166,6 @@ impl Boundary {
         [s, norm(residual) / norm(slope)]
     }
 
-    /// Returns `true` if the corner lies on the axis, where the two ends of the boundary are
-    /// different points.
     fn is_on_axis(&self, corner: Corner) -> bool {
         corner == 0 && self.ends[0][0][0] == 0.0
     }

@@ -226,8 +226,6 @@ fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     chosen
 }
 
-/// Returns warnings about the surface tension of a tank's modes: a formula is used outside its
-/// range, or a surface tension that matters is not given.
 pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String> {
     match &data.capillarity {
         Some(found) => found.warnings.clone(),

@@ -9,7 +9,6 @@ use crate::sweep::Sweep;
 use crate::table::significant;
 use crate::tank::{Geometry, Tank};
 
-/// Colours of the modes, which colour-blind readers can tell apart (Okabe and Ito).
 pub const COLOURS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00"];
 const DRAWN: usize = 5;
 const LIQUID: &str = "#dcecf7";

@@ -66,8 +66,6 @@ const FAR: f64 = 2.3;
 /// Limit of [`bernstein`]'s sum for a whole panel. If a point x is outside the ellipse with this
 /// sum of semi-axes, the panel is integrated with its own points, without bisection.
 const FAR_WHOLE: f64 = 3.0;
-/// Number of iterations for the eigenvectors. For a few modes each iteration reduces the slowest
-/// component of the error to about a third.
 const ITERATIONS: usize = 30;
 /// Number of integration points on each side of a point on its own panel, where the kernel has a
 /// logarithm. [`OWN_POWER`] is the power with which the points are concentrated so that the

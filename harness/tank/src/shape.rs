@@ -262,8 +262,6 @@ impl Kind {
     }
 }
 
-/// Returns the dimensions of a shape except its height: radius or half angle, and the radius of a
-/// ring.
 fn dimensions(shape: &Shape) -> [f64; 2] {
     match *shape {
         Shape::Cylinder { radius, .. } | Shape::Sphere { radius } => [radius, 0.0],

@@ -164,7 +164,6 @@ impl Surface {
         }))
     }
 
-    /// Returns the square of the radius to which the liquid reaches inwards at the height `z`, m².
     fn inner(&self, z: f64) -> f64 {
         (2.0 * (self.gravity * z - self.c) / (self.omega * self.omega)).max(0.0)
     }

@@ -46,8 +46,6 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     Ok(segments)
 }
 
-/// Keeps both ends and every k-th of `points`, with k so that `total` points would give about 100
-/// segments, because computing time grows fast with the number of segments.
 fn thin_points(points: &[Point], total: usize) -> Vec<Point> {
     let every = total.div_ceil(MANY);
     let last = points.len() - 1;

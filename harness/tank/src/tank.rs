@@ -300,8 +300,6 @@ impl Tank {
         Ok(Tank { name: None, density, geometry })
     }
 
-    /// Returns the largest possible fill, m above the lowest point, or `None` for a box, which is
-    /// open at the top.
     pub fn depth(&self) -> Option<f64> {
         self.contour().map(Contour::depth)
     }
@@ -437,9 +435,6 @@ impl Tank {
         data
     }
 
-    /// Returns the modal data of the full closed tank, which has neither a free surface nor modes.
-    /// The result is `None` if `fill`, m above the lowest point, is not the full height, or if the
-    /// tank cannot be full.
     fn full_tank_data(&self, fill: f64) -> Option<ModalData> {
         let contour = self.contour()?;
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {

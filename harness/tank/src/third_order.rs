@@ -89,8 +89,6 @@ pub struct Overlaps {
 }
 
 impl Overlaps {
-    /// Computes the overlap integrals of a circular section of radius 1 with `count` modes of each
-    /// azimuthal number.
     pub fn new(count: usize) -> Overlaps {
         Overlaps::round(0.0, 1.0, count)
     }
@@ -290,8 +288,6 @@ fn inverse(m: Matrix2<f64>) -> Matrix2<f64> {
     Matrix2::new(d, -b, -c, a) / (a * d - b * c)
 }
 
-/// Returns the stationary value over all x of the quadratic function x.M x/2 + v.x with the matrix
-/// `m` and the vector `v`.
 fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     -0.5 * v.dot(&(inverse(m) * v))
 }
@@ -364,8 +360,6 @@ impl Radial {
         }
     }
 
-    /// Returns the radial part of mode `n`, counted from 0, at the points of the quadrature. It is
-    /// positive at the outer wall.
     fn mode(&self, n: usize) -> Vec<f64> {
         self.values.column(n).iter().copied().collect()
     }
@@ -401,8 +395,6 @@ pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64
     all
 }
 
-/// Returns `size` Legendre polynomials over the width of a ring, and their derivatives with respect
-/// to r, at the fraction `s` of the width `width`, m.
 fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
     let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
     legendre(s, &mut values);

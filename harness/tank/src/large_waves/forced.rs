@@ -37,7 +37,6 @@ pub struct Function {
     sine: [bool; 2],
 }
 
-/// Returns the cosine of x, or its sine if `sine` is true, and the derivative.
 fn wave(x: f64, sine: bool) -> [f64; 2] {
     let (sin, cos) = x.sin_cos();
     if sine { [sin, cos] } else { [cos, -sin] }
@@ -108,15 +107,16 @@ impl Function {
 }
 
 /// A steady forced wave. Each vector holds the values of one period at [`PHASES`] phases.
+///
+/// - `q`: displacement of the slosh mass along x and y, in units of its length; its magnitude is
+///   the sine of the slosh angle.
+/// - `push`: acceleration of the tank along x and y, in units of g: for each axis the coefficients
+///   of cos(tau) and sin(tau) with the phase tau.
+/// - `ratio`: frequency of the wave divided by the frequency of small free waves.
 #[derive(Clone, Debug)]
 pub struct ForcedWave {
-    /// Displacement of the slosh mass along x and y, in units of its length; its magnitude is the
-    /// sine of the slosh angle.
     pub q: [Vec<f64>; 2],
-    /// Acceleration of the tank along x and y, in units of g: for each axis the coefficients of
-    /// cos(tau) and sin(tau) with the phase tau.
     pub push: [[f64; 2]; 2],
-    /// Frequency of the wave divided by the frequency of small free waves.
     pub ratio: f64,
 }
 
@@ -166,18 +166,19 @@ fn second_derivative(values: &[f64], tau: f64) -> f64 {
 }
 
 /// Solver for steady waves in a tank that moves sideways.
+///
+/// - `drag`: damping matrix for the coefficients of the potential: the sum over all modes of 2 zeta
+///   omega_n u_n u_n^T.
+/// - `first`: indices of the terms of the first mode: cos(tau) and sin(tau) along x, and then along
+///   y.
 pub struct Forced<'a> {
     solver: Solver<'a>,
-    /// Damping matrix for the coefficients of the potential: the sum over all modes of 2 zeta
-    /// omega_n u_n u_n^T.
     drag: DMatrix<f64>,
     omega: f64,
     ratio: f64,
-    /// Indices of the terms of the first mode: cos(tau) and sin(tau) along x, and then along y.
     first: Vec<usize>,
 }
 
-/// Wetted wall of a tank, and the smooth part of the wall near the surface.
 pub struct Walls {
     wall: Wall,
     side: Side,
@@ -224,15 +225,11 @@ impl<'a> Forced<'a> {
         Some(Forced { solver, drag, omega, ratio, first })
     }
 
-    /// Returns the numbers of unknowns of the elevation, of the potential and of the tank's
-    /// acceleration. One more unknown is a pressure.
     fn sizes(&self) -> [usize; 3] {
         let [nz, nc] = self.solver.sizes();
         [nz, nc, self.first.len()]
     }
 
-    /// Returns a vector whose scalar product with the coefficients of the elevation is the `n`-th
-    /// coefficient of the first mode.
     fn part(&self, n: usize) -> DVector<f64> {
         let [nz, ..] = self.sizes();
         let count = self.solver.resolution.polynomials;
