@@ -31,7 +31,6 @@ pub const PRODUCTS: f64 = 4e9;
 /// Highest frequency that a torque may have, Hz. The lowest frequency is the inverse of this
 /// number, Hz.
 pub const FREQUENCY: f64 = 1e9;
-/// Longest name of a run, bytes. File systems allow names of 255 bytes including the ending.
 pub const NAME: usize = 200;
 
 /// Returns the number of steps of `step` seconds in `span` seconds. The last step may be shorter

@@ -35,7 +35,6 @@ const MOST_NAMED: usize = 20;
 
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Lists the first files that this process has opened with [`open`], for reports of bugs.
 pub fn read_so_far() -> Vec<String> {
     let all = READ.lock().unwrap_or_else(PoisonError::into_inner);
     all.iter().map(|path| path.display().to_string()).collect()
@@ -56,10 +55,6 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text in UTF-8 from the file at `path`, which may have at most [`budget::TEXT`] bytes.
-///
-/// # Errors
-/// If the file cannot be read or is too large, or if it is not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();

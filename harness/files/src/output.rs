@@ -10,12 +10,15 @@ use sha2::{Digest, Sha256};
 
 use crate::{input, temporary};
 
+/// Place to which an output is written.
+///
+/// - `File`: A regular file at this path, which may not exist yet. The output replaces the whole
+///   file.
+/// - `Stream`: A device, a named pipe or an open descriptor such as `/dev/stdout`. The output is
+///   written to it and replaces nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
-    /// A regular file at this path, which may not exist yet. The output replaces the whole file.
     File(PathBuf),
-    /// A device, a named pipe or an open descriptor such as `/dev/stdout`. The output is written to
-    /// it and replaces nothing.
     Stream,
 }
 
@@ -128,7 +131,6 @@ pub fn sha256(bytes: &[u8]) -> String {
     base16ct::lower::encode_string(&Sha256::digest(bytes))
 }
 
-/// Returns the SHA-256 of all bytes that can be read from `from`, which need not fit into memory.
 pub fn hash_reader(mut from: impl Read) -> Result<String> {
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {

@@ -85,8 +85,6 @@ impl Folder {
         Folder::make(&std::env::temp_dir(), PREFIX)
     }
 
-    /// Creates a temporary folder in `parent` with a name that begins with `prefix`. It also
-    /// removes folders with this prefix that killed programs have left.
     pub fn new_in(parent: &Path, prefix: &str) -> Result<Folder> {
         sweep(parent, prefix);
         Folder::make(parent, prefix)
