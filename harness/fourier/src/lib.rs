@@ -38,8 +38,6 @@ impl Forward {
     }
 }
 
-/// Inverse transform of a fixed length N. Its result is N times the signal that belongs to a
-/// spectrum.
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
 impl Inverse {
