@@ -28,8 +28,6 @@ use fourier::Complex64;
 
 pub const LEAST_PERIODS: f64 = 5.0;
 
-/// A record of a free decay: an oscillating signal in any unit, at increasing times, s, which need
-/// not be equally spaced.
 #[derive(Clone, Copy, Debug)]
 pub struct Record<'a> {
     pub time: &'a [f64],

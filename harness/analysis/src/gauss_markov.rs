@@ -87,8 +87,6 @@ impl Whitening {
         }
     }
 
-    /// Returns the sum of the logarithms of the innovations' variances. Together with the sum of
-    /// the squared innovations it is −2 ln L, with the likelihood L, up to a constant.
     pub fn log_variance(&self) -> f64 {
         self.log_variance
     }

@@ -164,8 +164,6 @@ impl Linear {
         Self::bench(1.3304311085, 0.7562932719, 2.3436181431, damping)
     }
 
-    /// Returns the model of the thesis's bench with 5 cm of water. `damping` is the damping ratio
-    /// of the slosh mode.
     pub fn bench_5_cm(damping: f64) -> Self {
         Self::bench(0.4165810206, 0.6267811696, 2.1335346636, damping)
     }

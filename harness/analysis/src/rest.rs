@@ -49,18 +49,20 @@ pub struct Rest {
     pub chunks: Vec<Chunk>,
 }
 
+/// Statistics of a part of the record of a gyro at rest.
+///
+/// - `kolmogorov`: Kolmogorov–Smirnov distance of the readings from the normal distribution with
+///   their mean and variance, multiplied by √n − 0.01 + 0.85/√n for n readings (Stephens).
+///   Quantisation with the step Δ raises the distance of normal readings to about Δ √n/(2σ√(2π)).
+/// - `between_levels`: Kolmogorov–Smirnov distance as in `kolmogorov`, but evaluated only midway
+///   between the levels of the readings, where quantisation has no effect. The variance of the
+///   readings is reduced by the variance of the quantisation error, Δ²/12 (Sheppard).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chunk {
     pub from: f64,
     pub mean: f64,
     pub variance: f64,
-    /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and
-    /// variance, multiplied by √n − 0.01 + 0.85/√n for n readings (Stephens). Quantisation with the
-    /// step Δ raises the distance of normal readings to about Δ √n/(2σ√(2π)).
     pub kolmogorov: f64,
-    /// Kolmogorov–Smirnov distance as in `kolmogorov`, but evaluated only midway between the levels
-    /// of the readings, where quantisation has no effect. The variance of the readings is reduced
-    /// by the variance of the quantisation error, Δ²/12 (Sheppard).
     pub between_levels: f64,
 }
 
@@ -141,8 +143,6 @@ impl Rest {
         [count(|chunk| chunk.kolmogorov), count(|chunk| chunk.between_levels)]
     }
 
-    /// Returns the limit within which the autocorrelation of white noise lies with a probability of
-    /// 95 %: 1.96/√n for n samples.
     pub fn white_bound(&self) -> f64 {
         1.96 / (self.count as f64).sqrt()
     }

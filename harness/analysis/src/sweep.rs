@@ -29,7 +29,6 @@ pub enum Law {
 }
 
 impl Sweep {
-    /// The sweep of Rubaga's thesis (chapter 5), with a torque amplitude of 0.1 N·m.
     pub const THESIS: Sweep =
         Sweep { amplitude: 0.1, f0: BAND.0, f1: BAND.1, duration: 2700.0, law: Law::Exponential };
 

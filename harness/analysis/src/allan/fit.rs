@@ -48,23 +48,21 @@ pub struct Octaves {
     variances: Vec<f64>,
 }
 
+/// An estimated value with its 95 % interval.
+///
+/// - `low`: lower end of the 95 % interval of the value. It is 0 if the record does not show this
+///   noise, and NaN if the interval could not be computed.
+/// - `high`: upper end of the 95 % interval of the value. It is infinite if the record is too
+///   short, and NaN if the interval could not be computed.
+/// - `error`: standard error of the value; NaN if the value is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
-    /// Lower end of the 95 % interval of the value. It is 0 if the record does not show this noise,
-    /// and NaN if the interval could not be computed.
     pub low: f64,
-    /// Upper end of the 95 % interval of the value. It is infinite if the record is too short, and
-    /// NaN if the interval could not be computed.
     pub high: f64,
-    /// Standard error of the value; NaN if the value is 0.
     pub error: f64,
 }
 
-/// The averaging time at which a fit deviates most from the record.
-///
-/// - `tau`: averaging time, s.
-/// - `ratio`: Allan deviation of the record divided by the Allan deviation of the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     pub tau: f64,
