@@ -194,7 +194,7 @@ impl Filled {
     }
 
     /// Computes steady waves of 2 to 14 degrees at the frequency of free waves of 9 degrees and at
-    /// frequencies 1 % from it, and prints them beside the motion of the slosh masses. The waves
+    /// frequencies 1 % from it, and prints them with the motion of the slosh masses. The waves
     /// move on a circle if `is_circle` is true, otherwise in a plane.
     fn steady(&self, is_circle: bool, resolution: [usize; 2]) {
         let space = if is_circle { Space::Circle } else { Space::Plane };

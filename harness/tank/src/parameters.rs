@@ -376,7 +376,7 @@ impl ParameterSet {
             chosen.iter().map(|&(axis, n)| of_axes[axis][n].clone()).collect();
         if let Some(spin) = &data.spin {
             set.notes.push(format!(
-                "masses, lengths and heights hold for liquid at rest; when the liquid turns with the tank at {} rad/s, its centre of mass is at \
+                "masses, lengths and heights hold for liquid at rest; when the liquid rotates with the tank at {} rad/s, its centre of mass is at \
                  z = {:.6} m and its inertia about the axis {} kg·m²",
                 significant(spin.omega),
                 spin.z_cg,
