@@ -48,8 +48,8 @@ pub struct RunArgs {
     /// they are in the command line.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Time between the rows of the result, s. It does not change the inputs: the FMU also steps to every row of
-    /// --input, and to every jump and torque value of a profile.
+    /// Time between the rows of the result, s. It does not change the inputs: the FMU also steps to every row
+    /// of --input, and to every jump and torque value of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
     /// Time between the torque values into which an oscillating profile (such as a sine or a sweep) is divided, s. The

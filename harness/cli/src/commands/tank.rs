@@ -67,8 +67,8 @@ pub struct TankArgs {
     /// Number of the tank, 1 to 4, in the parameters that --parameters writes for Spacecraft.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m²/s. With it the command computes damping ratios and their intervals at
-    /// --gravity, for the table, --out and --parameters (with --sweep at every fill) [default: no viscosity, all damping
+    /// Kinematic viscosity of the liquid, m²/s. With it the command computes damping ratios and their intervals
+    /// at --gravity, for the table, --out and --parameters (with --sweep at every fill) [default: no viscosity, all damping
     /// ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,

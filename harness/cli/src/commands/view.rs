@@ -40,8 +40,8 @@ pub struct ViewArgs {
     /// 2:fuel.toml.
     #[arg(long = "tank", value_name = "[N:]TANK.toml")]
     tanks: Vec<String>,
-    /// File with the parameters of the run. It is needed if the file of the run does not contain them. Parameters given by
-    /// --set replace those in this file.
+    /// File with the parameters of the run. It is needed if the file of the run does not contain them. Parameters
+    /// given by --set replace those in this file.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Sets a parameter of the run, if the file of the run does not contain it.
