@@ -236,8 +236,8 @@ fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Returns the value below which a standard normal variable lies with the probability `part`, 0 to
-/// 1. It is computed by Newton's method from the complementary error function.
+/// Returns the value below which a standard normal variable lies with the probability `part`, which
+/// is between 0 and 1. It is computed by Newton's method from the complementary error function.
 pub fn normal_quantile(part: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..60 {

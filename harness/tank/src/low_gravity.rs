@@ -107,9 +107,9 @@ fn flat_omega2(bond: f64) -> f64 {
 }
 
 /// Returns the change of the squared frequency omega_1^2 rho R^3/sigma by a curved meniscus. The
-/// table is interpolated in cos(angle) and ln(1 + Bo), so that the change at 90 degrees is exactly
-/// 0. Above Bo = 100 the change approaches its limit -2 xi^2 cos(angle) as 1/Bo, which follows from
-/// the shape derivative of the eigenvalue.
+/// table is interpolated in cos(angle) and ln(1 + Bo), so that the change is exactly 0 at 90
+/// degrees. Above Bo = 100 the change approaches its limit -2 xi^2 cos(angle) as 1/Bo, which follows
+/// from the shape derivative of the eigenvalue.
 fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     let cosine = |angle: f64| if angle == 90.0 { 0.0 } else { angle.to_radians().cos() };
     let cos = cosine(contact_angle);

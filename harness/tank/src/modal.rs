@@ -771,8 +771,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// With twice the last difference alone as the stated error, the true error would be 0.74 (seed
-    /// 7) and 0.99 (seed 114) of it, which leaves no margin.
+    /// If only twice the last difference were stated, the true error would be 0.74 of it for the seed
+    /// 7 and 0.99 for the seed 114, which leaves no margin.
     #[test]
     fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {
