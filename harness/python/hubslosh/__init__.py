@@ -41,7 +41,7 @@ __all__ = [*sorted(_MODULE_OF), "attitude", "plot"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name of the package when it is used for the first time."""
+    """Import a public name of the package when it is used for the first time."""
     if name == "__version__":
         value: Any = _version()
     elif name in _MODULE_OF:
@@ -56,7 +56,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return all names of the package, including names whose module is not imported yet."""
+    """Return all public names, including names whose module has not been imported yet."""
     return sorted({*globals(), *__all__, "__version__"})
 
 

@@ -270,7 +270,6 @@ class Appendage:
         ]
 
     def __repr__(self) -> str:
-        """Return a one-line description of the appendage."""
         return f"Appendage({self.describe()})"
 
     def describe(self) -> str:
@@ -294,7 +293,7 @@ class Appendage:
 
 
 def _unmasked(given: Any) -> Vector:
-    """Return an array of numbers, or an empty array if a value is masked or is not a number."""
+    """Return ``given`` as floats; empty if an entry is masked or is not a number."""
     try:
         return array(given)
     except FmuError:
@@ -302,7 +301,11 @@ def _unmasked(given: Any) -> Vector:
 
 
 def _matrices(source: Any, names: tuple[str, str]) -> tuple[Vector, Vector]:
-    """Return mass and stiffness matrix, both square and of the same size."""
+    """Return mass and stiffness matrix, after checking that they are square, finite, symmetric.
+
+    ``source`` is a pair of matrices, or the path of a NASTRAN Output-4 file, in which the matrices
+    have the ``names``.
+    """
     if isinstance(source, str | Path):
         try:
             from pyyeti.nastran import op4

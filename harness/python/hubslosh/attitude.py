@@ -22,7 +22,10 @@ Real = NDArray[np.float64]
 
 
 def _unit_quaternions(q: Any) -> Real:
-    """Return unit quaternions, one in each row, from an array or a table with q[1] to q[4]."""
+    """Return the quaternions in ``q`` as rows (n × 4), each divided by its norm.
+
+    ``q`` is an array (4) or (n × 4), or a table with the columns q[1] to q[4].
+    """
     if hasattr(q, "columns"):
         check_columns(q, NAMES, "the table")
         q = q[list(NAMES)].to_numpy(float)
@@ -36,7 +39,10 @@ def _unit_quaternions(q: Any) -> Real:
 
 
 def _as_given(q: Any, names: tuple[str, ...], values: Real) -> Any:
-    """Return ``values`` as a table with columns ``names`` if ``q`` is a table, else as an array."""
+    """Return ``values`` as a table with the columns ``names`` if ``q`` is a table.
+
+    Otherwise ``values`` is returned as it is, an array.
+    """
     if not hasattr(q, "columns"):
         return values
     import pandas as pd

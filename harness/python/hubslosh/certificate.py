@@ -99,7 +99,6 @@ class WorstCase:
         return 1 / self.size
 
     def __repr__(self) -> str:
-        """Return size and frequency, then the parameters."""
         if not np.isfinite(self.size):
             return "WorstCase: no unstable Δ was found, so the lower bound of µ is 0"
         values = [
@@ -167,7 +166,6 @@ class Certificate:
         return self.worst.size / self.size if self.size else np.inf
 
     def __repr__(self) -> str:
-        """Return the certified size, the worst case and the gap between them."""
         if not self.size:
             return f"Certificate: none was found with {self.solved} convex problems\n{self.worst!r}"
         found = (
@@ -221,7 +219,6 @@ class UnstableError(Exception):
     """Raised if the loop is unstable at a Δ for which stability should be proved."""
 
     def __init__(self, delta: Vector) -> None:
-        """Create the exception for ``delta``, the Δ at which the loop is unstable."""
         super().__init__()
         self.delta = delta
 
@@ -248,7 +245,6 @@ class Search:
         self, response: Callable[[Any], Complex], poles: Callable[[Vector], Complex],
         counts: Sequence[int], period: float, progress: Progress = None,
     ) -> None:  # fmt: skip
-        """Prepare the optimisation of the scalings D and G for ``counts`` repetitions of each δ."""
         self.closed, self.poles, self.period = response, poles, period
         self.scalings = Scalings(counts)
         self.nyquist = 0.5 / period

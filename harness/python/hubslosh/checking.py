@@ -40,7 +40,6 @@ class Finding:
     text: str
 
     def __repr__(self) -> str:
-        """Return the line that ``hubslosh check`` prints for the finding, shortened."""
         line = f"{self.severity} {self.rule}: {self.place}: {self.text}"
         return textwrap.shorten(line, 200, placeholder=" …")
 
@@ -81,7 +80,6 @@ class CheckedRule:
     seconds: float
 
     def __repr__(self) -> str:
-        """Return the requirement and the number of findings."""
         count = f"{len(self.findings)} findings" if self.skipped is None else "skipped"
         return f"{self.rule}: {self.title} [{self.source}]: {count}"
 
@@ -120,7 +118,6 @@ class Checked:
         return tuple(finding for rule in self.rules for finding in rule.findings)
 
     def __repr__(self) -> str:
-        """Return the first findings and a summary."""
         most = 12
         findings = self.findings
         lines = [repr(finding) for finding in findings[:most]]

@@ -50,9 +50,10 @@ def find_program(path: str | Path | None = None) -> Path:
 
 
 def _scripts(exe: str) -> Iterator[Path]:
-    """Yield paths at which pip may have installed the program.
+    """Yield the paths at which pip may have installed the program named ``exe``.
 
-    These are the scripts of the environment, those of the user, and those of ``pip --target``.
+    These are in the scripts of this environment, the scripts of the user, and the folder next to
+    this package, for ``pip install --target``.
     """
     yield Path(sysconfig.get_path("scripts")) / exe
     yield Path(sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user"))) / exe
@@ -116,7 +117,10 @@ def call(
 
 
 def _end(child: "subprocess.Popen[str]") -> None:
-    """End the program, which first ends the processes in which it runs FMUs."""
+    """End the program ``child``, which first ends the processes in which it runs FMUs.
+
+    The program is killed if it does not end in five seconds.
+    """
     child.terminate()
     try:
         child.wait(5)

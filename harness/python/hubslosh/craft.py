@@ -179,7 +179,6 @@ class MountedTank:
         return found
 
     def __repr__(self) -> str:
-        """Return a one-line description of the tank."""
         return f"MountedTank({self.describe()})"
 
     def describe(self) -> str:
@@ -237,7 +236,6 @@ class MassProperties:
     inertia: Vector
 
     def __str__(self) -> str:
-        """Return the mass properties in five lines."""
         rows = "\n".join(f"  {_row(row, 7)}" for row in self.inertia)
         return (
             f"mass {self.mass:.7g} kg, centre of mass {_row(self.center_of_mass, 6)} m\n"
@@ -326,7 +324,6 @@ class Craft:
     _said: list[str] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        """Raise one FmuError that lists all wrong fields."""
         problems = not_positive("mass", self.mass, "kg")
         if self.gravity is not None:
             problems += not_positive("gravity", self.gravity, "m/s²")
@@ -362,7 +359,10 @@ class Craft:
         return found
 
     def _spin_of(self, name: str) -> float:
-        """Return the spin of the craft about a tank's axis, rad/s; a rounding error counts as 0."""
+        """Return the craft's angular rate about the axis of the tank ``name``, rad/s, at least 0.
+
+        A rate below 1e-9 of the craft's angular rate is a rounding error and counts as 0.
+        """
         omega = self._omega
         rate = abs(float(self.tanks[name].rotation[:, 2] @ omega))
         return rate if rate > 1e-9 * np.linalg.norm(omega) else 0.0
@@ -401,7 +401,7 @@ class Craft:
 
     @property
     def _names(self) -> Names:
-        """Names of the tanks, and the appendage's name for each mode, in the FMU's order."""
+        """Names of the tanks and, for each appendage mode in the FMU's order, of its appendage."""
         modes = [name for name, of in self.appendages.items() for _ in range(of.count)]
         return Names.collect(self.tanks, modes)
 
@@ -420,7 +420,11 @@ class Craft:
         return J
 
     def _resultant(self) -> tuple[Vector, Vector, Vector]:
-        """Return the resultant force, a point on its line of action, and the remaining torque."""
+        """Return the resultant of thrust and engines: force (N), point (m) and torque (N·m).
+
+        The point is on the line of action of the force. The torque is the part about this line,
+        which no choice of the point can remove.
+        """
         return resultant(_along_z(self.thrust, "thrust"), self.engines)
 
     def _force(self) -> Vector:
@@ -475,7 +479,7 @@ class Craft:
         return dict(zip(names, values, strict=True))
 
     def _drawing(self, name: str) -> Any:
-        """Return the drawing of a tank; its file is read only once."""
+        """Return the shape of the tank ``name`` from its file, which is read only once."""
         key = ("drawing", name)
         if key not in self._known:
             try:
@@ -491,10 +495,11 @@ class Craft:
                         of.contact_angle, spin)  # fmt: skip
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
-        """Return a solved tank for each (name, fill, gravity), or None if the tank is empty.
+        """Return the slosh modes of each (name, fill, gravity), or None if the tank is empty.
 
-        Each tank is solved once. All tanks that were not solved before are solved in one call, on
-        all cores.
+        The name is the tank's, and gravity is the specific force, m/s². Each combination is
+        computed only once for this craft. All new combinations are computed in one call, on all
+        cores.
         """
         wanted = [key for key in dict.fromkeys(asked) if not _is_empty(key[1])]
         new = [key for key in wanted if key not in self._known]
@@ -516,13 +521,13 @@ class Craft:
         return [None if _is_empty(key[1]) else self._known[key] for key in asked]
 
     def _capacity(self, name: str) -> Tank:
-        """Return the tank at a fill of 100 %, from which the mass of a partial fill is computed."""
+        """Return the full tank ``name``, whose liquid has the largest possible mass."""
         (full,) = self._solve([(name, "100%", 1.0)])
         assert full is not None
         return full
 
     def _mass_of(self, name: str, fill: Any) -> float:
-        """Return the mass of liquid in a tank, kg."""
+        """Return the mass of liquid in the tank ``name`` at ``fill``, kg."""
         if _is_empty(fill):
             return 0.0
         if is_mass(fill):
@@ -615,7 +620,7 @@ class Craft:
         return [{name: tank for name, tank in of.items() if tank is not None} for of in tanks]
 
     def _warn(self) -> None:
-        """Issue the warnings that arose when slosh modes of tanks were computed."""
+        """Issue, once, the warnings that arose when slosh modes of tanks were computed."""
         said, self._said[:] = self._said[:], []
         for text in dict.fromkeys(said):
             warnings.warn(text, FmuWarning, stacklevel=caller())
@@ -779,16 +784,22 @@ class Craft:
         trimmed: bool = True,
         **options: Any,
     ) -> tuple[OperatingPoint, float | None]:
-        """Return the operating point at a fill, and the loop's delay if it is in ``parameters``."""
+        """Return the operating point at ``fill``, and the loop's delay (s) or None.
+
+        The delay is an entry of ``parameters``, although it is no parameter of the FMU. ``options``
+        are passed to `_untrimmed`.
+        """
         every, modes, late = self._resolve(fill, parameters, **options)
         return self._realised(every, modes, trimmed=trimmed), late
 
     def _resolve(
         self, fill: Fill, parameters: Parameters | None, **options: Any
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
-        """Return untrimmed parameters, given values of slosh modes by name, and the given delay.
+        """Return what ``fill`` and ``parameters`` define, as three parts.
 
-        The delay is None if ``parameters`` has none.
+        The parts are: the FMU's parameters without trimming; new values of slosh modes by name,
+        such as tank[1].frequency[1], which are no parameters of the FMU; and the loop's delay (s),
+        or None if ``parameters`` has no delay. ``options`` are passed to `_untrimmed`.
         """
         every = self._untrimmed(fill, **options)
         given = full_names(parameters_of(parameters), Fmu.open(self.model), self._names)
@@ -798,7 +809,7 @@ class Craft:
         return every | given, modes, late
 
     def _check_rates(self, given: Parameters) -> None:
-        """Raise FmuError if ``init.omega`` contradicts the spin of the craft."""
+        """Raise FmuError if ``init.omega`` in ``given`` contradicts the spin of the craft."""
         omega, fmu = self._omega, Fmu.open(self.model)
         spin = float(np.linalg.norm(omega))
         w = [float(fmu.convert(name, given.get(name, omega[i]))) for i, name in enumerate(OMEGA)]
@@ -817,10 +828,10 @@ class Craft:
         *,
         trimmed: bool = True,
     ) -> OperatingPoint:
-        """Return the operating point of a craft with the parameters ``every``.
+        """Return the operating point of the FMU's parameters ``every``, trimmed if ``trimmed``.
 
-        ``modes`` has new values of slosh modes by name, for example of ``tank[1].frequency[1]``.
-        ``factors`` has factors by which frequencies of slosh modes are multiplied, by name.
+        ``modes`` has new values of slosh modes, for example of tank[1].frequency[1]. ``factors``
+        has factors by which the frequencies of slosh modes are multiplied, by the same names.
         """
         model = self.model
         if trimmed:
@@ -842,7 +853,12 @@ class Craft:
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
     ) -> dict[str, Quantity]:
-        """Return the parameters of Spacecraft at a fill without trimming: O is the given origin."""
+        """Return Spacecraft's parameters at ``fill``, with O where the user put it.
+
+        Trimming would move the reference point O. If ``rigid``, tanks have no slosh modes; if
+        ``detach``, their liquid is detached. ``mass_flow`` (kg/s) and ``between`` (two fills) make
+        the tanks drain, see `_draining`.
+        """
         if detach and (rigid or mass_flow is not None):
             raise FmuError(
                 "detach=True cannot be combined with rigid=True or mass_flow=: only sloshing "
@@ -907,7 +923,11 @@ class Craft:
     def _draining(
         self, mass_flow: Any, tanks: dict[str, Tank], between: Sequence[float | str]
     ) -> dict[str, Quantity]:
-        """Return the parameters of draining tanks: fill tables and mass flows."""
+        """Return the parameters with which ``tanks`` drain: fill tables, masses and mass flows.
+
+        ``mass_flow`` is the mass flow out of each tank, kg/s, or one for all. The fill tables hold
+        the slosh modes at fills within ``between``, from the lower to the upper fill.
+        """
         found: dict[str, Quantity] = {}
         flows = self._by_tank(mass_flow, "mass_flow")
         for number, (name, flow) in enumerate(flows.items(), 1):
@@ -1327,7 +1347,11 @@ class Craft:
         return replace(model, tanks=order)
 
     def _with_intervals(self, fill: Fill, ranges: Mapping[str, Any]) -> dict[str, Any]:
-        """Return ranges by full names, with a pair (low, high) in place of "interval"."""
+        """Return ``ranges``, by full names, with a pair (low, high) in place of "interval".
+
+        "interval" stands for the interval of a damping ratio that the tank solver gives at
+        ``fill``.
+        """
         tanks, order, found = self.tank_at(fill), self._names, dict(ranges)
         for name, of in ranges.items():
             if isinstance(of, str) and of == "interval":
@@ -1663,16 +1687,14 @@ class Craft:
         return view(run, out, tanks=sources, **options)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for pickling, without results that can be computed again."""
+        """Leave out results that can be computed again, so that a pickled craft is small."""
         return {**self.__dict__, "_known": {}, "_said": []}
 
     def __repr__(self) -> str:
-        """Return a one-line description of the craft."""
         modes = f", appendages: {', '.join(self.appendages)}" if self.appendages else ""
         return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'}{modes})"
 
     def __str__(self) -> str:
-        """Return a description of the craft, with a line for each tank, wheel and appendage."""
         J, F = self._inertia(), self._force()
         burning = [name for name, engine in self.engines.items() if engine.burns]
         products = f"Jxy, Jxz, Jyz {_row((J[0, 1], J[0, 2], J[1, 2]))}"
@@ -1695,13 +1717,20 @@ class Craft:
 
 
 def _along_z(given: Any, name: str) -> Vector:
-    """Return a vector that is given by its components, or by its component along z."""
+    """Return ``given`` as a vector; a number is the component along z, so 5 is (0, 0, 5).
+
+    ``name`` is the field's name in error messages.
+    """
     along_z = isinstance(given, int | float | np.number)
     return vector([0.0, 0.0, given] if along_z else given, 3, name)
 
 
 def _without_point(name: str) -> str:
-    """Return the name of the constant parameter that a parameter of the fill table replaces."""
+    """Return the constant parameter that an entry of the fill table replaces.
+
+    For example, "tank[1].fill.mass[2,3]" replaces "tank[1].mass[2]", because the fill table gives
+    the mass of mode 2 at several fills (the last index).
+    """
     prefix, key = name.split(".fill.")
     if key.startswith("liquid["):
         return f"{prefix}.m_0"
@@ -1718,7 +1747,11 @@ def _is_empty(fill: Any) -> bool:
 
 
 def _own_inertia(tank: Tank, liquid: Liquid) -> Vector:
-    """Return the moments of inertia of a liquid about its centre of mass, tank axes, kg·m²."""
+    """Return a liquid's moments of inertia about its centre of mass, tank axes, kg·m² (3).
+
+    They count the whole liquid as rigid if ``liquid`` is "frozen". If it is "effective", they count
+    only the part of the inertia that follows rotations of the tank.
+    """
     kind = "eff" if liquid == "effective" else "frozen"
     axes = tank.all.get("axes")  # of a box: motion along y turns about x
     across = [float((axes[of] if axes else tank.all)[f"I_{kind}_cg"]) for of in "yx"]

@@ -123,7 +123,10 @@ def curves_of(
 def _smooth(
     gain: "LinearModel", f: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return ``f`` refined where the loop gain changes fast, and the loop gain there."""
+    """Return the frequencies ``f`` (Hz), with more where the loop gain changes fast.
+
+    Also return the loop gain at all these frequencies.
+    """
     model, values = _compiled(gain), np.zeros(0, complex)
     new, old = f, np.zeros(0)
     for _ in range(6):

@@ -46,7 +46,6 @@ class DeltaSearch:
     def __init__(
         self, model: "UncertainModel", loop: "Loop", K: LinearModel, progress: Progress = None
     ) -> None:
-        """Prepare the search for a loop whose linear controller is ``K``."""
         self.model, self.loop, self.K = model, loop, K
         self.least = model._least
         """Lower bound of each δ."""
@@ -158,7 +157,9 @@ class DeltaSearch:
     def _followed(self, start: Complex, largest: float) -> Iterator[WorstCase]:
         """Yield limits of stability that are found by following each lightly damped pole.
 
-        Each δ changes in the direction that increases the magnitude of the pole.
+        ``start`` has the closed loop's poles (z plane) at Δ = 0. For each of them, every δ changes
+        by the same amount, up to ``largest``, in the direction that increases the magnitude of the
+        pole.
         """
         count, seen = len(self.least), set()
         light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]
@@ -206,7 +207,11 @@ class DeltaSearch:
         return best
 
     def _in_box(self, starts: Sequence[Matrix], best: WorstCase, box: float) -> WorstCase:
-        """Search a box for an unstable Δ; return the limit of stability on the line to this Δ."""
+        """Search the box ``|δ| ≤ box`` for an unstable Δ.
+
+        The search begins at ``starts`` and at the least unstable Δ that is known, ``best``. Return
+        the limit of stability on the line from Δ = 0 to the unstable Δ.
+        """
         known = [self.model.delta(best.delta)] if best.delta else []
         near = [at * min(1.0, box / np.abs(at).max(initial=box)) for at in (*known, *starts)]
         for group in (near, self._meetings(box)):
@@ -216,9 +221,10 @@ class DeltaSearch:
         return NOTHING
 
     def _drawn(self, size: float) -> Matrix:
-        """Return the least stable of random Δ; half of them have the smallest damping ratios.
+        """Return the least stable of random Δ in the box ``|δ| ≤ size``.
 
-        These draws can find a loop that is unstable only between the corners of the box.
+        Half of the Δ have the smallest damping ratios. Random Δ can find a loop that is unstable
+        only between the corners of the box.
         """
         rng = np.random.default_rng(1)
         at = rng.uniform(-size, size, (DRAWS, len(self.least)))
@@ -230,10 +236,10 @@ class DeltaSearch:
     def _meetings(self, size: float) -> list[Matrix]:
         """Return Δ at which two uncertain frequencies are equal, if their ranges overlap.
 
-        ``size`` bounds the ranges. Two modes of the same frequency and little damping can be
-        unstable in only a thousandth of the ranges, which random Δ would miss. Each pair gives
-        three Δ, at frequencies that both modes can have. The damping ratios have their smallest
-        values, and other parameters their nominal values.
+        In the box ``|δ| ≤ size``, two modes of equal frequency and little damping can be unstable
+        in only a thousandth of the ranges, which random Δ would miss. Each pair of frequencies
+        gives three Δ, at frequencies that both modes can have. The damping ratios have their
+        smallest values, and other parameters their nominal values.
         """
         at = np.zeros(len(self.least))
         at[self.damping] = -size
@@ -248,11 +254,11 @@ class DeltaSearch:
         return found
 
     def _climbed(self, starts: Sequence[Matrix], size: float) -> Matrix | None:
-        """Return an unstable Δ in a box that pattern searches find from ``starts``, or None.
+        """Return an unstable Δ in the box ``|δ| ≤ size``, or None.
 
-        A search changes one δ at a time, or two frequencies by the same amount. It tries all these
-        changes, then sums of the changes that make the loop less stable. All searches end as soon
-        as one finds an unstable Δ.
+        Pattern searches begin at each Δ in ``starts``. A search changes one δ at a time, or two
+        frequencies by the same amount. It tries all these changes, then sums of the changes that
+        make the loop less stable. All searches end as soon as one finds an unstable Δ.
         """
         if not len(starts):
             return None
@@ -285,7 +291,7 @@ class DeltaSearch:
         return at[best.argmax()] if best.max() > UNSTABLE else None
 
     def _radii(self, groups: list[Matrix]) -> list[Matrix]:
-        """Return the largest magnitude of a pole for each Δ of each group."""
+        """Return the largest magnitude of a closed-loop pole (z plane) for each Δ of each group."""
         ends = np.cumsum([len(group) for group in groups])[:-1]
         return np.split(self.radius(np.vstack(groups)), ends)
 

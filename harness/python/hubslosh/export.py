@@ -76,7 +76,10 @@ def export(
 
 
 def _copy(path: Path, archive: zipfile.ZipFile, changed: Mapping[str, str]) -> None:
-    """Copy a ZIP archive to ``path``, with the texts in ``changed`` for some of its files."""
+    """Copy the entries of the ZIP file ``path`` into ``archive``.
+
+    ``changed`` has new texts by the names of entries. Names that ``path`` lacks are added.
+    """
     left = dict(changed)
     with zipfile.ZipFile(path) as whole:
         for entry in whole.infolist():
@@ -87,14 +90,20 @@ def _copy(path: Path, archive: zipfile.ZipFile, changed: Mapping[str, str]) -> N
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
-    """Return an archive entry without a date, so that the same craft gives the same bytes."""
+    """Return the header of the file ``name`` in a ZIP file, with a fixed date.
+
+    Two exports of the same craft then have the same bytes.
+    """
     entry = zipfile.ZipInfo(name)
     entry.compress_type = zipfile.ZIP_DEFLATED
     return entry
 
 
 def _ssv(fmu: Fmu, values: Mapping[str, Value]) -> str:
-    """Return the values as a parameter set of SSP 1.0 (.ssv)."""
+    """Return ``values`` as the XML text of a parameter set of SSP 1.0 (.ssv).
+
+    The types of the values are those of the variables in ``fmu``.
+    """
     rows = []
     for name, value in values.items():
         items = dict(map(reversed, fmu.variable(name).items))  # type: ignore[arg-type]
@@ -116,7 +125,10 @@ def _shown(fmu: Fmu) -> list[str]:
 
 
 def _ssd(fmu: Fmu) -> str:
-    """Return the SSP description of a system with the FMU, its inputs and outputs of `SHOWN`."""
+    """Return the XML text of an SSP 1.0 system that contains the FMU.
+
+    The system passes on the FMU's inputs and the outputs listed in `SHOWN`.
+    """
     connectors, units = [], {}
     for kind, names in (("input", fmu.names("input")), ("output", _shown(fmu))):
         for name in names:

@@ -52,7 +52,6 @@ class Feedback:
     between two rows, its torque is 0 from that moment on."""
 
     def __post_init__(self) -> None:
-        """Allocate the arrays of commands and of wheel speeds."""
         rows = self.cycles * self.parts + 1
         self.commands: Matrix = np.zeros((rows, len(self.command)))
         """Commands that act from each row to the next; the last row is not set."""

@@ -171,7 +171,10 @@ def to_mat(
 
 
 def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
-    """Return values, and their units as ``units``, under names that MATLAB allows."""
+    """Return ``values`` and their ``units`` under variable names that MATLAB allows.
+
+    For example, "q[1]" becomes "q_1". Raises FmuError if two names would become equal.
+    """
     names = {name: re.sub(r"\W+", "_", name).strip("_") for name in values}
     twice = [name for name in names if list(names.values()).count(names[name]) > 1]
     if twice or any(not re.fullmatch(r"[A-Za-z]\w{0,62}", name) for name in names.values()):
@@ -183,7 +186,11 @@ def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict
 
 
 def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
-    """Return models of one size as three-dimensional arrays for a .mat file, one page per model."""
+    """Return linear models as arrays (row, column, model) for a .mat file.
+
+    The models must have the same states, inputs, outputs and period. The arrays of one model are
+    matrices.
+    """
     import numpy as np
 
     first = models[0]
@@ -200,7 +207,7 @@ def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
 
 
 def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values with lists of strings as arrays of objects, MATLAB's cell arrays."""
+    """Return ``values`` for SciPy's writer of .mat files: lists of strings become cell arrays."""
     import numpy as np
 
     return {

@@ -53,13 +53,15 @@ class DefinedUnit(str):
     factor · (value in this unit) + offset."""
 
     def __new__(cls, name: str, base: tuple[Sequence[int], float, float]) -> "DefinedUnit":
-        """Create a unit from its name and its conversion to SI base units."""
+        """Create a unit: SI value = factor · value + offset.
+
+        ``base`` has the exponents of the SI base units, then factor and offset.
+        """
         unit = super().__new__(cls, name)
         unit.base = base
         return unit
 
     def __getnewargs__(self) -> tuple[str, Any]:  # type: ignore[override]
-        """Return the arguments of ``__new__`` for pickling and copying."""
         return str(self), self.base
 
 
@@ -176,7 +178,6 @@ class Fmu:
     _opened: ClassVar[dict[tuple[Path, int, int], "Fmu"]] = {}
 
     def __init__(self, path: Path) -> None:
-        """Read modelDescription.xml."""
         self.path = path
         """The file."""
         self.native = _Fmu(path)
@@ -190,7 +191,6 @@ class Fmu:
         atexit.register(self.native.close)
 
     def __repr__(self) -> str:
-        """Return name, number of variables and file."""
         return f"Fmu {self.name}: {len(self.variables)} variables, {self.path}"
 
     @classmethod

@@ -21,7 +21,10 @@ SHAPES = {
 
 
 def _own(shape: str, mass: float, size: Any) -> float:
-    """Return a part's inertia about its own centre, parallel to the bearing axis."""
+    """Return a part's inertia about its own centre, parallel to the bearing axis, kg·m².
+
+    ``mass`` is in kg, and ``size`` has the dimensions (m) that ``shape`` needs.
+    """
     numbers = np.atleast_1d(floats(size))
     count = {"box": 2, "tube": 2, "rod": 2}.get(shape, 1)
     if numbers.shape != (count,) or not np.isfinite(numbers).all() or (numbers < 0).any():

@@ -24,7 +24,10 @@ Matrix = NDArray[np.float64]
 
 
 def _check_states(states: int, cycles: int, period: float) -> None:
-    """Raise FmuError if the delay of a sampled model needs too many states for delayed commands."""
+    """Raise FmuError if a model that stores delayed commands has too many states.
+
+    ``states`` is its number of states; the delay is ``cycles`` control cycles of ``period`` (s).
+    """
     if states > MOST_STATES:
         raise FmuError(
             f"a delay of {cycles * period:g} s is {cycles} cycles of {period:g} s, and the "
@@ -93,11 +96,10 @@ class LinearModel:
     period: float | None = None
 
     def __iter__(self) -> Iterator[Matrix]:
-        """Yield A, B, C, D."""
+        """Yield A, B, C, D, so that ``A, B, C, D = model`` works."""
         return iter((self.A, self.B, self.C, self.D))
 
     def __repr__(self) -> str:
-        """Return numbers and names of states, inputs and outputs."""
         from .short import names
 
         time = "continuous" if self.period is None else f"sampled with {self.period:g} s"
@@ -110,7 +112,6 @@ class LinearModel:
         return f"LinearModel, {time}: {sizes}"
 
     def __str__(self) -> str:
-        """Return numbers and names of states, inputs and outputs, and the first modes."""
         from .short import rows
 
         modes = self.modes().assign(states=lambda table: table["states"].map(", ".join))
@@ -158,13 +159,19 @@ class LinearModel:
         return self._at(s)
 
     def _at(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return the transfer function at points of the s plane, or of the z plane if sampled."""
+        """Return the transfer function (output × input) at each point of ``s``.
+
+        The points are in the s plane or, for a sampled model, in the z plane.
+        """
         system = s[:, None, None] * np.eye(len(self.A)) - self.A
         states = np.linalg.solve(system, np.broadcast_to(self.B, (len(s), *self.B.shape)))
         return np.asarray(self.C @ states + self.D, np.complex128)
 
     def _then(self, other: "LinearModel", prefix: str) -> "LinearModel":
-        """Return this model in series with ``other``, whose states get the prefix ``prefix``."""
+        """Return this model in series with ``other``, which receives this model's outputs.
+
+        The names of the states of ``other`` get the prefix ``prefix``.
+        """
         nothing = np.zeros((self.A.shape[-1], len(other.A)))
         return LinearModel(
             _block([[self.A, nothing], [other.B @ self.C, other.A]]),
@@ -236,11 +243,11 @@ class LinearModel:
     def _delayed(self, period: float, cycles: int, rest: float) -> "LinearModel":
         """Return the model in discrete time with a delay of its inputs.
 
-        The delay is ``cycles`` cycles and ``rest`` seconds, 0 ≤ rest < period. In cycle k the
-        command of cycle k - cycles - 1 acts for ``rest`` seconds, then the command of cycle
-        k - cycles (Åström and Wittenmark, Computer-Controlled Systems, section 2.4). An output that
-        depends directly on an input has the value just before a new command acts, because this is
-        what the controller measures.
+        The delay is ``cycles`` cycles of ``period`` (s) and ``rest`` seconds, 0 ≤ rest < period. In
+        cycle k the command of cycle k - cycles - 1 acts for ``rest`` seconds, then the command of
+        cycle k - cycles (Åström and Wittenmark, Computer-Controlled Systems, section 2.4). An
+        output that depends directly on an input has the value just before a new command acts,
+        because this is what the controller measures.
         """
         n, m = self.B.shape[-2:]
         _check_states(n + m * (cycles + 1), cycles, period)
@@ -297,7 +304,10 @@ class LinearModel:
         return mode_table(self._modes(below))
 
     def _modes(self, below: float) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Return frequency (Hz), damping ratio and most active states of each oscillatory mode."""
+        """Return frequency (Hz), damping ratio and most active states of each oscillatory mode.
+
+        Modes with a damping ratio of at least ``below`` are left out.
+        """
         poles, left, right = eigenvectors(self)
         rows = []
         for k, pole in enumerate(poles):
@@ -375,14 +385,14 @@ def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
 
 @lru_cache(maxsize=32)
 def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
-    """Return exp(A t), and the change of the states if each input is 1 for the time t."""
+    """Return exp(A t), and the states after ``time`` (s) from 0 with each input held at 1."""
     n, m = model.B.shape[-2:]
     whole = exponential(_block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
     return whole[..., :n, :n], whole[..., :n, n:]
 
 
 def _block(rows: list[list[Matrix]]) -> Matrix:
-    """Return a matrix of blocks, or a stack of matrices if a block is a stack."""
+    """Return the matrix of the blocks in ``rows``, or a stack of matrices if a block is a stack."""
     stack = max((block.shape[:-2] for row in rows for block in row), key=len)
     size = sum(row[0].shape[-2] for row in rows), sum(block.shape[-1] for block in rows[0])
     found, y = np.empty((*stack, *size)), 0
@@ -510,7 +520,10 @@ def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
 
 
 def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[str]:
-    """Return ``names`` as a list of Real variables; by default all that have ``causality``."""
+    """Return ``names`` as a list, after checking that they are Real variables of the FMU.
+
+    If ``names`` is None, return all Real variables with ``causality`` ("input" or "output").
+    """
     if names is None:
         return [name for name in fmu.names(causality) if fmu.kind(name) == "Real"]
     problems: list[str] = []

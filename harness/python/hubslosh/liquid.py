@@ -101,7 +101,6 @@ class LiquidModes:
     error: "pd.DataFrame" = field(repr=False)
 
     def __repr__(self) -> str:
-        """Return mass of the liquid, specific force, and the first modes."""
         from .short import rows
 
         return f"LiquidModes of {self.mass:.6g} kg, {self.gravity:.4g} m/s²\n{rows(self.modes)}"
@@ -403,7 +402,10 @@ def _check_shape(shape: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
 
 
 def _level(force: np.ndarray) -> np.ndarray:
-    """Return the matrix of the shortest rotation that brings the specific force to the z axis."""
+    """Return the rotation matrix that brings the specific force ``force`` (3) to the z axis.
+
+    It is the shortest rotation. In the rotated tank the free surface is level.
+    """
     a = force / np.linalg.norm(force)
     axis = np.cross(a, [0.0, 0.0, 1.0])
     s, c = np.linalg.norm(axis), a[2]
@@ -418,8 +420,10 @@ def _heights(
 ) -> tuple[float, float]:
     """Return the heights of the lowest and the highest point of the rotated tank, m.
 
-    They are computed from corners and rims, because OpenCASCADE's bounding boxes of curved surfaces
-    are too large. For a CAD file, its bounding box is used all the same.
+    ``name`` and ``size`` are the tank's shape and dimensions, ``level`` is the rotation, and
+    ``solid`` is the tank in gmsh's kernel ``occ``. The heights are computed from corners and rims,
+    because OpenCASCADE's bounding boxes of curved surfaces are too large. For a CAD file, its
+    bounding box is used all the same.
     """
     if name == "sphere":
         center = level @ [0, 0, size["radius"]]
@@ -446,7 +450,10 @@ def _heights(
 
 
 def _solid(occ: Any, name: str, size: Mapping[str, Any]) -> int:
-    """Create the tank's interior as a solid of gmsh, in tank axes, and return its tag."""
+    """Create the tank of the shape ``name`` and the dimensions ``size`` in gmsh's kernel ``occ``.
+
+    Return the tag of the solid, which is the tank's interior in tank axes.
+    """
     if name == "cylinder":
         return int(occ.addCylinder(0, 0, 0, 0, 0, size["height"], size["radius"]))
     if name == "horizontal_cylinder":
@@ -521,7 +528,11 @@ class _Tank(NamedTuple):
 def _on_a_mesh(
     tank: _Tank, surface: float | None, elements: float, do: "Callable[[Any], Any]"
 ) -> Any:
-    """Call ``do`` with a mesh; repeat with finer meshes while elements are too distorted."""
+    """Call ``do`` with a mesh, and again with finer meshes while elements are too distorted.
+
+    The mesh fills the tank up to the height ``surface`` (m), or the whole tank if None, with
+    ``elements`` elements across the surface.
+    """
     for again in range(4):
         mesh = _mesh(tank, surface, elements * 1.05**again)
         try:
@@ -569,10 +580,11 @@ def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
 
 
 def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
-    """Return the height of the free surface, m.
+    """Return the height of the free surface at ``fill``, m, in axes in which the surface is level.
 
     OpenCASCADE's volumes of cut or rotated round tanks are wrong by up to a hundredth, so they only
     give a first guess. Then the volume of the mesh is compared with the volume of the upright tank.
+    ``elements`` is the number of elements across the surface.
     """
     part = parse_share(fill)
     if isinstance(fill, str) and fill.strip().endswith("%") and not (part and part < 1):
@@ -619,7 +631,7 @@ def _volume(mesh: Any) -> float:
 
 
 def _on_surface(mesh: Any, surface: float) -> np.ndarray:
-    """Return the boundary facets of a mesh that lie in the free surface."""
+    """Return the boundary facets of ``mesh`` at the height ``surface``, m."""
     outside = mesh.boundary_facets()
     heights = mesh.p[2, mesh.facets[:, outside]]
     tall = mesh.p[2].max() - mesh.p[2].min()
@@ -627,9 +639,10 @@ def _on_surface(mesh: Any, surface: float) -> np.ndarray:
 
 
 def _volume_and_area(surface: float, mesh: Any) -> tuple[float, float]:
-    """Return a mesh's volume, m³, and the area of its free surface, m².
+    """Return the volume of ``mesh``, m³, and the area of its free surface, m².
 
-    The facets count as plane triangles, so that the area lacks a narrow strip at the rim.
+    The surface is at the height ``surface``, m. Its facets count as plane triangles, so that the
+    area lacks a narrow strip at the rim.
     """
     a, b, c = (mesh.p[:2, corner] for corner in mesh.facets[:, _on_surface(mesh, surface)])
     (x, y), (u, v) = b - a, c - a
@@ -637,7 +650,10 @@ def _volume_and_area(surface: float, mesh: Any) -> tuple[float, float]:
 
 
 def _cut(occ: Any, solid: int, box: Sequence[float], surface: float) -> int:
-    """Cut away the tank above the free surface, and return the tag of the liquid's solid."""
+    """Cut away the tank above the height ``surface``; return the tag of the liquid's solid.
+
+    The tank is ``solid`` in gmsh's kernel ``occ``, and ``box`` is its bounding box.
+    """
     margin = max(box[3] - box[0], box[4] - box[1], box[5] - box[2])
     lid = occ.addBox(
         box[0] - margin, box[1] - margin, surface, *(3 * margin,) * 2, box[5] - surface + margin
@@ -661,10 +677,11 @@ def _is_at(gmsh: Any, tag: int, surface: float, box: Sequence[float]) -> bool:
 
 
 def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
-    """Set the element sizes: smallest at the edge of the free surface, and growing away from it.
+    """Make elements smallest at the edge of the free surface, and larger away from it.
 
-    Larger elements suffice there, because the modes decay with the distance from the free surface.
-    Without a free surface all elements have the same size.
+    ``size`` is the element size on the surface, m, whose faces in gmsh are ``flat``. Larger
+    elements suffice elsewhere, because the modes decay with the distance from the free surface. If
+    ``flat`` is empty, all elements have the same size.
     """
     fields = gmsh.model.mesh.field
     if flat:
@@ -692,7 +709,11 @@ def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
 
 
 def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int) -> LiquidModes:
-    """Return the slosh modes that are computed on one mesh, without an estimate of their errors."""
+    """Return the slosh modes of the liquid that ``mesh`` fills, without an estimate of errors.
+
+    The free surface is at the height ``surface``, m; ``gravity`` is the specific force, m/s²;
+    ``count`` is the number of modes.
+    """
     import pandas as pd
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
     from skfem import Basis, ElementTetP2, FacetBasis, Functional, LinearForm
@@ -765,8 +786,9 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
 def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotate pairs of modes of equal frequency so that they move along x and along y.
 
-    The eigensolver returns such a pair in arbitrary directions, which depend on the mesh. ``a`` is
-    the coupling of the modes, of unit norm, with displacements along x and y: modes × 2.
+    The eigensolver returns such a pair in arbitrary directions, which depend on the mesh.
+    ``lambdas`` are the eigenvalues, the columns of ``phi`` the modes, and the rows of ``a`` their
+    coupling with displacements of the tank along x and y, of unit norm.
     """
     lambdas, phi = lambdas.copy(), phi.copy()
     large = np.hypot(*a.T) > 1e-3 * np.hypot(*a.T).max()
@@ -783,7 +805,11 @@ def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.nd
 def _mode(
     density: float, gravity: float, lam: float, b: np.ndarray, norm: float, liquid: float
 ) -> dict[str, float]:
-    """Return the equivalent pendulum of a mode; ``b`` couples it with the tank's six motions."""
+    """Return the pendulum that acts on the tank like one slosh mode.
+
+    ``lam`` is the eigenvalue ω²/g, 1/m; ``b`` couples the mode with the tank's six motions;
+    ``norm`` is the mode's norm over the free surface; ``liquid`` is the mass of the liquid, kg.
+    """
     a = np.hypot(b[0], b[1])
     mass = density * lam * a**2 / norm
     twist = density * lam * b[5] ** 2 / norm

@@ -109,7 +109,6 @@ class Loop:
     tanks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        """Return a description of the loop in four lines."""
         measured, command = (names_of(of, "", []) for of in (self.measured, self.command))
         given = self.parameters
         known = (
@@ -143,7 +142,10 @@ class Loop:
         return self._examine()[0]
 
     def _examine(self) -> tuple[list[str], LinearModel | None]:
-        """Return all problems of the loop, and its controller as a linear model if it is linear."""
+        """Return error messages about the loop, and its controller as a linear model or None.
+
+        The controller is None if it is a function.
+        """
         controller = None
         found = out_of_range(period=self.period, latency=self.latency, delay=self.delay)
         fmu = Fmu.open(self.model)
@@ -207,14 +209,14 @@ class Loop:
 
     @property
     def _turned(self) -> dict[str, Wheel]:
-        """Wheels whose torques are commands, by the names of their torques."""
+        """The wheels that the controller commands, each by the name of its torque."""
         if not self.wheels:
             return {}
         commands = self.names[1]
         return {name: of for name, of in torque_names(self.wheels).items() if name in commands}
 
     def _units(self) -> dict[str, str]:
-        """Return the units of the wheels' torques and speeds, which are not in the FMU."""
+        """Units of torques and speeds of the wheels, which are no variables of the FMU."""
         return units_of(torque_names(self.wheels))
 
     @property
@@ -250,7 +252,7 @@ class Loop:
         return _linear(self.controller, self.period, measured, command)
 
     def _must_be_linear(self) -> LinearModel:
-        """Return the linear controller of the loop; raise FmuError if the loop has problems."""
+        """Return the controller as a linear model; raise FmuError if the loop has problems."""
         found, controller = self._examine()
         refuse(found)
         if controller is None:
@@ -295,7 +297,10 @@ class Loop:
         return self._plant(parameters_of(parameters))
 
     def _plant(self, parameters: Parameters, *, all_states: bool = False) -> LinearModel:
-        """Return the model of `plant`; ``all_states`` as for `linearize`."""
+        """Return the linear model from commands to measurements at ``parameters``.
+
+        If ``all_states``, states that do not affect the measurements are kept, see `linearize`.
+        """
         measured, command = self.names
         every = parameters_of(self.parameters) | dict(parameters)
         if not (turned := self._turned):
@@ -308,11 +313,11 @@ class Loop:
     def _with_wheels(
         self, model: LinearModel, inputs: list[str], *, all_states: bool = False
     ) -> LinearModel:
-        """Return a model whose inputs are ``inputs``, with torques of the wheels among them.
+        """Return ``model`` with torques of wheels among its inputs, which are then ``inputs``.
 
-        The other ``inputs`` are inputs of ``model``, which also has the inputs torque and h_wheels.
-        The momentum of a wheel acts in a craft that turns, so that its speed is then a further
-        state.
+        ``model`` must have the inputs torque and h_wheels, too. The momentum of a wheel acts on a
+        craft that turns, so that the wheel's speed is then a state. For ``all_states`` see
+        `linearize`.
         """
         turned = self._turned
         torque, h = (
@@ -496,10 +501,10 @@ class Loop:
         return run
 
     def _constants(self, parameters: Parameters) -> dict[str, float]:
-        """Return the constant to which each command is added.
+        """Return, for each command by name, the constant that is added to it.
 
         The constant is the value of the commanded input in ``parameters``, such as the thrust of a
-        craft, and 0 if the parameters do not have this input.
+        craft, and 0 if ``parameters`` does not have this input.
         """
         fmu, turned = Fmu.open(self.model), self._turned
         return {
@@ -508,10 +513,10 @@ class Loop:
         }
 
     def _momentum(self, fmu: Fmu, parameters: Parameters) -> tuple[float, float, float]:
-        """Return the angular momentum of the wheels at the start of a run, N·m·s.
+        """Return the angular momentum of all wheels at the start of a run, body axes, N·m·s (3).
 
-        ``parameters`` override the momentum that follows from the speeds of the wheels, for example
-        if they contain the momentum of further wheels.
+        It follows from the start speeds of the loop's wheels, unless ``parameters`` sets h_wheels,
+        for example because there are further wheels.
         """
         if not self._turned:
             return (0.0, 0.0, 0.0)
@@ -527,10 +532,11 @@ class Loop:
         measured: list[str],
         constants: dict[str, float],
     ) -> tuple[Any, list[str]]:
-        """Return the controller for a run, and the names of the variables that it measures.
+        """Return the controller of a run, and the variables that it measures.
 
-        ``constants`` has the constant that the controller adds to each command, by the name of the
-        command and in the order of the commands.
+        The run has ``cycles`` cycles, which begin at the times in ``time``, s. ``reference`` has
+        the wanted values of ``measured``. ``constants`` has, for each command in its order, the
+        constant that is added to it.
         """
         model, command = self.linear(), list(constants)
         if model is None:
@@ -657,11 +663,12 @@ def _repeated(names: list[str]) -> list[str]:
 def _points(
     grid: NDArray[np.float64], substeps: int, period: float, rest: float
 ) -> tuple[NDArray[np.float64], int, NDArray[np.bool_] | None]:
-    """Return the communication points of a run, s.
+    """Return the times at which a run exchanges values with the FMU, s, and two more results.
 
-    Also return the index of the point in each cycle at which a command begins to act, and a mask of
-    the points that are rows of the result (None if all are). ``rest`` is the delay in seconds
-    beyond whole cycles.
+    Each cycle of ``period`` (s) has ``substeps`` rows, whose times are in ``grid``. A command
+    begins to act ``rest`` seconds after the start of a cycle, 0 ≤ rest < period. The second result
+    is the index, within a cycle, of the time at which it begins to act; the third is a mask of the
+    times that are rows of the result, or None if all are.
     """
     place = rest / period * substeps
     nearest = round(place)
@@ -678,7 +685,10 @@ def _points(
 def _checked_law(
     law: Law, constants: dict[str, float]
 ) -> Callable[[int, float, list[float]], list[float]]:
-    """Return a function that calls the controller, checks its result and adds ``constants``."""
+    """Return a function that calls the controller ``law`` and checks the commands it returns.
+
+    ``constants`` has, by the name of each command, the constant that is added to this command.
+    """
     command, added = list(constants), np.array(list(constants.values()))
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
@@ -699,7 +709,10 @@ def _checked_law(
 def _reference(
     reference: pd.DataFrame | None, measured: list[str], command: list[str]
 ) -> dict[str, History]:
-    """Return the history of each column of the reference, by name."""
+    """Return each column of the table ``reference`` as a time history, by the column's name.
+
+    Allowed columns are time, the measured variables, the commands and q[1] to q[4].
+    """
     if reference is None:
         return {}
     allowed = [*measured, *command, *QUATERNION]
@@ -732,7 +745,10 @@ def _reference(
 def _linear(
     controller: Any, period: float, measured: list[str], command: list[str]
 ) -> LinearModel | None:
-    """Return a controller as a linear model sampled with ``period``; None for a function."""
+    """Return ``controller`` as a linear model sampled with ``period`` (s); None for a function.
+
+    ``measured`` and ``command`` are the names of the inputs and outputs that it must have.
+    """
     if isinstance(controller, LinearModel):
         model = controller
     elif hasattr(controller, "dt") and hasattr(controller, "ninputs"):
@@ -784,7 +800,7 @@ def _tustin(model: LinearModel, period: float) -> LinearModel:
 def _bilinear(
     given: tuple[tuple[tuple[int, ...], bytes], ...], period: float
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return the matrices of a system discretised by SciPy; each is given as shape and bytes.
+    """Return A, B, C and D of a system discretised by SciPy; each is given as shape and bytes.
 
     Results are cached, because the threads of SciPy wait for each other: on two cores a call can
     take as long as all margins of a loop.
@@ -796,7 +812,6 @@ def _bilinear(
 
 
 def _from_control(system: Any) -> LinearModel:
-    """Return a system of python-control as a `LinearModel`."""
     import control
 
     try:

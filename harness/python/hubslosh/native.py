@@ -17,7 +17,7 @@ def source_tree() -> Path | None:
 
 
 def _built() -> Any:
-    """Load the library that ``cargo build`` has built."""
+    """Load the native library that ``cargo build`` has made in this source tree."""
     name = {"win32": "hubslosh_native.dll", "darwin": "libhubslosh_native.dylib"}
     file = name.get(sys.platform, "libhubslosh_native.so")
     path = _ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / file

@@ -104,11 +104,9 @@ class OperatingPoint:
         return self._remaining[1]
 
     def __repr__(self) -> str:
-        """Return one line with the angular acceleration that remains after trimming."""
         return f"OperatingPoint({np.linalg.norm(self.angular_acceleration):.2g} rad/s² left)"
 
     def __str__(self) -> str:
-        """Return one line on the shift by trimming and one line on the remaining acceleration."""
         lines = [
             f"O, where the thrust acts, moves by {_row(self.shift)} m to the centre of mass",
             f"angular acceleration: {np.linalg.norm(self.untrimmed_acceleration):.4g} rad/s² "
@@ -163,13 +161,20 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
 
 
 def _flexible(plant: Plant) -> list[str]:
-    """Return the name prefixes ("appendage[1].") of the modes that the craft's motion excites."""
+    """Return the prefixes, such as "appendage[1].", of appendage modes that the craft can excite.
+
+    The craft's motion does not excite a mode whose participation factors are all 0.
+    """
     names = [f"appendage[{j}]." for j in range(1, int(plant.get(["appendages"])[0]) + 1)]
     return [name for name in names if _participation(plant, name).any()]
 
 
 def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
-    """Return the angular acceleration, rad/s², if appendages are deflected without vibration."""
+    """Return the angular acceleration of the craft, rad/s², with appendages that do not vibrate.
+
+    At ``parameters`` of the FMU ``model``, appendages are deflected as far as the steady force
+    requires.
+    """
     with Plant(model, parameters) as plant:
         names = _flexible(plant)
 
@@ -193,12 +198,15 @@ def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
 
 
 def _participation(plant: Plant, name: str) -> Vector:
-    """Return the participation factors of an appendage mode; its parameters begin with ``name``."""
+    """Return the six participation factors of the appendage mode with the prefix ``name``."""
     return np.array(plant.get([f"{name}participation[{i}]" for i in range(1, 7)]))
 
 
 def _deflections(plant: Plant, names: Sequence[str], force: Vector) -> dict[str, Quantity]:
-    """Return the modal displacements of appendages under the steady specific force, m/s²."""
+    """Return the start values at which appendages are at rest under ``force``, m/s² (3).
+
+    ``names`` are the prefixes of the appendage modes, and ``force`` is the steady specific force.
+    """
     found: dict[str, Quantity] = {}
     for name in names:
         along = _participation(plant, name)[:3]

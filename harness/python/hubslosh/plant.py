@@ -37,7 +37,6 @@ class RunError(FmuError):
     """
 
     def __init__(self, sentence: str, time: float, columns: dict[str, np.ndarray]) -> None:
-        """Store the message, the time and the time histories."""
         super().__init__(sentence)
         self.time = time
         """Start of the last step, s."""
@@ -58,7 +57,6 @@ class Instance:
     """
 
     def __init__(self, fmu: Fmu, *, exchange: bool = False) -> None:
-        """Instantiate for Co-Simulation, or for Model Exchange."""
         self.fmu = fmu
         """The FMU."""
         self.native = native.Instance(fmu.native, exchange)
@@ -67,7 +65,6 @@ class Instance:
             self.set(start, 0.0)
 
     def __enter__(self) -> Self:
-        """Return the instance itself."""
         return self
 
     def __exit__(
@@ -76,7 +73,6 @@ class Instance:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Free the instance."""
         self.close()
 
     def close(self) -> None:
@@ -238,7 +234,6 @@ class Plant(Instance):
         inputs: Mapping[str, float] | None = None,
         torque: float | None = None,
     ) -> None:
-        """Instantiate the FMU and initialise it."""
         super().__init__(Fmu.open(fmu))
         self.time = start
         """Present time, s."""

@@ -31,7 +31,7 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequence[Axes]":
-    """Create a figure of ``height`` inches, and return its axes, one above the other."""
+    """Return the axes of a new figure, one above the other; ``height`` is in inches."""
     try:
         import matplotlib.pyplot as plt
     except ModuleNotFoundError:
@@ -50,7 +50,6 @@ def _label(table: pd.DataFrame, name: str) -> str:
 
 
 def _line(ax: "Axes", x: Any, y: Any, label: str | None) -> None:
-    """Draw a line in the next colour of the axes, with a legend if the line has a label."""
     ax.plot(x, y, color=COLORS[len(ax.lines) % len(COLORS)], linewidth=0.9, label=label)
     ax.grid(alpha=0.3)
     if label is not None:
@@ -62,7 +61,10 @@ def _panels(
     panels: Mapping[str, Sequence[tuple[str | None, Any]]],
     axes: "Sequence[Axes] | None",
 ) -> "Sequence[Axes]":
-    """Draw the lines of each panel over the time of a run; a line is a pair (label, values)."""
+    """Draw lines over the time of ``run``, and return the axes.
+
+    For each title, ``panels`` has the lines of one diagram as pairs (label, values).
+    """
     axes = _subplots(len(panels), sharex=True) if axes is None else axes
     for ax, (title, lines) in zip(axes, panels.items(), strict=True):
         for label, values in lines:
@@ -379,7 +381,10 @@ def _diagram(
     draw: "Callable[[Axes, Curves], None]",
     place: "Callable[[_Mark], tuple[float, float]]",
 ) -> "Axes":
-    """Draw the loop gains with ``draw``; ``place`` returns the coordinates of a crossing."""
+    """Draw the loop gains and mark their crossings; return the axes.
+
+    ``draw`` draws the curves, and ``place`` returns the coordinates of a crossing in the diagram.
+    """
     found, curves = _loop_curves(loop, parameters)
     draw(ax, curves)
     labels = [
@@ -391,7 +396,7 @@ def _diagram(
 
 
 def _loop_curves(loop: Any, parameters: Mapping[str, Any] | None) -> "tuple[Margins, Curves]":
-    """Return the margins of a loop, and the curve of the loop gain of each command."""
+    """Return the margins of ``loop``, and the curve of the loop gain of each command."""
     found, gain = margins_and_gain(loop, parameters)
     names = gain.inputs or ("loop gain",)
     gains = [
@@ -417,9 +422,10 @@ class _Mark(NamedTuple):
 
 
 def _marks(found: "Margins", curves: "Curves") -> "list[tuple[Curve, _Mark]]":
-    """Return the crossings of each curve, with labels for the smallest margins and slosh modes.
+    """Return each crossing in ``found`` with its curve; the smallest margins come first.
 
-    The crossings with the smallest margins come first, so that their labels are placed first.
+    Labels are placed in this order. Only the smallest margins and the crossings of slosh modes have
+    a label.
     """
     table = found.crossings[found.crossings["frequency"] > 0]
     marks = []
@@ -449,7 +455,7 @@ def _mark(ax: "Axes", x: float, y: float, symbol: str, text: str, color: str) ->
 
 
 def _finish(ax: "Axes", found: "Margins", labels: "list[_Label]") -> None:
-    """Add a title with the margins, a legend if there are several commands, and the labels."""
+    """Add a title with the margins ``found``, a legend if there are several curves, and labels."""
     delay = f"delay margin {found.delay_margin:.3g} s" if found.stable else "UNSTABLE"
     table = found.crossings
     crossed = table.loc[

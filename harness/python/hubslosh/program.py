@@ -154,7 +154,7 @@ def analyse(
 
 
 def _runs_in(directory: Path) -> pd.DataFrame:
-    """Return the table of runs that the command has written to a directory."""
+    """Return runs.csv of a campaign's ``directory`` as a table."""
     table = pd.read_csv(directory / "runs.csv")
     table.attrs["directory"] = directory
     return table
@@ -198,7 +198,7 @@ class Estimated:
 
     @classmethod
     def _read(cls, found: Mapping[str, Any]) -> "Estimated":
-        """Return an estimate from an entry of result.json, in which null stands for infinity."""
+        """Return an estimate from an entry of result.json, in which null means infinity."""
         ends = zip(found["interval"], (-np.inf, np.inf), strict=True)
         low, high = (limit if end is None else float(end) for end, limit in ends)
         spread = {
@@ -276,7 +276,6 @@ class Identification:
         return pd.DataFrame(np.array(self.all["covariance"], float), names, names)
 
     def __repr__(self) -> str:
-        """Return the verdict and the estimates."""
         every = self.parameters | self.measurement
         lines = [
             f"{name} = {e.value:.6g} ± {e.std:.2g} {e.unit}".rstrip() for name, e in every.items()
@@ -290,9 +289,10 @@ class Identification:
 def _files(
     data: "Table | Sequence[Table]", needed: Sequence[str], folder: Path
 ) -> tuple[list[Path], dict[str, str]]:
-    """Write tables of recordings to a folder.
+    """Write tables of recordings to ``folder``; recordings that are files stay where they are.
 
-    Return the files of all recordings, and for each written file a name for messages.
+    Each table must have the columns ``needed``. Return the files of all recordings and, for each
+    written file, a name that error messages show instead.
     """
     tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
     files: list[Path] = []
@@ -316,7 +316,11 @@ def _free_flags(
     outputs: Sequence[str],
     prior: Mapping[str, tuple[float, float]],
 ) -> list[str]:
-    """Return the command-line options for the identification of any FMU's parameters."""
+    """Return the options of ``hubslosh identify fmu`` for these unknowns and signals.
+
+    ``free`` has the start value or range of each unknown, ``prior`` its known value with standard
+    deviation.
+    """
     flags = []
     for name, start in free.items():
         numbers = start if isinstance(start, tuple) else (start,)

@@ -20,7 +20,6 @@ class Line:
     """A line on the terminal, or in a notebook, whose text is replaced as work proceeds."""
 
     def __init__(self, progress: Progress = None) -> None:
-        """Store how to show the line; see `Progress`."""
         show = is_watched() if progress is None else progress
         self._show = show if callable(show) else self._write if show else None
         self._width = 0

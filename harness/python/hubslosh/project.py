@@ -171,7 +171,7 @@ class Project:
         return "".join(parts)
 
     def _controller_text(self, folder: Path) -> Any:
-        """Return the value of the key ``controller`` in the project file."""
+        """Return the value of the key ``controller`` of a project file in ``folder``."""
         if self.controller_file is not None:
             file, _, name = self.controller_file.rpartition(":")
             return f"{_relative(Path(file), folder)}:{name}"
@@ -241,12 +241,14 @@ class Project:
         }
 
     def __repr__(self) -> str:
-        """Return the project's name and a one-line description of its craft."""
         return f"Project({self.name}: {self.craft!r})"
 
 
 def _set(of: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values that differ from the defaults of the fields of a dataclass, for a file."""
+    """Return the entries of ``values`` that a project file needs, as types that TOML knows.
+
+    These are the fields of the dataclass ``of`` that differ from their defaults.
+    """
     found = {}
     for item in fields(of):
         if item.name not in values:
@@ -267,7 +269,10 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _named(kind: str, tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables by their full names, such as ``cases.slow``, without their key ``craft``."""
+    """Return tables by full names: "slow" of the kind "cases" is "cases.slow".
+
+    The key "craft" of each table is left out.
+    """
     found = {}
     for name, of in tables.items():
         if not isinstance(of, Mapping):
@@ -277,7 +282,7 @@ def _named(kind: str, tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _masses(fills: Any) -> Any:
-    """Return fills in which each mass, ``[120, "kg"]`` in TOML, is the pair ``(120, "kg")``."""
+    """Return ``fills`` with each mass, ``[120, "kg"]`` in TOML, as the pair ``(120, "kg")``."""
     if isinstance(fills, Mapping):
         return {name: _masses(fill) for name, fill in fills.items()}
     if isinstance(fills, list):
@@ -313,7 +318,10 @@ def _check_names(
     where: str,
     without: set[str] = frozenset(),  # type: ignore[assignment]
 ) -> None:
-    """Raise FmuError for a name that is no argument of a function."""
+    """Raise FmuError if the table ``given`` has a key that is no argument of ``function``.
+
+    ``where`` is the table's name in messages; arguments in ``without`` are not allowed.
+    """
     if not isinstance(given, Mapping):
         raise FmuError(f"{where} must be a table, not {given!r}")
     allowed = [name for name in inspect.signature(function).parameters if name not in without]
@@ -324,7 +332,10 @@ def _check_names(
 
 
 def _call(function: Callable[..., Any], given: Any, where: str) -> Any:
-    """Call a function with the entries of a TOML table as arguments."""
+    """Call ``function`` with the entries of the TOML table ``given`` as arguments.
+
+    ``where`` is the table's name in error messages.
+    """
     _check_names(function, given, where)
     parameters = inspect.signature(function).parameters
     missing = [name for name, p in parameters.items() if p.default is p.empty and name not in given]
@@ -365,7 +376,8 @@ def _controller(given: Any, folder: Path) -> Any:
 def _from_transfer_functions(num: Any, den: Any, period: float | None) -> LinearModel:
     """Return a matrix of transfer functions as a state-space model.
 
-    ``num`` and ``den`` have a row for each command and a column for each measurement.
+    ``num`` and ``den`` have a row for each command and a column for each measurement; each entry is
+    a list of coefficients, the highest power first.
     """
     from scipy.linalg import block_diag
     from scipy.signal import tf2ss

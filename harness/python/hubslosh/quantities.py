@@ -191,7 +191,6 @@ class Modes:
     """Parameters of Spacecraft in which quantities of slosh modes can be read and changed."""
 
     def __init__(self, model: str | Path, given: Parameters) -> None:
-        """Store the parameters of an FMU."""
         self.model, self.fmu, self.given = model, Fmu.open(model), dict(given)
 
     def number(self, name: str) -> float:
@@ -250,7 +249,7 @@ class Modes:
         return length
 
     def _axial_force(self, mode: ModeQuantity) -> float:
-        """Return the specific force along a tank's axis at the slosh mass, m/s²."""
+        """Return the specific force along the tank's axis at the slosh mass of ``mode``, m/s²."""
         bob = self.number(mode.name("hinge")) - self._length(mode)
         with Plant(self.model, self.given) as plant:
 
@@ -309,9 +308,10 @@ class Modes:
                 self.given |= {mode.name("length"): length, mode.name("hinge"): value + length}
 
     def _keep_at_rest(self, tank: int, points: list[tuple[float, float]]) -> None:
-        """Add point masses (kg) at heights (m) to the rigid liquid, so that the sum stays the same.
+        """Add point masses to a tank's rigid liquid, so that the sum of all liquid stays the same.
 
-        If the rigid liquid's inertia would become negative, the dry craft's inertia is reduced
+        ``points`` are pairs of mass (kg) and height (m); they compensate changed slosh masses. If
+        the rigid liquid's inertia would become negative, the dry craft's inertia is reduced
         instead; see `rigid_rest`.
         """
         prefix = f"tank[{tank}]"

@@ -114,7 +114,11 @@ def _matlab(path: Path) -> Iterator[Column]:
 
 
 def _matlab_value(name: str, value: Any, depth: int = 0) -> Iterator[Column]:
-    """Yield the columns of a variable: an array, or the fields of a structure or of a timetable."""
+    """Yield the columns in the MATLAB variable ``name``.
+
+    ``value`` is an array, a structure (whose fields are read in turn), or a timetable. ``depth`` is
+    the number of structures around it.
+    """
     if hasattr(value, "columns"):
         units = value.attrs.get("varUnits", ())
         if value.index.name:
@@ -261,7 +265,10 @@ def _check_size(values: int) -> None:
 
 
 def _parts(column: Column) -> Iterator[Column]:
-    """Yield the signals of a column with their values as lists; skip data that are no signal."""
+    """Yield the signals of ``column``, each with a list of values.
+
+    A matrix has one signal for each column. Data that cannot be a signal are left out.
+    """
     values = np.asarray(column.values)
     if values.ndim == 2 and values.shape[1] > values.shape[0]:
         values = values.T
@@ -298,7 +305,7 @@ def _cells(values: np.ndarray) -> list | None:
 
 
 def _aligned(columns: list[Column]) -> tuple[list[str], list[list]]:
-    """Return the header and the cells of a table of all columns.
+    """Return one table for all ``columns``: its header, and the cells of each row.
 
     If the columns have times of their own, the rows are all these times; otherwise row n has the
     value n of each column.

@@ -33,7 +33,6 @@ class Requirement:
         return UNITS[self.margin]
 
     def __str__(self) -> str:
-        """Return the requirement in words."""
         what = self.margin.replace("_", " ")
         return f"{what} of {self.points} points at least {self.limit:g}{self.unit}"
 

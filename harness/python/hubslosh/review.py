@@ -250,7 +250,10 @@ class Review:
         return {mode: words for _, mode, words in sorted(found, key=lambda row: row[0])}
 
     def _fill_text(self, fills: Sequence[int]) -> str:
-        """Return fills in words; successive fills are joined, such as "5% to 35%"."""
+        """Return fills in words; successive fills are joined, such as "5% to 35%".
+
+        ``fills`` are the numbers of the fills in the review.
+        """
         spans: list[list[int]] = []
         for fill in fills:
             if spans and fill == spans[-1][-1] + 1:
@@ -285,7 +288,7 @@ class Review:
         return " ".join([self._stability(), *self._failures()])
 
     def _failures(self) -> list[str]:
-        """Return a sentence about the requirements that fail; empty without requirements."""
+        """Return a sentence about the requirements that fail; empty if none fails."""
         table = self.requirements()
         failed = table[~table["passed"]]
         if table.empty:
@@ -354,7 +357,7 @@ class Review:
         return found
 
     def _describe(self, point: Point) -> str:
-        """Return the fill of a point, and its quantities that are not nominal, in words."""
+        """Return the fill of a point and its quantities that are not nominal, in words."""
         words = [f"fill {self.fills[point.fill]}"]
         for quantity, share in zip(self.uncertain, point.shares, strict=True):
             values = quantity.values(point.fill, float(share)) if share else {}
@@ -397,7 +400,6 @@ class Review:
         write_file(path, ".html", self.html)
 
     def __str__(self) -> str:
-        """Return the summary, then the numbers on which it rests."""
         table = self.points
         lines = [self.summary, *self.stabilisation()[:8]]
         stable = table[table["stable"]]
@@ -421,7 +423,6 @@ class Review:
         return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines)
 
     def __repr__(self) -> str:
-        """Return the first sentence of the summary."""
         return f"Review({self.summary})"
 
 
@@ -518,9 +519,10 @@ def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
 
 
 def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
-    """Return the plants of all points, extended by zeros so that all have the same states.
+    """Return the plants of all points with equal states, so that they can be stacked.
 
-    These are all states that any plant has, in the FMU's order.
+    The states are all states that any plant has, in the FMU's order. A plant that lacks a state
+    gets it with zeros.
     """
     models = []
     used: set[str] = set()
@@ -536,7 +538,7 @@ def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
 
 
 def _check_work(points: int, loop: Loop) -> None:
-    """Refuse a review that would take hours."""
+    """Raise FmuError if the review of ``points`` operating points would take hours."""
     states = len(loop.gain().A)
     if points * states**3 > MOST_WORK:
         raise FmuError(
@@ -548,7 +550,7 @@ def _check_work(points: int, loop: Loop) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """Space of the operating points of a review: fills and uncertain quantities."""
+    """The operating points of a review: its fills, and uncertain quantities with ranges."""
 
     craft: "Craft"
     names: tuple[str, ...]
@@ -671,7 +673,10 @@ def _list_of(fills: Any) -> list[Any]:
 
 
 def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
-    """Return, by the full name of each quantity, its name as given and its range."""
+    """Return the user's ranges by the full name of each quantity in the FMU.
+
+    Each entry has the name as the user wrote it and the range.
+    """
     if not isinstance(given, Mapping):
         raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
                        f"not {given!r}")  # fmt: skip
@@ -682,8 +687,9 @@ def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
 def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str]) -> list[Uncertain]:
     """Return the range of the damping of each tank, over which all its modes vary together.
 
-    The reason is that one correlation gives the damping of all modes of a tank. ``given`` has the
-    full names of quantities for which the user gives a value or a range.
+    The reason is that one correlation gives the damping of all modes of a tank. ``tanks`` has the
+    solved tanks at each fill by name. ``given`` has the full names of quantities for which the user
+    gives a value or a range; they are left out.
     """
     found, known = [], False
     for number, name in enumerate(craft.tanks, 1):
@@ -707,7 +713,10 @@ def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str])
 
 
 def _part(given: Any, what: str) -> float:
-    """Return the share by which a quantity varies, such as 0.1 for "10%"; 0 for "nominal"."""
+    """Return the share by which a quantity varies, such as 0.1 for "10%"; 0 for "nominal".
+
+    ``what`` is the argument's name in the error message.
+    """
     part = 0.0 if given == "nominal" else parse_share(given)
     if part is None or part >= 1:
         raise FmuError(
@@ -724,7 +733,11 @@ def _scaled(part: float, values: Mapping[str, float]) -> dict[str, tuple[float, 
 def _frequencies(
     craft: "Craft", loops: Sequence[Loop], part: float, ranges: Mapping[str, Any]
 ) -> list[Uncertain]:
-    """Return the range of the slosh frequencies of each tank, whose modes vary together."""
+    """Return the range of the slosh frequencies of each tank, whose modes vary together.
+
+    They vary by the share ``part``. ``loops`` has the loop at each fill. Frequencies in ``ranges``
+    are left out, because the user gives their ranges.
+    """
     found = []
     for number, name in enumerate(craft.tanks if part else (), 1):
         ends = []
@@ -748,7 +761,9 @@ def _of_appendages(
 ) -> list[Uncertain]:
     """Return the range of frequency or damping of each appendage, whose modes vary together.
 
-    ``known`` has the full names of quantities for which the user gives a value or a range.
+    ``kind`` is "frequency" or "zeta", ``part`` the share by which it varies, and ``given`` the
+    parameters at each fill. ``known`` has the full names of quantities for which the user gives a
+    value or a range; they are left out.
     """
     found, words = [], {"frequency": "frequency of", "zeta": "damping of"}[kind]
     for name in craft.appendages if part else ():
@@ -767,7 +782,11 @@ def _of_appendages(
 def _inertia(
     given: Sequence[Parameters], part: float, ranges: Mapping[str, Any]
 ) -> list[Uncertain]:
-    """Return the range of the dry craft's inertia; empty if the user varies a component."""
+    """Return the range of the dry craft's inertia, which varies by the share ``part``.
+
+    ``given`` has the parameters at each fill. The result is empty if the user varies a component of
+    the inertia, which is then in ``ranges``.
+    """
     names = [f"craft.J{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
     if not part or any(name in ranges for name in names):
         return []
@@ -786,7 +805,9 @@ def _quantities(
 ) -> list[Uncertain]:
     """Return the quantities whose ranges the user gives.
 
-    ``given`` has the untrimmed parameters at each fill; the keys of ``ranges`` are full names.
+    The keys of ``ranges`` are full names; each entry has the user's name and the range. ``loops``
+    and ``given`` have the loop and the untrimmed parameters at each fill; ``tanks`` are names for
+    messages.
     """
     fmu = Fmu.open(loops[0].model)
     allowed = [DELAY]
@@ -834,7 +855,10 @@ def _problem(loop: Loop, mode: ModeQuantity) -> str:
 
 
 def _nominal(loop: Loop, untrimmed: Parameters, name: str) -> float | None:
-    """Return the nominal value of a quantity, or None if its mode does not exist at this fill."""
+    """Return the nominal value of a quantity, or None if its mode does not exist at this fill.
+
+    ``untrimmed`` has the parameters before the craft is trimmed.
+    """
     if name == DELAY:
         return float(loop.delay)
     return nominal_value(Modes(loop.model, loop.parameters), untrimmed, name)  # type: ignore[arg-type]
@@ -844,7 +868,11 @@ Ends = list[tuple[float, float]]
 
 
 def _ends(given: Any, nominals: list[float | None]) -> tuple[Ends, str]:
-    """Return the ends of a range at each fill, or the rest of an error sentence about the range."""
+    """Return (low, high) of the range ``given`` at each fill, and an empty text.
+
+    ``nominals`` has the nominal value at each fill. If the range is wrong, the text is the rest of
+    an error sentence.
+    """
     known = [value for value in nominals if value is not None]
     if not known:
         return [], NO_MODE

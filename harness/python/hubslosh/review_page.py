@@ -74,7 +74,7 @@ def _facts(review: "Review") -> str:
 
 
 def _figures(review: "Review") -> Iterator[str]:
-    """Yield the figures as HTML; the title of each figure is a question."""
+    """Yield each figure of a review's page as HTML; its title is the question that it answers."""
     from .fmu import Fmu
 
     unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
@@ -167,7 +167,11 @@ def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure],
 
 
 def _signs(margin: str, drawn: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the signs with which a required margin is drawn: + and - for a gain margin, else +."""
+    """Return the signs with which a required margin is drawn: + and - for a gain margin, else +.
+
+    ``margin`` is the margin's column, and ``drawn`` has the margins that the figure shows. The
+    result is empty if the figure does not show this margin.
+    """
     if margin == "gain_margin":
         return (1, -1) if "gain_up" in drawn else ()
     return (1,) if margin in drawn else ()
@@ -214,7 +218,10 @@ def _marked(review: "Review") -> str:
 
 
 def _mark_unstable(ax: "Axes", bands: pd.DataFrame) -> None:
-    """Draw a line at each fill with unstable points: solid if the nominal point is unstable."""
+    """Draw a line at each fill with unstable points, solid if the nominal point is unstable.
+
+    ``bands`` has a row for each fill.
+    """
     nominal = bands["modulus_margin_nominal"].isna()
     for chosen, style, label in (
         (nominal, "-", "nominal loop unstable"),
@@ -233,7 +240,7 @@ def _widened(low: float, high: float) -> tuple[float, float]:
 
 
 def _by_mode(review: "Review") -> list[tuple[str, str, pd.DataFrame]]:
-    """Return colour, name and rows of each slosh mode.
+    """Return colour, name and table rows of each slosh mode of a review.
 
     If there are more modes than colours, the remaining modes share one colour.
     """
@@ -299,7 +306,10 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
 
 
 def _curves(review: "Review") -> list[Curves]:
-    """Return for each command the loop gains at equally spaced fills and at the worst case."""
+    """Return, for each command, the loop gain at some fills and at the worst case.
+
+    The fills are equally spaced, or unstable.
+    """
     count = len(review.fills)
     chosen = sorted(set(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int)))
     unstable = [k for k, point in enumerate(review.nominal) if not point.margins.stable]
@@ -321,14 +331,17 @@ def _curves(review: "Review") -> list[Curves]:
 
 
 def _shade(share: float) -> str:
-    """Return a colour between the palette's first two, which suit both light and dark mode."""
+    """Return a colour between the palette's first two, which suit both light and dark mode.
+
+    ``share`` is 0 for the first colour and 1 for the second.
+    """
     ends = np.array([[0x00, 0x82, 0xC8], [0xE0, 0x6A, 0x10]])
     r, g, b = (ends[0] + share * (ends[1] - ends[0])).round().astype(int)
     return f"#{r:02x}{g:02x}{b:02x}"
 
 
 def _key(figure: "Figure") -> None:
-    """Add a legend with the first fill, the last fill, unstable fills and the worst case."""
+    """Add a legend with the colours of the first fill, last fill, unstable fills and worst case."""
     _, labels = figure.axes[0].get_legend_handles_labels()
     unstable = [k for k, label in enumerate(labels[:-1]) if label.endswith("unstable")]
     last = len(labels) - 1
@@ -367,7 +380,7 @@ def _what_is_drawn(found: "Confirmation") -> str:
 
 
 def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
-    """Draw the peaks of the commands in the simulation of the worst case."""
+    """Draw the peaks of the commands (in ``unit``) in the simulation of the worst case."""
     found = review.confirmation
     ax = figure.subplots()
     commands = [found.command] if found.command else list(review.worst.gain.inputs)

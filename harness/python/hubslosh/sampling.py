@@ -90,13 +90,13 @@ def draw(
 
 
 def _drawn(ranges: Mapping[str, Range], run: int, seed: int) -> dict[str, Any]:
-    """Return the random values of one run from ranges whose limits are absolute numbers."""
+    """Return the random values of run number ``run``; all limits are absolute numbers."""
     shares = iter(uniforms(int(seed), int(run), len(ranges)))
     return {name: _value(of, next(shares)) for name, of in ranges.items()}
 
 
 def _value(of: Range, share: float) -> Any:
-    """Return the value of a range for the uniform random number ``share`` in [0, 1)."""
+    """Return the value of the range ``of`` at the uniform random number ``share`` in [0, 1)."""
     if hasattr(of, "ppf"):
         value = of.ppf(share)
     elif isinstance(of, list):
@@ -108,7 +108,10 @@ def _value(of: Range, share: float) -> Any:
 
 
 def _resolved(ranges: Any, nominal: Any) -> tuple[dict[str, Range], list[str]]:
-    """Return ranges with (low, high) in place of shares such as "10%", and all error messages."""
+    """Return ``ranges`` with (low, high) in place of shares, and all error messages.
+
+    A share such as "10%" is relative to the value that ``nominal`` has for this name.
+    """
     if not isinstance(ranges, Mapping) or not ranges:
         return {}, ["ranges must be (low, high), a share, a list or a distribution for each name"]
     if not isinstance(nominal, Mapping | None):
@@ -272,7 +275,7 @@ def monte_carlo(
 
 
 def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
-    """Call ``outcome`` for one run, and return its results, or the message of the FMU's error."""
+    """Return the results of ``outcome`` for ``values``, or the message if the FMU fails."""
     try:
         found = outcome(dict(values))
     except FmuError as error:
@@ -292,7 +295,10 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _result(value: Any) -> float:
-    """Return an outcome as a float; raise an error for a string, even for a string of digits."""
+    """Return a result of the user's outcome function as a float.
+
+    A string raises TypeError, even if it consists of digits.
+    """
     if isinstance(value, str | bytes | bytearray):
         raise TypeError
     return float(value)
@@ -307,7 +313,11 @@ def _checked(found: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
 def _results(
     pool: Executor, most: int, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield number and results of each run when it is done; up to ``most`` runs are in progress."""
+    """Yield each run's number and results when it is done.
+
+    ``jobs`` yields the number and the drawn values of each run. The processes of ``pool`` call
+    ``outcome``; up to ``most`` runs are in progress.
+    """
     with pool:
         under_way: dict[Future[dict[str, Any]], tuple[int, dict[str, Any]]] = {}
         try:

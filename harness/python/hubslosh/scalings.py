@@ -68,7 +68,6 @@ class Scalings:
     """Finds scalings D and G for a Δ in which each parameter has a given number of copies."""
 
     def __init__(self, counts: Sequence[int]) -> None:
-        """Prepare the constraints; ``counts`` are the numbers of repetitions of each δ in Δ."""
         self.clarabel = solver()
         self.counts = tuple(int(count) for count in counts)
         self.copies = np.repeat(np.arange(len(self.counts)), self.counts)
@@ -211,7 +210,11 @@ def _balanced(N: Complex) -> tuple[Complex, Vector]:
 
 
 def _triangle(matrices: Complex) -> Vector:
-    """Return the triangles of the real symmetric matrices that represent Hermitian matrices."""
+    """Return Hermitian matrices as vectors, in the form that the solver Clarabel needs.
+
+    A Hermitian matrix is represented by a real symmetric matrix of twice the size; the vector is
+    the triangle of this matrix, with off-diagonal elements multiplied by √2.
+    """
     real, imaginary = matrices.real, matrices.imag
     whole = np.concatenate([
         np.concatenate([real, -imaginary], -1), np.concatenate([imaginary, real], -1)

@@ -13,11 +13,10 @@ class ShortTable(pd.DataFrame):
 
     @property
     def _constructor(self) -> Any:
-        """Return the class of selections of the table."""
+        """Return the class of selections of the table, so that pandas keeps this class."""
         return type(self)
 
     def __repr__(self) -> str:
-        """Return the first and last rows."""
         options: list[Any] = ["display.max_rows", MOST, "display.min_rows", MOST]
         options += ["display.max_columns", 8, "display.expand_frame_repr", False]
         with pd.option_context(*options):

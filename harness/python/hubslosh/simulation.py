@@ -42,7 +42,6 @@ class History:
     """
 
     def __init__(self, time: Real, values: Real, slopes: Real | None, hold: bool) -> None:
-        """Store the rows, with the slope after each row; without slopes, interpolate linearly."""
         self.time = time
         self.native = native.History(time, values, slopes, hold)
 

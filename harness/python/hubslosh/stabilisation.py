@@ -59,7 +59,10 @@ Complex = NDArray[np.complex128]
 
 
 def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
-    """Return pole (z plane), residue and states of each slosh mode; equal poles count as one."""
+    """Return pole (z plane), residue and states of each slosh mode of a plant with one command.
+
+    Modes with equal poles count as one.
+    """
     from scipy.linalg import eig
 
     assert one.period is not None
@@ -88,7 +91,11 @@ def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
 def _row(
     one: LinearModel, pole: complex, residue: complex, poles: Complex
 ) -> dict[str, Any] | None:
-    """Return the row of the table for one mode in one loop."""
+    """Return the row of the table for one slosh mode in one loop.
+
+    ``one`` is the loop gain, ``pole`` and ``residue`` belong to the mode (z plane), and ``poles``
+    are the poles of the closed loop.
+    """
     T = one.period
     assert T is not None
 
@@ -126,9 +133,10 @@ def _row(
 
 
 def _solved(value: Any, pole: complex, start: complex, offset: float) -> complex:
-    """Return the root of offset + L(z) near ``start``, by the secant method.
+    """Return the root z of offset + L(z) = 0 near ``start``, by the secant method.
 
-    The method is applied to (z - pole) (offset + L(z)), which is smooth near the pole.
+    ``value`` is the function L. The method is applied to (z - pole) (offset + L(z)), which is
+    smooth near the pole.
     """
 
     def smooth(z: complex) -> complex:
@@ -150,7 +158,7 @@ def _solved(value: Any, pole: complex, start: complex, offset: float) -> complex
 
 
 def _name(states: set[str], tanks: Sequence[str]) -> str:
-    """Return the tanks and the number of a slosh mode from the states that move in it."""
+    """Return the name of a slosh mode, from the states that move in it and the tanks' names."""
     found: dict[str, set[str]] = {}
     for state in states:
         if match := _TANK.fullmatch(state):

@@ -105,7 +105,6 @@ class Margins:
         return float(margins[np.abs(margins).argmin()]) if len(margins) else np.inf
 
     def __str__(self) -> str:
-        """Return the verdict on stability, the margins, and the main crossings."""
         down, up = self.gain_margins
         lines = [
             f"closed loop: {'stable' if self.stable else 'UNSTABLE'}{_neutral_text(self.neutral)}",
@@ -132,7 +131,6 @@ class Margins:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        """Return the verdict on stability and the margins in one line."""
         return f"Margins({'; '.join(str(self).splitlines()[:2])})"
 
 
@@ -222,10 +220,10 @@ Modes = list[tuple[float, float, tuple[str, ...]]]  # Frequency (Hz), damping ra
 
 
 def _controllable_modes(plant: LinearModel, modes: Modes) -> list[Modes]:
-    """Return, for each input, the modes that it excites and that are observable.
+    """Return, for each input of ``plant``, the modes that it excites and that are observable.
 
     Modes with equal frequencies are treated together, because an input excites a combination of
-    them, for example of the modes of two equal tanks.
+    them, for example of the modes of two equal tanks. ``modes`` has all modes of the plant.
     """
     _, B, C, _ = plant
     poles, left, right = eigenvectors(plant)
@@ -350,7 +348,8 @@ def _errors(
 ) -> tuple[Matrix, Matrix]:
     """Return each pole's distance from the limit of stability, and its largest rounding error.
 
-    ``A`` is the closed loop's matrix, or a stack of matrices with as many rows of ``poles``.
+    ``A`` is the closed loop's matrix, or a stack of matrices with as many rows of ``poles``. The
+    limit is the imaginary axis or, if the loop has a sampling ``period``, the unit circle.
     """
     off = np.abs(poles.real if period is None else np.abs(poles) - 1)
     away = np.abs(poles if period is None else poles - 1)
@@ -360,7 +359,10 @@ def _errors(
 
 
 def _may_be_neutral(A: Matrix, poles: NDArray[np.complex128], period: float | None) -> Any:
-    """Return True if rounding errors can move a pole to the limit of stability."""
+    """Return True if rounding errors can move a pole to the limit of stability.
+
+    ``A`` is the closed loop's matrix; for ``period`` see `_errors`.
+    """
     off, most = _errors(A, poles, period)
     return (off <= most).any(axis=-1)
 
@@ -406,7 +408,7 @@ def _moved(gain: LinearModel) -> NDArray[np.complex128]:
 def _largest(poles: NDArray[np.complex128], period: float | None) -> float:
     """Return the largest real part of the poles or, of a sampled model, the largest magnitude.
 
-    ``poles`` has no neutral poles.
+    ``poles`` has no neutral poles; ``period`` is None for a continuous model.
     """
     sizes = poles.real if period is None else np.abs(poles)
     return float(max(sizes, default=-np.inf if period is None else 0.0))
@@ -434,7 +436,10 @@ def _zeros(gain: LinearModel) -> NDArray[np.complex128]:
 
 
 def _frequencies(values: Any, period: float | None) -> Matrix:
-    """Return the frequencies of poles or zeros, rad/s, without 0 and infinity."""
+    """Return the frequencies of poles or zeros, rad/s, without 0 and infinity.
+
+    ``values`` are in the s plane or, if there is a sampling ``period`` (s), in the z plane.
+    """
     values = np.asarray(values, complex)
     values = values[np.isfinite(values) & (values != 0)]
     sizes = np.abs(values.imag) if period is None else np.abs(np.angle(values)) / period
@@ -442,7 +447,7 @@ def _frequencies(values: Any, period: float | None) -> Matrix:
 
 
 def _compiled(model: LinearModel) -> Any:
-    """Return the model in the form that the compiled part of the package evaluates."""
+    """Return ``model`` in the form in which the native library evaluates its transfer function."""
     return Model(*(np.ascontiguousarray(matrix, float) for matrix in model), model.period or 0.0)
 
 
@@ -493,7 +498,10 @@ def _crossings(
 
 
 def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float, float]:
-    """Return the lowest and highest frequency of the search for crossings of a loop gain, rad/s."""
+    """Return the lowest and the highest frequency at which crossings are searched, rad/s.
+
+    ``roots`` has the poles and zeros of the loop gain and the poles of the closed loop.
+    """
     nyquist = np.inf if gain.period is None else np.pi / gain.period
     known = np.concatenate([_frequencies(values, gain.period) for values in roots])
     sizes = np.concatenate([np.abs(values) for values in roots])
@@ -510,7 +518,10 @@ def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float
 
 
 def _nearby_modes(frequency: float, modes: Modes, tanks: tuple[str, ...]) -> str:
-    """Return the names, frequencies and damping ratios of the modes near a frequency (Hz)."""
+    """Return the names, frequencies and damping ratios of the modes near ``frequency`` (Hz).
+
+    ``tanks`` are the names of the tanks, which the names of their modes contain.
+    """
     close = [mode for mode in modes if abs(mode[0] - frequency) <= NEAR * mode[0]]
     if not close:
         return ""
@@ -525,7 +536,10 @@ def _span(values: list[float]) -> str:
 
 
 def _mode_of(state: str, tanks: tuple[str, ...]) -> str:
-    """Return the name of the mode to which a state belongs, or the state's name if unknown."""
+    """Return the name of the mode to which a state belongs, or the state's name if unknown.
+
+    For example, the state tank[1].p[2,1] belongs to mode 2 of the first of ``tanks``.
+    """
     if found := re.fullmatch(r"slosh\.\w+\[(\d+)\]", state):
         return f"slosh mode {found[1]}"
     shown = short_name(state, tanks)
@@ -542,9 +556,10 @@ def _delay_margin(
 ) -> float:
     """Return the smallest additional delay, s, at which a sampled loop becomes unstable.
 
-    At a frequency at which an eigenvalue of L has the magnitude 1, a delay rotates the eigenvalue
-    to -1. This is exact only for whole cycles, because of the zero-order hold. Frequency and delay
-    are therefore refined.
+    ``delayed`` returns the loop gain with an additional delay, ``gain`` is the loop gain without
+    it, and ``closed`` has the poles of the closed loop. At a frequency at which an eigenvalue of L
+    has the magnitude 1, a delay rotates the eigenvalue to -1. This is exact only for whole cycles,
+    because of the zero-order hold. Frequency and delay are therefore refined.
     """
     least = np.inf
     with np.errstate(all="ignore"):  # an eigenvalue may be 0
@@ -559,7 +574,10 @@ def _delay_margin(
 def _exact_delay(
     delayed: Callable[[float], LinearModel], gain: LinearModel, delay: float, w: float
 ) -> float:
-    """Refine an estimate of the delay (s) and the frequency w (rad/s) at which det(I + L) is 0."""
+    """Refine an estimate of the delay (s) and the frequency w (rad/s) at which det(I + L) is 0.
+
+    L is the loop gain: ``gain`` without the delay, and ``delayed`` returns it for any delay.
+    """
     period = gain.period or 0.0
 
     def refined_delay(delay: float) -> float:
@@ -585,9 +603,10 @@ def _exact_delay(
 def _unit_eigenvalues(
     gain: LinearModel, closed: NDArray[np.complex128]
 ) -> list[tuple[float, float]]:
-    """Return frequencies (rad/s) at which an eigenvalue of L has the magnitude 1.
+    """Return each frequency at which an eigenvalue of L has the magnitude 1, with a delay.
 
-    Each item is the delay (s) that rotates the eigenvalue to -1, followed by the frequency.
+    Each item is the delay (s) that rotates the eigenvalue to -1, followed by the frequency (rad/s).
+    ``closed`` has the poles of the closed loop.
     """
     period = gain.period or 0.0
     roots = [np.linalg.eigvals(gain.A).astype(complex), closed]

@@ -58,17 +58,14 @@ class Store:
     """The folder of a study, which is locked within a ``with`` statement."""
 
     def __init__(self, folder: str | Path, seed: int, ranges: Mapping[str, str]) -> None:
-        """Lock the folder for a study; ``ranges`` has a string that identifies each range."""
         # an absolute path, because the working directory changes while an FMU is loaded
         self.path = Path(folder).absolute()
         self._store = NativeStore.study(self.path, seed, list(ranges.items()))
 
     def __enter__(self) -> Self:
-        """Return the store itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Unlock the folder."""
         self._store.close()
 
     def rows(self, draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
@@ -106,10 +103,10 @@ class Store:
 def _row(
     data: bytes, draw: Mapping[str, Any], damage: str | None
 ) -> tuple[dict[str, Any], str | None]:
-    """Return the results of a stored run, or an empty dictionary and the reason for its rejection.
+    """Return the results of a stored run, and None; or the reason why it cannot be used.
 
-    The reason is a value that differs from the drawn value or, if there is none, the ``damage`` of
-    the file.
+    The reason is a stored value that differs from the drawn value in ``draw`` or, if there is none,
+    the ``damage`` of the file whose content is ``data``.
     """
     try:
         stored = json.loads(data)

@@ -86,7 +86,9 @@ def _candidates(
     """Return candidate filters, each with its description, for one slosh mode.
 
     The filters are placed at an unstable slosh mode or, if all modes are stable, at the mode with
-    the largest loop gain.
+    the largest loop gain. ``slosh`` is the table of slosh modes in the loop, ``rigid`` has the
+    frequencies (Hz) at which the loop gain without slosh crosses 0 dB, and ``period`` is the
+    sampling period, s.
     """
     if slosh.empty:
         return []
@@ -110,8 +112,8 @@ def _candidates(
 def _second_order(f: float, zeta: float, period: float, notch: float | None) -> LinearModel:
     """Return the low-pass w²/(s² + 2 ζ w s + w²), or a notch with this denominator, sampled.
 
-    ``notch`` is the gain of the notch at its centre frequency ``f`` (Hz), or None for the low-pass.
-    Sampling is by Tustin's rule, prewarped at ``f``.
+    ``f`` is the frequency w in Hz, ``zeta`` is ζ, and ``notch`` is the gain of the notch at ``f``,
+    or None for the low-pass. Sampling with ``period`` (s) is by Tustin's rule, prewarped at ``f``.
     """
     w = 2 / period * np.tan(np.pi * f * period)
     A, B = np.array([[0.0, 1.0], [-w * w, -2 * zeta * w]]), np.array([[0.0], [1.0]])
@@ -142,7 +144,10 @@ def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex
 def _distance(
     point: "Point", z: NDArray[np.complex128], L: NDArray[np.complex128], law: LinearModel
 ) -> float:
-    """Return the modulus margin at an operating point with a filter; it is negative if unstable."""
+    """Return the modulus margin with the filter ``law`` in the loop; negative if unstable.
+
+    ``point`` is the operating point; ``L`` is the loop gain without the filter at the points ``z``.
+    """
     size = _largest(_moved(_series(point.gain, law)), point.gain.period)
     if size >= 1:
         return -float(np.log(size) / point.loop.period)

@@ -55,7 +55,6 @@ class Tank:
     _case: "TankCase" = field(repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the arguments from which another process computes a copy of the tank."""
         return _solve_case, (self._case,)
 
     @cached_property
@@ -93,7 +92,6 @@ class Tank:
         return table
 
     def __repr__(self) -> str:
-        """Return mass and fill of the liquid, the specific force, and the first modes."""
         from .short import rows
 
         what = f"{self.all['name']}: " if self.all.get("name") else ""
@@ -207,7 +205,7 @@ class Tank:
         return self._parameters("Spacecraft")
 
     def _prepare(self) -> list[str]:
-        """Compute the parameters of Spacecraft for a tank with modes, and return the warnings."""
+        """Compute Spacecraft's parameters for this tank, and return the warnings."""
         if not self.all["modes"]:
             return list(self._solved.warnings())
         found, warned = self._solved.parameters("Spacecraft")

@@ -116,7 +116,7 @@ class _Bob:
 
 @dataclass(frozen=True)
 class _Tank:
-    """A tank: origin, axes (columns x, y, e), rigid liquid, and ``g_ref`` for damping ratios."""
+    """A tank: origin (m), axes (columns x, y, e), rigid liquid, ``g_ref`` for damping ratios."""
 
     number: int
     origin: Matrix
@@ -257,7 +257,7 @@ class _Craft:
 
 
 def _cross(v: ArrayLike) -> Matrix:
-    """Return the matrix of a cross product."""
+    """Return the matrix of the cross product v ×."""
     x, y, z = np.asarray(v, float)
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
@@ -268,20 +268,26 @@ def _twice(w: Matrix) -> Matrix:
 
 
 def _gyroscopic(M: Matrix, w: Matrix) -> Matrix:
-    """Return the gyroscopic force and torque about O of a rigid body with mass matrix M."""
+    """Return gyroscopic force and torque about O of a rigid body with the mass matrix M (6 × 6).
+
+    ``w`` is its angular velocity, rad/s.
+    """
     found: Matrix = _twice(w) @ M[:, 3:] @ w
     return found
 
 
 def _gyroscopic_slope(M: Matrix, w: Matrix) -> Matrix:
-    """Return the derivative of `_gyroscopic` with respect to w."""
+    """Return the derivative of `_gyroscopic` with respect to the angular velocity w (6 × 3)."""
     momentum = (M[:, 3:] @ w).reshape(2, 3)
     found: Matrix = _twice(w) @ M[:, 3:] - np.vstack([_cross(of) for of in momentum])
     return found
 
 
 def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
-    """Return the mass matrix of a rigid body about O."""
+    """Return the mass matrix (6 × 6) of a rigid body about O.
+
+    Its centre of mass is at ``center``, m; ``own`` is its inertia about this centre, kg·m².
+    """
     C = mass * _cross(center)
     return np.block([[mass * np.eye(3), -C], [C, own - C @ _cross(center)]])
 
@@ -289,7 +295,7 @@ def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
 def _read(
     model: str | Path, parameters: Parameters, held: tuple[Matrix, Matrix] | None = None
 ) -> _Craft:
-    """Read the craft and its liquid from the FMU with the given parameters.
+    """Read the craft and its liquid from the FMU ``model`` with the given parameters.
 
     ``held`` has accelerations as `_Craft.accelerations` returns them, which replace the craft's own
     accelerations in the computation of damping ratios and frequencies.
@@ -421,7 +427,10 @@ def _read(
 
 
 def _slope(ends: tuple[Matrix, Matrix], size: Matrix, step: float) -> Matrix:
-    """Return a difference quotient, in which differences due to rounding are set to 0."""
+    """Return (ends[1] - ends[0])/step; differences that are rounding errors count as 0.
+
+    ``size`` is the size of the numbers, to which rounding errors are relative.
+    """
     rise = ends[1] - ends[0]
     rise[np.abs(rise) <= ALONE * size] = 0.0
     found: Matrix = rise / step
@@ -431,8 +440,8 @@ def _slope(ends: tuple[Matrix, Matrix], size: Matrix, step: float) -> Matrix:
 def _derivative(craft: _Craft, step: float, ends: tuple[_Craft, _Craft]) -> dict[str, float]:
     """Return the derivatives of all uncertain parameters by one FMU parameter of a tank.
 
-    ``ends`` has the craft at both ends of a step of this FMU parameter. A change of the rigid
-    liquid counts as a change of the dry craft, because only the sum of both acts.
+    ``ends`` has the craft before and after a change of this FMU parameter by ``step``. A change of
+    the rigid liquid counts as a change of the dry craft, because only the sum of both acts.
     """
     of_bobs = [bob.name(kind) for bob in craft.bobs for kind in KINDS]
     values, *at = (np.array([c.values[of] for of in of_bobs]) for c in (craft, *ends))
@@ -476,7 +485,11 @@ OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge
 def _converted(
     model: str | Path, given: Parameters, craft: _Craft, table: "pd.DataFrame"
 ) -> tuple["pd.DataFrame", list[str]]:
-    """Return the derivatives of uncertain parameters by FMU parameters, and error messages."""
+    """Return the derivatives of uncertain parameters by FMU parameters, and error messages.
+
+    The rows of ``table`` name the FMU parameters, for example because `identify` has estimated
+    them. ``craft`` was read from the FMU ``model`` with the parameters ``given``.
+    """
     import pandas as pd
 
     slopes: dict[str, dict[str, float]] = {}
@@ -507,9 +520,10 @@ def _converted(
 
 
 class _Equations:
-    """Linear equations in which products with uncertain parameters become channels of Δ.
+    """Linear equations in which each product with an uncertain parameter adds a row to Δ.
 
-    A signal is a row of coefficients of states, inputs, X and channels.
+    Such a row is called a channel. A signal is a row of coefficients of states, inputs, the craft's
+    acceleration X and channels.
     """
 
     def __init__(self, width: int, values: Mapping[str, float], spread: "pd.DataFrame") -> None:
@@ -542,8 +556,8 @@ def _partitioned(
 ) -> tuple[Matrix, list[int], tuple[str, ...]]:
     """Return M from (states, channels, all inputs) to (derivatives, channels, all outputs).
 
-    Also return the number of channels of each column of ``spread``, and the names of the states.
-    At the operating point the acceleration is γ X_f + X_c.
+    A channel is a row of Δ. Also return the number of channels of each column of ``spread``, and
+    the names of the states. At the operating point the acceleration is γ X_f + X_c.
     """
     states = [*OUTPUTS, *(
         f"tank[{bob.tank}].{of}[{bob.mode},{i}]"
@@ -659,7 +673,10 @@ def _partitioned(
 
 
 def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
-    """Return which of the first ``inside`` signals depend on an input and affect an output."""
+    """Return a mask of the first ``inside`` signals: those between an input and an output.
+
+    Such a signal depends on an input of M and affects an output of M, directly or through others.
+    """
     size = np.abs(M).max(axis=1, keepdims=True)
     joined = np.abs(M) > 1e-14 * size
     reached = joined[:inside, inside:].any(axis=1)
@@ -672,9 +689,10 @@ def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
 
 
 def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int]]:
-    """Return M in which each repeated block of channels has its smallest number of copies.
+    """Return M with the smallest number of copies of each uncertain parameter, and these numbers.
 
-    A repeated real block is like a block of integrators, so that it can be reduced to its
+    ``counts`` has the present numbers; the copies begin at the row and column ``first`` of M. A
+    repeated real block is like a block of integrators, so that it can be reduced to its
     controllable and observable part. Each block is reduced with the others unchanged.
     """
     counts = list(counts)
@@ -787,7 +805,6 @@ class UncertainModel:
         return sum(self.counts)
 
     def __repr__(self) -> str:
-        """Return the sizes of the model, the blocks of Δ, and the names of inputs and outputs."""
         M, width = self.M, self.order
         copies = names([
             f"{short_name(n, self.tanks)} × {c}"
@@ -867,7 +884,10 @@ class UncertainModel:
                        C=plant.C * scale)  # fmt: skip
 
     def _plants(self, deltas: Matrix) -> LinearModel:
-        """Return the linear model at Δ with the states of M; a stack of them for many Δ as rows."""
+        """Return the linear model at the Δ ``deltas``, or a stack of models if ``deltas`` has rows.
+
+        The states are those of M, whose slosh states are scaled differently from the FMU's.
+        """
         width, (A, B, C, D), n = self.order, self.M, len(self.M.A)
         D_x = np.repeat(deltas, self.counts, axis=-1)
         seen = np.hstack([C[:width], D[:width, width:]])
@@ -881,7 +901,7 @@ class UncertainModel:
         )  # fmt: skip
 
     def _scale(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
-        """Return the ratios of the states of M to the states of the FMU.
+        """Return the ratios of the states of M to the states of the FMU at ``delta``.
 
         For a slosh mode the ratio is the slosh mass times the pendulum length.
         """
@@ -895,15 +915,18 @@ class UncertainModel:
         return np.array([sizes[int(of[1]), int(of[2])] if of else 1.0 for of in found])
 
     def _ratio(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return the ratio of a mode's frequency to its nominal value."""
+        """Return the frequency of a slosh mode in ``values`` divided by its nominal value."""
         return values[bob.name("frequency")] / self._craft.values[bob.name("frequency")]
 
     def _acceleration(self, values: Mapping[str, float]) -> Matrix:
-        """Return X at the operating point."""
+        """Return specific force at O and angular acceleration at the operating point."""
         return values[FACTOR] * self._X_f + self._X_c
 
     def _length(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return the pendulum length (m) with which gravity keeps its share of ω²."""
+        """Return the pendulum length (m) with which gravity keeps its share of ω².
+
+        The frequency of the mode ``bob`` is in ``values``.
+        """
         craft, axis = self._craft, self._craft.tanks[bob.tank].axes[:, 2]
         before, now = (
             axis @ craft.specific(self._acceleration(of), craft.place(bob, of))
@@ -1156,7 +1179,11 @@ class UncertainModel:
         return Certificate(size, worst, ends, data, solved)
 
     def _checked(self, loop: Loop, K: LinearModel) -> "dict[str, NDArray[Any]]":
-        """Return M, the controller and the loop gain at Δ = 0, after checking the loop."""
+        """Return the matrices of M, of the controller ``K`` and of the loop gain at Δ = 0, by name.
+
+        Also return bounds and copies of each δ, and the loop's period and delay, s. A certificate
+        is checked with these numbers.
+        """
         gain = loop._gain(self.at(np.zeros(len(self.counts))), K)
         systems = {"M": self.M, "K": K, "L": gain}
         found = {f"{name}_{part}": matrix for name, system in systems.items()
@@ -1309,7 +1336,10 @@ def _kind(name: str) -> str:
 
 
 def _unknown(name: str, values: Mapping[str, float]) -> str:
-    """Return an error message with advice for a name that is no uncertain parameter."""
+    """Return an error message with advice for a name that is no uncertain parameter.
+
+    ``values`` has all parameters that can be uncertain, for the proposal of a similar name.
+    """
     if instead := slosh_mass_error(name):
         return f"{name} {instead}"
     return f"{name} is no uncertain parameter{did_you_mean(name, values)}"

@@ -49,7 +49,7 @@ class View:
     path: Path | None = None
 
     def _repr_html_(self) -> str:
-        """Return the page in an HTML frame, which IPython shows."""
+        """Return the page in an HTML frame, which notebooks show."""
         return (
             f'<iframe title="A run of an FMU" style="width:100%;height:{HEIGHT}px;border:0" '
             f'srcdoc="{html.escape(self.html)}"></iframe>'

@@ -136,7 +136,6 @@ class Wheel:
         return f"axis ({axis}), up to {self.max_torque:g} N·m and {most:.4g} N·m·s{bias}"
 
     def __repr__(self) -> str:
-        """Return a one-line description of the wheel."""
         return f"Wheel({self.describe()})"
 
 

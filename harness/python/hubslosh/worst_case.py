@@ -86,7 +86,6 @@ class Confirmation:
         return self._comparison() + (left if self.out_of_range else "")
 
     def __str__(self) -> str:
-        """Return the comparison with the prediction, and how tanks left their model's range."""
         text = "; the simulation left the range of its model: " if self.out_of_range else ""
         return self._comparison() + text + "; ".join(self.out_of_range)
 
@@ -152,7 +151,10 @@ def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
 
 
 def _corners(points: "Sequence[Point]") -> list[tuple[int, Vector]]:
-    """Return for each of the worst fills the corner at which each quantity has its worse end."""
+    """Return a corner of the ranges for each of the worst fills, with the fill's number.
+
+    At the corner each quantity is at the end of its range at which the loop is less stable.
+    """
     estimates = []
     for fill in {point.fill for point in points}:
         here = [point for point in points if point.fill == fill]
@@ -251,7 +253,10 @@ def _compare(
 
 
 def _showing(gain: LinearModel, pole: complex) -> list[str]:
-    """Return the commands in which a closed-loop pole is prominent according to its eigenvector."""
+    """Return the commands in which the closed-loop pole ``pole`` (z plane) is prominent.
+
+    They follow from the eigenvector of the pole; ``gain`` is the loop gain.
+    """
     A, B, C, D = gain
     closing = np.linalg.solve(np.eye(len(D)) + D, C)
     values, vectors = np.linalg.eig(A - B @ closing)
@@ -260,7 +265,7 @@ def _showing(gain: LinearModel, pole: complex) -> list[str]:
 
 
 def _scaled(model: LinearModel, output: int, factor: float) -> LinearModel:
-    """Return a model with one of its outputs multiplied by a factor."""
+    """Return ``model`` with the output of index ``output`` multiplied by ``factor``."""
     scale = np.ones((len(model.D), 1))
     scale[output] = factor
     return replace(model, C=scale * model.C, D=scale * model.D)
@@ -271,7 +276,7 @@ def _followed(
 ) -> complex:
     """Return the closed-loop pole (z plane) into which ``pole`` moves while a gain changes.
 
-    ``factors`` has the first and the last factor of the gain of one command; ``pole`` is a pole at
+    ``factors`` has the first and the last factor of the gain of ``command``; ``pole`` is a pole at
     the first factor. The factor changes in small steps, so that the pole can be followed. The
     followed pole need not have the slowest decay at the last factor, because a slosh mode with
     little damping may decay more slowly.
@@ -285,8 +290,9 @@ def _followed(
 def _critical(gain: LinearModel) -> complex:
     """Return the pole of a closed loop that grows fastest, or decays slowest (z plane).
 
-    In a stable loop it is an oscillating pole, if the loop has one; a negative pole oscillates with
-    half the sampling rate. Neutral poles do not count, unless all poles are neutral.
+    ``gain`` is the loop gain. In a stable loop the result is an oscillating pole, if the loop has
+    one; a negative pole oscillates with half the sampling rate. Neutral poles do not count, unless
+    all poles are neutral.
     """
     poles = _closed(gain)
     neutral = _is_neutral(gain, poles)
@@ -298,10 +304,11 @@ def _critical(gain: LinearModel) -> complex:
 
 
 def _fit(signals: Vector, known: NDArray[np.complex128], start: complex) -> complex:
-    """Fit signals by a sum of powers of one unknown pole and of known poles (z plane).
+    """Return the pole z for which ``signals`` are best fitted by a sum of powers of poles.
 
-    The unknown pole is returned. The method is variable projection: for each trial value of the
-    pole, the amplitudes follow from linear least squares.
+    The poles ``known`` are part of the sum, too; the search begins at ``start``. The method is
+    variable projection: for each trial value of the pole, the amplitudes follow from linear least
+    squares.
     """
     from scipy.optimize import least_squares
 
