@@ -69,7 +69,10 @@ LOOKED_AT = (
 
 
 def open_page(browser: Browser, file: Path, width: int, scheme: str) -> Page:
-    """Open a page; a request for anything outside the book's folder is an error."""
+    """Open a page of the book; fail if it requests anything outside the book's folder.
+
+    ``width`` is the width of the window, px; ``scheme`` is "light" or "dark".
+    """
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     fetched: list[str] = []
     page.on("request", lambda request: fetched.append(request.url))
@@ -80,7 +83,7 @@ def open_page(browser: Browser, file: Path, width: int, scheme: str) -> Page:
 
 
 def search(page: Page, book: Path, words: str) -> list[str]:
-    """Return the addresses of the first hits of a search."""
+    """Type ``words`` into the search of the ``book``; return the addresses of the first hits."""
     page.goto(f"{(book / 'search.html').absolute().as_uri()}?q={quote(words)}")
     page.wait_for_function("/finished|did not match/.test(document.body.innerText)")
     links = page.locator("ul.search > li > a").evaluate_all("all => all.map(a => a.href)")
@@ -91,7 +94,6 @@ def search(page: Page, book: Path, words: str) -> list[str]:
 
 
 def main() -> None:
-    """Check one book; exit with a message if a search fails or a page is too wide."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("book", type=Path, help="output folder of `hubslosh book --out`")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of the pages")

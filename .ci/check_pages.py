@@ -210,10 +210,9 @@ def commands(block: Block) -> list[tuple[int, str]]:
 
 
 class Reader:
-    """A reader's machine, with the wheel and the system's programs."""
+    """The machine of a reader who follows the pages: the wheel and the system's programs."""
 
     def __init__(self, folder: Path, wheel: Path, find_links: Path | None) -> None:
-        """Install the wheel with the packages that the pages use."""
         self.folder = folder
         venv = folder / "venv"
         subprocess.run([sys.executable, "-m", "venv", venv], check=True)
@@ -240,7 +239,7 @@ class Reader:
         self.fmus = [Path(line) for line in listed.split()]
 
     def prepare(self, page: str) -> Path:
-        """Create a page's folder with the files that the pages name, and return it."""
+        """Create a folder for a page, with the files that the page names, and return it."""
         folder = self.folder / page.replace("/", "-").removesuffix(".md")
         (folder / "dist").mkdir(parents=True)
         for fmu in self.fmus:
@@ -255,7 +254,6 @@ class Reader:
         return folder
 
     def run(self, arguments: list, folder: Path) -> tuple[int, str]:
-        """Run a command in a folder; return its exit code and its output."""
         done = subprocess.run(
             arguments, cwd=folder, env=self.environment, text=True, encoding="utf-8",
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, check=False,
@@ -281,23 +279,21 @@ for page, line, code in json.loads(Path(sys.argv[1]).read_text()):
 
 
 class Check:
-    """A check of pages: its failures, and the list entries that matched a command."""
+    """Runs the code of pages, and counts failures and the list entries that matched a command."""
 
     def __init__(self, reader: Reader, include_slow: bool) -> None:
-        """Store the reader; ``include_slow``: also run commands of more than ten seconds."""
         self.reader, self.include_slow = reader, include_slow
         self.failures: list[str] = []
         self.used: set[str] = set()
         self.durations: list[tuple[float, str]] = []
 
     def matches(self, patterns: object, command: str) -> str | None:
-        """Return the list entry that a command matches, and record it as used."""
+        """Return the first of ``patterns`` that matches the command, and record it as used."""
         found = next((p for p in patterns if re.match(p, command)), None)
         self.used |= {found} if found else set()
         return found
 
     def page(self, page: str) -> None:
-        """Run all blocks of a page."""
         folder = self.reader.prepare(page)
         own = blocks(page)
         prelude = [Block(page, 1, "python", GIVEN[page])] if page in GIVEN else []
@@ -323,7 +319,7 @@ class Check:
             self._python(page, [*prelude, *before, *python], folder)
 
     def _before(self, block: Block) -> str:
-        """Return the paragraph before a block."""
+        """Return the paragraph before a block, which says what the block is for."""
         lines = (ROOT / block.page).read_text().splitlines()[: block.line - 2]
         return " ".join(lines[-4:])
 
@@ -376,7 +372,6 @@ class Check:
 
 
 def main() -> None:
-    """Run the pages."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

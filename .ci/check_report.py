@@ -18,7 +18,7 @@ RANGE = "document.querySelector('.plot').layout.xaxis.range.map(Number)"
 
 
 def clicks(page: Page) -> None:
-    """Check hover, legend, zoom and reset of the first figure, and the table of contents."""
+    """Check that hover, legend, zoom, reset and table of contents of a report work."""
     plot = page.locator(".plot").first
     plot.scroll_into_view_if_needed()
     point = plot.locator(".points path, .point path")
@@ -103,7 +103,10 @@ def background(page: Page) -> int:
 
 
 def view(browser: Browser, report: Path) -> str:
-    """Follow the link to the run with the largest radial slosh angle; return its name."""
+    """Follow the report's link to the run with the largest radial slosh angle.
+
+    Check the page of this run, and return the run's name.
+    """
     with (report.parent / "runs.csv").open(newline="") as table:
         runs = [row for row in csv.DictReader(table) if float(row["peak_radial_angle_deg"]) > 0]
     largest = max(runs, key=lambda row: float(row["peak_radial_angle_deg"]))
@@ -119,7 +122,6 @@ def view(browser: Browser, report: Path) -> str:
 
 
 def main() -> None:
-    """Check one report; exit with a message at the first fault."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("report", type=Path)
     parser.add_argument("--pages", type=int, help="largest number of printed pages")

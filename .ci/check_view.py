@@ -54,7 +54,7 @@ VIEWS = ((1400, "light"), (400, "light"), (1400, "dark"))
 
 @dataclass(frozen=True)
 class Drawn:
-    """Expected position of one slosh mode's bob in body axes, m."""
+    """Expected position of one slosh mode's bob (the drawn slosh mass) in body axes, m."""
 
     hinge: Vector
     bob: Vector
@@ -67,7 +67,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Mode:
-    """Data of one slosh mode: m, m, m/rad, m⁴."""
+    """Data of one slosh mode: heights and lengths in m, ``wave`` in m/rad, ``moment`` in m⁴."""
 
     hinge: float
     length: float
@@ -77,7 +77,10 @@ class Mode:
 
 
 def cylinder(n: int, radius: float, depth: float) -> Mode:
-    """Return mode n (from 0) of an upright cylinder, with heights from its bottom (NASA SP-106)."""
+    """Return mode ``n`` (from 0) of an upright cylinder (NASA SP-106); heights from its bottom.
+
+    ``radius`` and ``depth`` (of the liquid) are in m.
+    """
     xi = XI[n]
     u = xi * depth / radius
     length = radius / (xi * math.tanh(u))
@@ -88,7 +91,7 @@ def cylinder(n: int, radius: float, depth: float) -> Mode:
 
 @dataclass(frozen=True)
 class Case:
-    """A run, the options of its page, and a function that computes its bobs from the table."""
+    """A run, the options of its page, and a function from a row of its table to expected bobs."""
 
     name: str
     fmu: str
@@ -105,7 +108,11 @@ class Case:
 
 
 def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
-    """Return the bob of the bench's tank from the sines of slosh angles, displacements over l."""
+    """Return the bob of the bench's tank at one row of the table.
+
+    ``sines`` has, for each mode, the sines of both slosh angles, which are displacements over
+    length.
+    """
     radius, depth, arm = 0.163 / 2, 0.1, 0.225
     data = [cylinder(n, radius, depth) for n in range(len(sines))]
     p = [(x, y, -math.sqrt(1 - x * x - y * y)) for x, y in sines]
@@ -113,7 +120,7 @@ def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
 
 
 def sweep(row: Row) -> list[list[Drawn]]:
-    """Return the bob of the sweep, which has one mode."""
+    """Return the bob of the sweep, which has one mode, at one row of the table."""
     return bench(row, [(math.sin(row["slosh_angle_radial"]), math.sin(row["slosh_angle"]))])
 
 
@@ -128,9 +135,9 @@ def four(row: Row) -> list[list[Drawn]]:
 
 
 def slew(row: Row) -> list[list[Drawn]]:
-    """Return the bobs of two tanks.
+    """Return the bobs of two tanks at one row of the table.
 
-    The lower is given by its modes, the upper by diameter and depth, and turned by 90°.
+    The lower tank is given by its modes, the upper one by diameter and depth, and turned by 90°.
     """
     # m l of the first tank follows from the cylinder to which its wave and length belong.
     given = Mode(0.136534, 0.248039, 0.376618, cylinder(0, 0.45, 0.6).moment)
@@ -147,15 +154,20 @@ def slew(row: Row) -> list[list[Drawn]]:
 
 
 def modes(row: Row, prefix: str, data: list[Mode], at: Vector, level: float) -> list[Drawn]:
-    """Return the bobs of a tank's modes, computed from their directions p in the table."""
+    """Return the bobs of a tank, computed from the directions of its pendulums in ``row``.
+
+    ``prefix`` is the tank's name in the table. ``data`` has its modes, ``at`` its position, and
+    ``level`` the height of its free surface, m.
+    """
     p = [[row[f"{prefix}.p[{n},{i}]"] for i in (1, 2, 3)] for n in range(1, len(data) + 1)]
     return draw_modes(data, p, at, level)
 
 
 def draw_modes(data: list[Mode], p: Sequence[Vector], at: Vector, level: float) -> list[Drawn]:
-    """Return the bobs of a tank's modes from the pendulums' directions.
+    """Return the bobs of a tank's modes from the directions ``p`` of their pendulums.
 
-    The wave at the wall is the sum over all modes.
+    The tank is at ``at``, and its free surface at the height ``level``, m. The wave at the wall is
+    the sum over all modes.
     """
     angles = [(math.asin(one[0]), math.asin(one[1])) for one in p]
     wall = [sum(mode.wave * a[i] for mode, a in zip(data, angles, strict=True)) for i in (0, 1)]
@@ -177,12 +189,12 @@ def drain(row: Row) -> list[list[Drawn]]:
 
 
 def pulse(t: float, begin: float, end: float) -> float:
-    """Return a smooth pulse with values from 0 to 1."""
+    """Return a smooth pulse at the time ``t``: 0 before ``begin`` and after ``end``, 1 halfway."""
     return math.sin(math.pi * (t - begin) / (end - begin)) ** 2 if begin < t < end else 0.0
 
 
 def torques(t: float) -> Row:
-    """Return the torques of a slew about three axes under thrust."""
+    """Return the torques, N·m, of a slew about three axes under thrust at the time ``t``, s."""
     return {
         "torque[1]": 24 * (pulse(t, 2, 14) - pulse(t, 14, 26)),
         "torque[2]": 16 * (pulse(t, 5, 17) - pulse(t, 17, 29)),
@@ -192,13 +204,13 @@ def torques(t: float) -> Row:
 
 
 def shaken(t: float) -> Row:
-    """Return the force that shakes a tank sideways while it drains."""
+    """Return the force, N, that shakes a tank sideways while it drains, at the time ``t``, s."""
     flow = 4.5 if 2 < t < 58 else 0.0
     return {"mass_flow": flow, "a[1]": 0.25 * math.sin(4.4 * t)}
 
 
 def pushed(t: float) -> Row:
-    """Return the force that shakes a tank in two directions one after the other."""
+    """Return the force, N, that shakes a tank in two directions one after the other."""
     return {
         "a[1]": 0.06 * math.sin(3.9 * t) * pulse(t, 0, 8),
         "a[2]": 0.2 * pulse(t, 5, 6) - 0.2 * pulse(t, 6, 7),
@@ -227,7 +239,7 @@ TWO_TANKS = (
 
 
 def settings(text: str) -> list[str]:
-    """Return the command's flags for settings that spaces separate."""
+    """Return the options of the command for settings ``NAME=VALUE`` that spaces separate."""
     return [part for name in text.split() for part in ("--set", name)]
 
 
@@ -280,7 +292,7 @@ CASES = (
 
 
 def in_sphere(binary: Path, folder: Path) -> Case:
-    """Return a run of a sphere filled to 0.14 m with the modes from the tank solver."""
+    """Return the case of a sphere filled to 0.14 m, with modes of the tank solver."""
     tank = Path(__file__).parents[1] / "harness/tank/examples/sphere.toml"
     file, fill, radius, density = folder / "sphere.toml", 0.14, 0.3, 1004.0
     command = [binary, "tank", tank, "--fill", str(fill), "--modes", "2", "--parameters", file]
@@ -313,13 +325,15 @@ def in_sphere(binary: Path, folder: Path) -> Case:
 
 
 def rows(file: Path) -> list[Row]:
-    """Return the rows of a table."""
     with file.open(newline="") as text:
         return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(text)]
 
 
 def record(case: Case, binary: Path, fmus: Path, folder: Path) -> tuple[Path, Path]:
-    """Simulate the case and write its page; return the paths of the CSV table and the page."""
+    """Simulate the case and write its page; return the paths of the CSV table and the page.
+
+    ``binary`` is the program, and ``fmus`` the folder of FMUs.
+    """
     run, page = folder / f"{case.name}.parquet", folder / f"{case.name}.html"
     drive = []
     if case.inputs:
@@ -364,10 +378,11 @@ def first_moment(section: list[list[float]], radius: float) -> float:
 
 
 def compare(page: Page, case: Case, row: Row, reach: float) -> tuple[float, float]:
-    """Return two errors of the drawn scene.
+    """Return two errors of the scene that a page draws at one row of the table.
 
-    The first is the largest distance from the table's positions, m. The second is the relative
-    difference between the liquid's shift by the surface and its shift by the pendulums.
+    The first is the largest distance of a bob from its position according to the table, m. The
+    second is the relative difference between the liquid's shift by the drawn surface and its shift
+    by the pendulums. Allowed distances are relative to ``reach``, the size of the scene, m.
     """
     page.evaluate(f"hubsloshView.seek({row['time']!r})")
     tanks = page.evaluate("hubsloshView.read()")
@@ -400,7 +415,7 @@ def compare(page: Page, case: Case, row: Row, reach: float) -> tuple[float, floa
 
 
 def keys(page: Page) -> None:
-    """Check by keyboard that the page plays, pauses, steps, jumps and turns the view."""
+    """Check that keys play, pause, step and jump in the page, and turn the view."""
     now = "hubsloshView.now"
     page.keyboard.press("Home")
     assert page.evaluate(f"{now} === hubsloshView.first")
@@ -455,7 +470,6 @@ def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str
 
 
 def main() -> None:
-    """Check all cases; exit with a message if a drawing differs from its table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("binary", type=Path, help="the program hubslosh")
     parser.add_argument("fmus", type=Path, help="folder of the packed FMUs")

@@ -40,10 +40,9 @@ FMUS = ("HubSlosh", "Spacecraft", "SloshTank")
 
 
 class Machine:
-    """An environment with only the wheel and the system's programs."""
+    """A virtual environment with only the wheel and the system's programs."""
 
     def __init__(self, folder: Path) -> None:
-        """Create the environment."""
         self.folder = folder
         venv = folder / "venv"
         subprocess.run([sys.executable, "-m", "venv", venv], check=True)
@@ -81,14 +80,16 @@ class Machine:
 
 
 def within(what: str, seconds: float, limit: float) -> None:
-    """Print a duration, and end the program if it is above ``limit``."""
+    """Print a duration in s; end the program with an error if it is above ``limit``, s.
+
+    ``what`` says what took this time.
+    """
     print(f"{what}: {seconds:.2f} s (allowed: {limit:g} s)", flush=True)
     if seconds > limit:
         sys.exit(f"error: {what}: more than {limit:g} s")
 
 
 def main() -> None:
-    """Check the wheel in a new environment."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -102,7 +103,7 @@ def main() -> None:
 
 
 def check(machine: Machine, args: argparse.Namespace) -> None:
-    """Use all parts of the wheel."""
+    """Use every part of the wheel once: its command, its FMUs, the package and its examples."""
     run, python = machine.run, machine.python
     begin = time.monotonic()
     source = (

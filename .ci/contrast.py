@@ -49,7 +49,10 @@ OVER = """() => {
 
 
 def findings(page: Page, axe: Path) -> tuple[list[str], int]:
-    """Return the findings on the page, and the number of texts with enough contrast."""
+    """Return what axe-core finds wrong with contrast on the page, and how many texts pass.
+
+    ``axe`` is the file of axe-core.
+    """
     page.evaluate(f"{axe.read_text(encoding='utf-8')}; null")
     wrong, passed = page.evaluate(RUN)
     return [*wrong, *page.evaluate(OVER)], passed

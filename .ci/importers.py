@@ -91,7 +91,7 @@ sys.exit(not run.step(50))
 
 
 def casadi_findings(fmu: Path) -> list[str]:
-    """Return failures of CasADi's Model Exchange, and Jacobians that differ from differences."""
+    """Return what fails in CasADi: Model Exchange, and Jacobians compared with differences."""
     name = read_model_description(str(fmu)).modelName
     with tempfile.TemporaryDirectory() as folder:
         with zipfile.ZipFile(fmu) as archive:
@@ -132,7 +132,6 @@ def casadi_findings(fmu: Path) -> list[str]:
 
 
 def main() -> None:
-    """Run all tools and print their findings."""
     if len(sys.argv) != 2:
         sys.exit("usage: python importers.py FMU")
     fmu = Path(sys.argv[1])

@@ -53,7 +53,6 @@ if "VDMCHECK2" in os.environ:
 
 
 def main() -> None:
-    """Print a row for each group of rules with the number of faults that each tool reports."""
     folder = Path(sys.argv[1])
     rows = [
         row.split("\t") for row in (folder / "index.tsv").read_text(encoding="utf-8").splitlines()

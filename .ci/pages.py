@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """Yield Chromium, which draws without a graphics processor."""
+    """Yield the browser Chromium, set to draw without a graphics processor."""
     program = shutil.which("chromium")
     if program is None:
         sys.exit("error: chromium is missing: .ci/browser installs it")
@@ -25,7 +25,8 @@ def chromium() -> Iterator[Browser]:
 def open_page(browser: Browser, file: Path, width: int, scheme: str = "light", **more: str) -> Page:
     """Open a page and wait until it is drawn.
 
-    An error of the page or a request to the network fails.
+    An error in the page's script fails, and so does a request to the network. ``width`` is the
+    width of the window, px; ``scheme`` is "light" or "dark".
     """
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme, **more)
     faults: list[str] = []

@@ -29,12 +29,11 @@ SECONDS_OF_GIT = 600
 
 
 def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def git(folder: Path, *arguments: str) -> bytes | None:
-    """Return the output of git, or None if it fails."""
+    """Return the output of git in ``folder``, or None if git fails."""
     environment = {**os.environ, "GIT_TERMINAL_PROMPT": "0", "GIT_LFS_SKIP_SMUDGE": "1"}
     command = ["git", "-C", str(folder), *arguments]
     try:
@@ -47,7 +46,10 @@ def git(folder: Path, *arguments: str) -> bytes | None:
 
 
 def fetch(repository: str, rows: list[dict]) -> None:
-    """Download the FMUs of one repository that can be reached into the cache."""
+    """Download the FMUs of one repository, the ``rows`` of the list, into the cache.
+
+    FMUs that cannot be reached are left out.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         git(folder, "init", "--quiet", "--bare")
@@ -66,9 +68,10 @@ def fetch(repository: str, rows: list[dict]) -> None:
 
 
 def findings(fmu: Path) -> tuple[dict[str, set[str]], set[str]]:
-    """Return the rules with errors, the rules with warnings, and the machine-dependent rules.
+    """Return the rules that ``hubslosh check`` reports for an FMU.
 
-    Findings of machine-dependent rules may differ between machines.
+    The three results are the rules with errors, the rules with warnings, and the rules whose
+    findings may differ between machines.
     """
     with tempfile.TemporaryDirectory() as name:
         report = Path(name) / "report.json"

@@ -15,19 +15,16 @@ import pytest
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Turn warnings that a run leaves the range of its model into errors."""
     config.addinivalue_line("filterwarnings", "error::hubslosh.FmuWarning")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add options for the paths of the FMU, and of the files that example 7 writes."""
     parser.addoption("--fmu", default="HubSlosh", help="FMU file, or name of an FMU of the package")
     parser.addoption("--folder", type=Path, default=Path("dist"))
 
 
 @pytest.fixture(scope="session")
 def fmu(request: pytest.FixtureRequest) -> str:
-    """Return the path of HubSlosh.fmu."""
     name: str = request.config.getoption("--fmu")
     return str(Path(name).absolute()) if name.endswith(".fmu") else name
 

@@ -47,7 +47,7 @@ def compare(fmu: str = "HubSlosh") -> dict[str, hubslosh.Run]:
 
 
 def pointing_error(runs: dict[str, hubslosh.Run]) -> pd.Series:
-    """Return the difference of the craft's angle with sloshing and with rigid liquid, 0.001°."""
+    """Return the craft's angle with sloshing liquid minus its angle with rigid liquid, 0.001°."""
     return 1e3 * np.degrees(runs["spherical"]["theta"] - runs["frozen"]["theta"])
 
 
@@ -88,7 +88,6 @@ def figure(runs: dict[str, hubslosh.Run]) -> plt.Figure:
 
 
 def main() -> None:
-    """Simulate the manoeuvre and draw how the liquid changes the pointing."""
     parser = argparse.ArgumentParser(description="What the liquid does to your craft.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path("my_tank.png"))

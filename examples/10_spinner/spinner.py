@@ -23,7 +23,11 @@ START = (0.06, 0.02, SPIN)  # angular velocity at the start, rad/s
 
 
 def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[str, float | int]:
-    """Return parameters of the FMU: two tanks at ±0.45 m whose bottoms point outwards."""
+    """Return the FMU's parameters: two tanks at ±0.45 m whose bottoms point outwards.
+
+    ``j_zz`` is the inertia about the spin axis, kg·m², and ``omega`` the angular velocity at the
+    start, rad/s. Without ``slosh`` the liquid is rigid.
+    """
     values: dict[str, float | int] = {
         "craft.mass": 310.0, "craft.r[3]": 0.05, "craft.Jxx": 152.0, "craft.Jyy": 148.0,
         "craft.Jzz": j_zz, "tanks": 2,
@@ -52,7 +56,8 @@ def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[st
 def nutation_pole(fmu: str, j_zz: float) -> complex:
     """Return the pole of the nutation about the steady spin, body axes, 1/s.
 
-    Among all poles, this is the pole whose eigenvector has the largest transverse rate.
+    Among all poles, this is the pole whose eigenvector has the largest transverse rate. ``j_zz`` is
+    the inertia about the spin axis, kg·m².
     """
     spin = parameters(j_zz, omega=(0, 0, SPIN))
     model = hubslosh.linearize(fmu, spin, ["torque[1]"], ["omega[1]"], all_states=True)
@@ -65,7 +70,10 @@ def nutation_pole(fmu: str, j_zz: float) -> complex:
 
 
 def nutation(fmu: str, j_zz: float, stop: float, slosh: bool = True) -> pd.DataFrame:
-    """Simulate the craft; return time (s), nutation angle (rad) and dissipated energy (J)."""
+    """Simulate the craft to the time ``stop``, s, for the inertia ``j_zz`` about the spin axis.
+
+    Return time (s), nutation angle (rad) and dissipated energy (J).
+    """
     names = [f"q[{i}]" for i in range(1, 5)] + [f"angular_momentum[{i}]" for i in (1, 2, 3)]
     run = hubslosh.simulate(
         fmu, parameters(j_zz, slosh), stop=stop, step=0.1, outputs=[*names, "dissipated"],
@@ -85,7 +93,7 @@ def mean_growth(history: pd.DataFrame, until: float = np.inf) -> float:
 
 
 def figure(fmu: str) -> plt.Figure:
-    """Draw the nutation angle of four craft."""
+    """Draw the nutation angle of four craft, each with another ratio of inertias."""
     drawing, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
     for ax, j_zz, text, stop in (
         (axes[0], PROLATE, "Spin about the axis of least inertia: slosh makes nutation grow", 1600),
@@ -107,7 +115,6 @@ def figure(fmu: str) -> plt.Figure:
 
 
 def main() -> None:
-    """Print the numbers of README and draw its figure."""
     parser = argparse.ArgumentParser(description="Nutation of a spinner with slosh.")
     parser.add_argument("--fmu", default="Spacecraft", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

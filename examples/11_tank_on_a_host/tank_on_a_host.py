@@ -46,7 +46,7 @@ Values = dict[str, float | int]
 
 
 def body(mass: float, centre: np.ndarray, inertia: np.ndarray) -> Values:
-    """Return the parameters of a dry craft."""
+    """Return Spacecraft's parameters of a dry craft: mass (kg), centre (m) and inertia (kg·m²)."""
     values: Values = {"craft.mass": mass}
     values |= {f"craft.r[{i}]": float(x) for i, x in enumerate(centre, 1)}
     for i, a in enumerate("xyz"):
@@ -280,7 +280,6 @@ def table(folder: Path | None) -> dict[str, dict[float, float]]:
 
 
 def main() -> None:
-    """Print the table of README and draw its figure."""
     import matplotlib.pyplot as plt
 
     from hubslosh.plot import COLORS, save

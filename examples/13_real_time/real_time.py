@@ -30,7 +30,10 @@ SILENCE = 5.0
 
 
 def controller(port: int) -> None:
-    """Answer every received state with a torque, until no state arrives for `SILENCE`."""
+    """Answer every state that arrives at the UDP ``port`` with a torque.
+
+    The function ends if no state arrives for `SILENCE`.
+    """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
         peer.bind(("127.0.0.1", 0))
         peer.settimeout(SILENCE)
@@ -45,7 +48,7 @@ def controller(port: int) -> None:
 
 
 def wait(until: float) -> None:
-    """Wait until a time: sleep, then poll the clock, because a sleep may end late."""
+    """Wait until the clock shows ``until``, s: sleep, then poll, because a sleep may end late."""
     rest = until - time.perf_counter() - 2e-4
     if rest > 0:
         time.sleep(rest)
@@ -120,7 +123,6 @@ def lines(table: pd.DataFrame) -> list[str]:
 
 
 def figure(table: pd.DataFrame, path: Path) -> None:
-    """Draw the figure that README explains."""
     import matplotlib.pyplot as plt
 
     whole, (when, share) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
@@ -145,7 +147,6 @@ def figure(table: pd.DataFrame, path: Path) -> None:
 
 
 def main() -> None:
-    """Print the results of a run and draw the figure."""
     parser = argparse.ArgumentParser(description="The FMU at 1 kHz against a UDP peer.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--cycles", type=int, default=10_000, help="1 ms each, 60,000 at most")

@@ -13,7 +13,10 @@ RANGES = {
 
 
 def certificate(fill: str, of: hubslosh.Craft | None = None) -> hubslosh.Certificate:
-    """Return the certificate at a fill of both tanks, for this satellite or another craft."""
+    """Return the proof of stability for all uncertain parameters at a fill of both tanks.
+
+    ``of`` is the craft, by default this satellite.
+    """
     loop = telecom.loop(fill, of)
     model = (of or telecom.craft).uncertain(fill, RANGES, outputs=loop.names[0])
     return model.certify(loop, largest=9)

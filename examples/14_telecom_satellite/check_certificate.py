@@ -8,7 +8,11 @@ import numpy as np
 
 
 def check(path: str | Path) -> float:
-    """Return the largest eigenvalue of X in a certificate; below 0, stability is proved."""
+    """Check a certificate of stability in the file ``path`` without the package.
+
+    Return the largest eigenvalue of the matrix X of the proof; stability is proved if it is below
+    0.
+    """
     c = np.load(path)
     copies, period, n = np.repeat(np.arange(len(c["counts"])), c["counts"]), c["period"], 9
     same = copies[:, None] == copies

@@ -31,7 +31,10 @@ MEASURED = ["q[2]", "omega[1]", "q[3]", "omega[2]", "q[4]", "omega[3]"]
 
 
 def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpace:
-    """Return a PID controller of half angles and rates for each axis, with notch and roll-off."""
+    """Return a PID controller of half angles and rates for each axis, with notch and roll-off.
+
+    ``bandwidth`` and the frequency ``notch`` are in Hz.
+    """
     s = control.tf("s")
     w, n, r = (2 * np.pi * f for f in (bandwidth, notch, 25 * bandwidth))
     filters = (s**2 + 0.2 * n * s + n**2) / (s**2 + 1.2 * n * s + n**2)
@@ -45,12 +48,15 @@ def controller(bandwidth: float = 0.02, notch: float = 0.12) -> control.StateSpa
 
 
 def loop(fill: str, of: hubslosh.Craft | None = None) -> hubslosh.Loop:
-    """Return the three-axis loop at a fill of both tanks, for this satellite or another craft."""
+    """Return the three-axis loop at a fill of both tanks.
+
+    ``of`` is the craft, by default this satellite.
+    """
     return (of or craft).loop(controller(), PERIOD, fill, measured=MEASURED, delay=DELAY)
 
 
 def over_fills() -> pd.DataFrame:
-    """Return mass properties and margins at each fill."""
+    """Return the satellite's mass properties and stability margins, a row for each fill."""
     rows = []
     for fill in FILLS:
         at, found = craft.mass_properties(fill), hubslosh.margins(loop(fill))

@@ -17,13 +17,12 @@ PULSE = pd.DataFrame(
 
 
 def run(fmu: str | Path, model: str) -> pd.DataFrame:
-    """Simulate the pulse on the bench, whose bearing sticks."""
+    """Simulate the pulse on the bench, whose bearing sticks, with a slosh model."""
     outputs = ["omega", "omega_dot", "slosh_angle", "stuck"]
     return hubslosh.simulate(fmu, {"slosh.model": model}, PULSE, step=0.01, outputs=outputs)
 
 
 def main() -> None:
-    """Print how the liquid changes the response, and draw the figure."""
     parser = argparse.ArgumentParser(description="A pulse of torque on the hub.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

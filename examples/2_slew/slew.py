@@ -31,7 +31,11 @@ Profile = Callable[[float], tuple[float, float, float]]
 
 
 def bang_stop_bang(time: float, push: float = 1.2, coast: float = 1.2) -> tuple[float, ...]:
-    """Return the profile of constant acceleration, coasting, and constant deceleration."""
+    """Return the slew profile of constant acceleration, coasting and constant deceleration.
+
+    The result is angle (rad), rate and acceleration at ``time``, s, from the start of the slew.
+    ``push`` and ``coast`` are the durations of acceleration and coasting, s.
+    """
     a = ANGLE / (push * (push + coast))
     end = 2 * push + coast
     if time < push:
@@ -47,7 +51,8 @@ def bang_stop_bang(time: float, push: float = 1.2, coast: float = 1.2) -> tuple[
 def smoothed(time: float, push: float = 2.4) -> tuple[float, ...]:
     """Return the profile with the same largest rate and torque, and accelerations like 1 - cos.
 
-    A rest-to-rest slew of this angle is then two pulses, without coasting between them.
+    A rest-to-rest slew of this angle is then two pulses of the duration ``push`` (s), without
+    coasting between them.
     """
     a = ANGLE / (1.2 * (1.2 + 1.2)) / 2  # half the largest acceleration
     w = 2 * np.pi / push
@@ -77,7 +82,10 @@ def inertia(fmu: str | Path) -> float:
 
 
 def slew(fmu: str | Path, profile: Profile, model: str) -> pd.DataFrame:
-    """Simulate the slew; the column ``error`` is theta minus the angle of the profile, rad."""
+    """Simulate the slew ``profile`` with the slosh model ``model``.
+
+    The column ``error`` is theta minus the angle of the profile, rad.
+    """
     I, w = inertia(fmu), 2 * np.pi * BANDWIDTH
 
     def law(time: float, measured: np.ndarray) -> float:
@@ -102,20 +110,19 @@ def settling_time(run: pd.DataFrame, profile: str) -> float:
 
 
 def results(fmu: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
-    """Simulate all runs; return them by profile and slosh model."""
+    """Return all runs, by the name of the profile and the slosh model."""
     models = ("frozen", "linear", "spherical")
     return {(p, m): slew(fmu, PROFILES[p], m) for p in PROFILES for m in models}
 
 
 def title(runs: dict[tuple[str, str], pd.DataFrame], profile: str) -> str:
-    """Return a title with the duration of the slew and the settling time."""
+    """Return a title with the duration of the slew and the settling times."""
     settled = settling_time(runs[profile, "spherical"], profile)
     over = f"{profile.capitalize()}: over at {DURATION[profile]} s"
     return f"{over}, settled at {settled:.1f} s"
 
 
 def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
-    """Draw the figure that README explains."""
     figure, axes = plt.subplots(3, 2, figsize=(10, 9), layout="constrained")
     for column, profile in zip(axes.T, PROFILES, strict=True):
         torque, error, path_of = column
@@ -145,7 +152,6 @@ def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
 
 
 def main() -> None:
-    """Print the settling times and draw the figure."""
     parser = argparse.ArgumentParser(description="A slew with slosh, two profiles.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

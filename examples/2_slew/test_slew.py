@@ -28,7 +28,6 @@ ERRORS = {
 
 @pytest.fixture(scope="module")
 def runs(fmu: str) -> dict[tuple[str, str], pd.DataFrame]:
-    """Return all runs of the script."""
     return results(fmu)
 
 

@@ -29,14 +29,14 @@ ZETA = 0.7
 
 @dataclass(frozen=True)
 class Cycle:
-    """Cycle time and delay of the controller."""
+    """Cycle time and delay of the controller, s."""
 
     period: float  # s
     latency: int  # cycles
     label: str
 
     def hold(self, frequency: np.ndarray) -> np.ndarray:
-        """Return the frequency response of hold and delay at frequencies in Hz."""
+        """Return the response of zero-order hold and delay at frequencies in Hz."""
         half = np.exp(-1j * np.pi * frequency * self.period)
         return half * np.sinc(frequency * self.period)
 
@@ -49,7 +49,6 @@ class Bench:
     """The FMU of the bench, and linear models of the bench at rest."""
 
     def __init__(self, fmu: str | Path = "HubSlosh", parameters: dict | None = None) -> None:
-        """Store the FMU, and parameters that are set in addition to `VISCOUS`."""
         self.fmu = fmu
         self.parameters = VISCOUS | (parameters or {})
         self.linear = self._linearize({})
@@ -66,7 +65,7 @@ class Bench:
         return self.inertia * np.array([w**2, 2 * ZETA * w])
 
     def loop(self, cycle: Cycle, bandwidth: float, filter: control.StateSpace | None = None):
-        """Return the sampled loop gain; the loop is opened at the torque command."""
+        """Return the sampled loop gain, with the loop opened at the torque command."""
         plant = self.linear.sampled(cycle.period, cycle.latency).to_control()
         plant = plant if filter is None else plant * filter
         return control.ss(plant.A, plant.B, self.gains(bandwidth) @ plant.C, 0, cycle.period)
@@ -101,7 +100,7 @@ class Bench:
 
 
 def pd_law(gains: np.ndarray, filter: control.StateSpace | None = None) -> hubslosh.Law:
-    """Return the law u = filter(-kp theta - kd omega)."""
+    """Return the controller u = filter(-kp theta - kd omega); ``gains`` is [kp, kd]."""
     state = np.zeros(0 if filter is None else len(filter.A))
 
     def law(time: float, measured: np.ndarray) -> float:
@@ -117,7 +116,10 @@ def pd_law(gains: np.ndarray, filter: control.StateSpace | None = None) -> hubsl
 
 
 def notch(frequency: float, cycle: Cycle, deep: float = 0.05, wide: float = 0.3):
-    """Return (s² + 2·deep·w s + w²)/(s² + 2·wide·w s + w²), sampled without a shift of w."""
+    """Return a notch filter at ``frequency``, Hz, sampled without a shift of its frequency w.
+
+    It is (s² + 2·deep·w s + w²)/(s² + 2·wide·w s + w²).
+    """
     w = 2 * np.pi * frequency
     continuous = control.tf([1, 2 * deep * w, w**2], [1, 2 * wide * w, w**2])
     return control.ss(
@@ -126,7 +128,7 @@ def notch(frequency: float, cycle: Cycle, deep: float = 0.05, wide: float = 0.3)
 
 
 def low_pass(frequency: float, cycle: Cycle):
-    """Return a sampled Butterworth low-pass filter of second order; ``frequency`` in Hz."""
+    """Return a Butterworth low-pass of second order at ``frequency``, Hz, sampled."""
     w = 2 * np.pi * frequency
     continuous = control.tf([w**2], [1, np.sqrt(2) * w, w**2])
     return control.ss(
@@ -135,7 +137,11 @@ def low_pass(frequency: float, cycle: Cycle):
 
 
 def slosh_damping(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> float:
-    """Return the damping ratio of the closed loop's pole nearest to the open loop's slosh pole."""
+    """Return the damping ratio of the slosh mode in the closed loop.
+
+    This mode's pole is the closed loop's pole nearest to the slosh pole of the open loop.
+    ``bandwidth`` is the bandwidth of the controller, Hz.
+    """
     loop = bench.loop(cycle, bandwidth, filter)
     poles = np.log(np.linalg.eigvals(loop.A - loop.B @ loop.C).astype(complex)) / cycle.period
     open_loop = bench.linear.poles
@@ -157,7 +163,7 @@ class Margins:
 
 
 def margins(bench: Bench, cycle: Cycle, bandwidth: float, filter=None) -> Margins:
-    """Return the stability margins of a loop."""
+    """Return the stability margins of the loop with a controller of ``bandwidth``, Hz."""
     loop = bench.loop(cycle, bandwidth, filter)
 
     def excess(factor: float) -> float:
@@ -182,7 +188,10 @@ def growth(run: pd.DataFrame) -> float:
 
 
 def simulated_first_unstable(bench: Bench, cycle: Cycle, near: float) -> float:
-    """Return the bandwidth at which the simulated oscillation neither grows nor decays, Hz."""
+    """Return the bandwidth, Hz, at which the simulated motion neither grows nor decays.
+
+    The search begins at ``near``, Hz.
+    """
     stop = 1800 * cycle.period
     return brentq(
         lambda bandwidth: growth(bench.run(cycle, bandwidth, stop, outputs=["omega"])),
@@ -194,7 +203,7 @@ def simulated_first_unstable(bench: Bench, cycle: Cycle, near: float) -> float:
 
 
 def harmonic_balance(bench: Bench, cycle: Cycle, amplitudes: np.ndarray, pendulum: str, dry: bool):
-    """Return bandwidths (Hz) and rate amplitudes (rad/s) of limit cycles with given slosh angles.
+    """Return limit cycles with given slosh angles: bandwidths (Hz) and rate amplitudes (rad/s).
 
     al = a cos(wt) and omega = Re(W exp(iwt)) are put into the equations of hub and pendulum (linear
     or planar; the documentation's page on the model has them); their first harmonics must vanish.
@@ -202,6 +211,8 @@ def harmonic_balance(bench: Bench, cycle: Cycle, amplitudes: np.ndarray, pendulu
     bandwidth. The held torque also excites the plant above half the sampling rate, and sampling
     folds (aliases) this response back to w. The folded part is the response of the sampled model
     minus the response of hold and plant.
+
+    ``amplitudes`` are the slosh angles a, rad; ``dry`` says whether the bearing has dry friction.
     """
     names = ["hub.I", "tank.m_0", "slosh.mass[1]", "slosh.length[1]", "tank.r", "g_axial"]
     names += ["slosh.damping[1]", *(f"friction.{x}" for x in ("b", "c", "d", "omega_s"))]
@@ -298,7 +309,7 @@ def threshold(bench: Bench, bandwidth: float) -> float:
 
 
 def settled(bench: Bench, bandwidth: float, stop: float) -> list[float]:
-    """Return the amplitudes that a run with spherical pendulums approaches.
+    """Return the amplitudes that a run with spherical pendulums approaches until ``stop``, s.
 
     These are the tangential and the radial slosh angle (rad) and the hub's rate (rad/s).
     """
@@ -327,7 +338,7 @@ DESIGNS = {
 
 
 def table(full: Bench, drained: Bench) -> pd.DataFrame:
-    """Return margins and slosh damping of the designs at two fills."""
+    """Return margins and slosh damping of the designs with full and with drained tank."""
     rows = {}
     for name, design in DESIGNS.items():
         found = margins(full, *design)
@@ -342,7 +353,6 @@ def table(full: Bench, drained: Bench) -> pd.DataFrame:
 
 
 def figure(full: Bench, drained: Bench, path: Path) -> None:
-    """Draw the figure of the README."""
     _, axes = plt.subplots(3, 2, figsize=(11, 12), layout="constrained")
     (damping, nyquist), (notch_slow, notch_fast), (decay, cycles) = axes
     blue, orange, green, pink = COLORS[:4]
@@ -460,7 +470,6 @@ def figure(full: Bench, drained: Bench, path: Path) -> None:
 
 
 def main() -> None:
-    """Print the table and draw the figure."""
     parser = argparse.ArgumentParser(description="Slosh and a sampled PD controller.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

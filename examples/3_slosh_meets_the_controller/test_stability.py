@@ -21,7 +21,6 @@ from stability import (
 
 @pytest.fixture(scope="module")
 def full(fmu: str) -> Bench:
-    """Return the bench with 10 cm of water."""
     return Bench(fmu)
 
 

@@ -30,7 +30,10 @@ WIDTHS = (1e-2, 1e-3, 1e-5)
 def run(
     fmu: str | Path, angle: float, stop: float, parameters: dict, integral: float = 0.0
 ) -> pd.DataFrame:
-    """Simulate a step of the commanded angle (rad) with a PID law and spherical pendulums."""
+    """Simulate a step of the commanded angle (rad) with a PID controller and spherical pendulums.
+
+    The run ends at ``stop``, s; ``integral`` is the controller's integral gain.
+    """
     w, area = 2 * np.pi * BANDWIDTH, 0.0
 
     def law(time: float, measured: np.ndarray) -> float:
@@ -63,13 +66,19 @@ def friction_laws() -> dict[str, dict]:
 
 
 def stiction(fmu: str | Path, integral: float, stop: float) -> dict[str, pd.DataFrame]:
-    """Return the motion after a step of 1 degree for each friction law."""
+    """Return the motion after a commanded step of 1 degree, for each friction law.
+
+    The runs end at ``stop``, s; ``integral`` is the controller's integral gain.
+    """
     angle = np.radians(1)
     return {name: run(fmu, angle, stop, law, integral) for name, law in friction_laws().items()}
 
 
 def summary(fmu: str | Path) -> pd.DataFrame:
-    """Return the pointing error (deg) at four times after the step, by controller and law."""
+    """Return the pointing error (deg) at four times after the step.
+
+    The table has a row for each controller and friction law.
+    """
     rows = {}
     for controller, integral in (("PD", 0.0), ("PID", INTEGRAL)):
         for name, table in stiction(fmu, integral, 60).items():
@@ -80,7 +89,6 @@ def summary(fmu: str | Path) -> pd.DataFrame:
 
 
 def figure(fmu: str | Path, path: Path) -> None:
-    """Draw the figure of the README."""
     whole, axes = plt.subplots(2, 2, figsize=(10, 7), layout="constrained")
     (angle, speed), (pd_error, pid_error) = axes
     for (name, table), color in zip(saturation(fmu).items(), COLORS, strict=False):
@@ -110,7 +118,6 @@ def figure(fmu: str | Path, path: Path) -> None:
 
 
 def main() -> None:
-    """Print the numbers and draw the figure."""
     parser = argparse.ArgumentParser(description="Wheel limits and stiction of a bearing.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

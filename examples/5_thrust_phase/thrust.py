@@ -40,7 +40,7 @@ DISPLACED = np.radians(10)
 
 
 def specific_force() -> pd.DataFrame:
-    """Return ``g_axial`` over time: coast, thrust and coast, joined by ramps."""
+    """Return the input ``g_axial`` over time: coast, thrust and coast, joined by ramps."""
     time = [0.0, START, START + RAMP, END, END + RAMP, STOP]
     return pd.DataFrame({"time": time, "g_axial": [COAST, COAST, THRUST, THRUST, COAST, COAST]})
 
@@ -52,13 +52,16 @@ def linear(fmu: str | Path, model: str = "linear") -> hubslosh.LinearModel:
 
 
 def gains(fmu: str | Path, bandwidth: float) -> np.ndarray:
-    """Return [kp, kd] of a PD controller for hub and rigid liquid."""
+    """Return [kp, kd] of a PD controller of ``bandwidth``, Hz, for hub and rigid liquid."""
     w = 2 * np.pi * bandwidth
     return np.array([w**2, 2 * ZETA * w]) / linear(fmu, "frozen").B[1, 0]
 
 
 def slosh_pole(fmu: str | Path, bandwidth: float) -> complex:
-    """Return the pole of the slosh mode in the sampled loop under thrust, rad/s."""
+    """Return the pole of the slosh mode in the sampled loop under thrust, rad/s.
+
+    ``bandwidth`` is the bandwidth of the controller, Hz.
+    """
     A, B, C, _ = linear(fmu).sampled(PERIOD, LATENCY)
     poles = np.log(np.linalg.eigvals(A - B @ gains(fmu, bandwidth)[None] @ C).astype(complex))
     free = linear(fmu).poles
@@ -67,7 +70,7 @@ def slosh_pole(fmu: str | Path, bandwidth: float) -> complex:
 
 
 def run(fmu: str | Path, bandwidth: float, model: str = "spherical") -> pd.DataFrame:
-    """Simulate coast, thrust and coast with the PD controller."""
+    """Simulate coast, thrust and coast with a PD controller of ``bandwidth``, Hz."""
     k = gains(fmu, bandwidth)
     return hubslosh.closed_loop(
         lambda time, measured: -k @ measured, PERIOD, STOP, fmu,
@@ -86,7 +89,6 @@ def decay(table: pd.DataFrame) -> float:
 
 
 def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
-    """Draw the figure of the README."""
     whole, (error, slosh, damping) = plt.subplots(
         3, figsize=(8, 9), layout="constrained", height_ratios=(1, 1, 1)
     )
@@ -117,7 +119,6 @@ def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
 
 
 def main() -> None:
-    """Print the numbers and draw the figure."""
     parser = argparse.ArgumentParser(description="Slosh under thrust.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

@@ -37,7 +37,6 @@ TOLERANCE = np.radians(0.01)
 
 
 def gains() -> np.ndarray:
-    """Return the gains [kp, kd] of the PD controller."""
     w = 2 * np.pi * BANDWIDTH
     return INERTIA * np.array([w**2, 2 * ZETA * w])
 
@@ -61,7 +60,7 @@ def draws(runs: int, seed: int) -> pd.DataFrame:
 
 
 def one(row: dict[str, float], fmu: str) -> dict[str, float]:
-    """Return the largest pole (linear, viscous) and the settling time of one draw."""
+    """Return the largest pole (linear, with viscous friction) and the settling time of a draw."""
     k = gains()
     parameters = {"slosh.zeta_from_correlation": False} | row
     viscous = parameters | {"friction.model": "viscous"}
@@ -96,7 +95,6 @@ def study(client: "Client | None", runs: int, seed: int, fmu: str) -> pd.DataFra
 
 
 def figure(table: pd.DataFrame, path: Path) -> None:
-    """Draw the figure of the README."""
     whole, (poles, times, ranks) = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained")
     stable = table["largest_pole"] < 1
     fill = 100 * table["tank.h"]
@@ -129,7 +127,6 @@ def figure(table: pd.DataFrame, path: Path) -> None:
 
 
 def main() -> None:
-    """Run the study on this machine's cores, or on a cluster."""
     parser = argparse.ArgumentParser(description="Settling time and robust stability.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--runs", type=int, default=400)

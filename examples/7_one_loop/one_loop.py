@@ -30,7 +30,10 @@ TOLERANCE = 1e-9
 
 @dataclass
 class Loop:
-    """Plant and controller, connected by a Jacobi master."""
+    """Plant and controller as two FMUs, connected by a Jacobi master.
+
+    A Jacobi master steps both FMUs with the inputs from the start of the step.
+    """
 
     plant: hubslosh.Plant
     controller: hubslosh.Plant
@@ -73,7 +76,10 @@ class Loop:
 
 
 def in_fmpy(folder: Path, fmu: str | Path, slopes: bool) -> pd.DataFrame:
-    """Simulate the closed loop with fmpy."""
+    """Simulate the closed loop with fmpy.
+
+    If ``slopes``, inputs change linearly over a step; otherwise they are held.
+    """
     with hubslosh.Plant(fmu, PLANT) as plant, hubslosh.Plant(folder / "Controller.fmu") as pd_fmu:
         loop, rows = Loop(plant, pd_fmu, slopes), []
         for k in range(STEPS + 1):
@@ -125,7 +131,7 @@ def pack_system(folder: Path, fmu: str | Path) -> Path:
 
 
 def difference(one: pd.DataFrame, other: pd.DataFrame) -> float:
-    """Return the largest difference relative to each column's largest value."""
+    """Return the largest difference of two tables, relative to each column's largest value."""
     one, other = one.set_index("time"), other.set_index("time")
     common = one.index.intersection(other.index)
     assert len(common) >= STEPS
@@ -143,7 +149,7 @@ WATCHED = ["theta", "omega", "slosh_angle"]
 
 
 def exactly(fmu: str | Path) -> hubslosh.Plant:
-    """Return the plant with a solver so accurate that the errors of the coupling dominate."""
+    """Return the plant with a solver so accurate that only errors of the coupling remain."""
     return hubslosh.Plant(fmu, PLANT, tolerance=1e-11)
 
 
@@ -154,7 +160,10 @@ def jump(loop: Loop) -> float:
 
 
 def fixed(fmu: str | Path, folder: Path, step: float) -> tuple[np.ndarray, int]:
-    """Return rows of time and watched outputs, and the number of steps, with a fixed step."""
+    """Simulate with a fixed step, s.
+
+    Return rows of time and watched outputs, and the number of steps.
+    """
     with exactly(fmu) as plant, hubslosh.Plant(folder / "Controller.fmu") as pd_fmu:
         loop, rows = Loop(plant, pd_fmu, slopes=True), []
         while loop.time < STOP - 1e-9:
@@ -166,7 +175,7 @@ def fixed(fmu: str | Path, folder: Path, step: float) -> tuple[np.ndarray, int]:
 
 
 def adaptive(fmu: str | Path, folder: Path, tolerance: float) -> tuple[np.ndarray, int]:
-    """Return the rows and the number of steps of a master that chooses its steps.
+    """Simulate with a master that chooses its steps; return rows and the number of steps.
 
     It makes each step whole, rolls back, and makes it in two halves. The difference of the results,
     in units of ``tolerance``, is the error of the whole step. This error grows as the third power
@@ -202,7 +211,7 @@ def adaptive(fmu: str | Path, folder: Path, tolerance: float) -> tuple[np.ndarra
 
 
 def exact(fmu: str | Path, times: np.ndarray) -> np.ndarray:
-    """Return the watched outputs of the linear loop at the times, from its eigenvalues."""
+    """Return the watched outputs at ``times`` of the linear loop, from its eigenvalues."""
     plant = hubslosh.linearize(fmu, PLANT, ["tau_cmd", "tau_ext"], WATCHED)
     k_p, k_d, t_f = 4.22, 1.88, 0.02  # as in controller.rs
     n = len(plant.A)
@@ -230,7 +239,10 @@ def exact(fmu: str | Path, times: np.ndarray) -> np.ndarray:
 
 
 def hosts(folder: Path, fmu: str | Path) -> dict[str, float]:
-    """Return the difference of each host from the harness; libcosim is included if installed."""
+    """Return the difference of each host's result from the result of ``hubslosh run``.
+
+    libcosim is included if it is installed.
+    """
     held, slopes = (pd.read_csv(folder / f"loop_{name}.csv") for name in ("held", "slopes"))
     found = {
         "fmpy, inputs held": difference(in_fmpy(folder, fmu, False), held),
@@ -245,7 +257,6 @@ def hosts(folder: Path, fmu: str | Path) -> dict[str, float]:
 
 
 def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> None:
-    """Draw the figure of the README."""
     import matplotlib.pyplot as plt
 
     from hubslosh.plot import COLORS, save
@@ -276,7 +287,6 @@ def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> 
 
 
 def main() -> None:
-    """Compare hosts with the harness, then the adaptive master with masters of fixed steps."""
     parser = argparse.ArgumentParser(description="One loop in several hosts.")
     parser.add_argument("--fmu", default="HubSlosh", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--folder", type=Path, default=Path("dist"), help="Controller.fmu's folder")

@@ -13,7 +13,6 @@ from one_loop import RECORDED, STEPS, TOLERANCE, adaptive, difference, exact, fi
 
 @pytest.fixture(scope="module")
 def folder(request: pytest.FixtureRequest) -> Path:
-    """Return the output folder of `cargo run -p one-loop`."""
     path: Path = request.config.getoption("--folder")
     assert (path / "Controller.fmu").is_file(), "cargo run --release -p one-loop -- FMU dist"
     return path
@@ -30,7 +29,7 @@ def test_fmpy_and_the_harness_give_equal_results(
     assert difference(in_fmpy(folder, fmu, slopes), theirs) <= TOLERANCE
 
 
-def test_input_slopes_change_the_loop(folder: Path) -> None:
+def test_slopes_of_the_inputs_change_the_result_of_coupled_fmus(folder: Path) -> None:
     """Results with and without slopes of the inputs differ by 20 %.
 
     Therefore two hosts can be compared only if both set slopes or neither does.

@@ -31,7 +31,7 @@ BOB = (128.211, 0.248039, 0.136534)
 
 @dataclass(frozen=True)
 class Craft:
-    """The craft with the origin of its tank at the height ``z`` (m)."""
+    """The craft with the origin of its tank at the height ``z`` (m) above the gimbal."""
 
     z: float
     zeta: float = 0.0
@@ -117,7 +117,7 @@ def closed_loop_poles(fmu: str, craft: Craft) -> np.ndarray:
 
 
 def growth(fmu: str, craft: Craft) -> float:
-    """Return the real part of the slosh pole in the loop, 1/s.
+    """Return the real part of the slosh pole in the closed loop, 1/s.
 
     Of all poles above 1 rad/s, only the slosh pole in pitch is shifted by the loop.
     """
@@ -133,7 +133,10 @@ def growth(fmu: str, craft: Craft) -> float:
 
 
 def simulate(fmu: str, craft: Craft, stop: float, period: float = 0.01) -> pd.DataFrame:
-    """Simulate the sampled loop; the liquid is released at 1 degree from rest."""
+    """Simulate the sampled loop; the liquid is released at 1 degree from rest.
+
+    The run ends at ``stop``, s, and the controller has the cycle time ``period``, s.
+    """
     k_p, k_d = craft.gains
 
     def law(_: float, seen: np.ndarray) -> float:
@@ -160,7 +163,7 @@ def simulated_growth(fmu: str, craft: Craft, stop: float = 120.0) -> float:
 
 
 def zone(fmu: str) -> tuple[float, float]:
-    """Return the lower and upper end of the heights at which the FMU's loop is unstable, m."""
+    """Return the lower and the upper end of the heights at which the FMU's loop is unstable, m."""
     return tuple(
         brentq(lambda z: growth(fmu, Craft(z)), low, high, xtol=1e-4)
         for low, high in ((0.0, 0.2), (0.7, 1.1))
@@ -205,7 +208,6 @@ def figure(fmu: str) -> plt.Figure:
 
 
 def main() -> None:
-    """Print the numbers of the README and draw its figure."""
     parser = argparse.ArgumentParser(description="Where a tank destabilises an attitude loop.")
     parser.add_argument("--fmu", default="Spacecraft", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

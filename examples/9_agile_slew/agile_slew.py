@@ -37,7 +37,10 @@ FREQUENCY, ZETA = 0.08, 0.01
 
 
 def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, float | int]:
-    """Return parameters of the FMU: tanks at ±ARM with their axes along the thrust axis x."""
+    """Return the FMU's parameters: tanks at ±ARM with their axes along the thrust axis x.
+
+    ``frequency`` is the slosh frequency, Hz. Without ``slosh`` the liquid is rigid.
+    """
     values: dict[str, float | int] = {
         "craft.mass": 900.0, "craft.Jxx": J_XX, "craft.Jyy": 380.0, "craft.Jzz": 400.0, "tanks": 2,
         "craft.r[1]": 0.0, "craft.r[2]": 0.0, "craft.r[3]": 0.0,
@@ -62,7 +65,10 @@ RIGID = J_XX + 2 * (OWN + (FIXED + MASS) * ARM**2)
 
 
 def reference(time: float) -> tuple[float, float, float]:
-    """Return roll angle (rad), rate and acceleration, which is one period of a sine."""
+    """Return roll angle (rad), rate and acceleration of the slew at ``time``, s.
+
+    The acceleration is one period of a sine.
+    """
     t = np.clip(time, 0.0, DURATION)
     w = 2 * np.pi / DURATION
     angle = SLEW * (t - np.sin(w * t) / w) / DURATION
@@ -91,13 +97,14 @@ class Observer:
         self.x = np.zeros(len(self.transition))
 
     def slosh_torque(self, x: np.ndarray) -> float:
-        """Return the torque of the sloshing liquid on a body with the inertia `inertia`, N·m."""
+        """Return the torque of the sloshing liquid on the craft, N·m, at the state ``x``."""
         return float(self.inertia * (self.A @ x))
 
     def update(self, measured: float, torque: float) -> tuple[float, float]:
-        """Return the slosh torque one cycle ahead, and its mean over the cycle that begins then.
+        """Return the slosh torque one cycle ahead, and its mean over the next cycle, N·m.
 
-        measured: rad/s; torque: the last command, which acts in the present cycle, N·m.
+        ``measured`` is the roll rate, rad/s; ``torque`` is the last command, which acts in the
+        present cycle, N·m.
         """
         self.x += self.gain * (measured - self.x[self.rate])
         self.x = self.transition @ self.x + self.input * torque
@@ -114,7 +121,8 @@ def slew(
 ) -> pd.DataFrame:
     """Simulate one slew; the column ``estimate`` is the observer's slosh torque, N·m.
 
-    ``frequency`` is the slosh frequency that the observer assumes, Hz.
+    ``observe`` says whether the controller compensates this torque, and ``frequency`` is the slosh
+    frequency that the observer assumes, Hz.
     """
     observer = Observer(fmu, frequency) if slosh else None
     random = np.random.default_rng(1)
@@ -165,7 +173,6 @@ def tranquillisation(run: pd.DataFrame) -> float:
 
 
 def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
-    """Draw the pointing errors and slosh torques of the runs."""
     drawing, axes = plt.subplots(
         2, 1, figsize=(9, 5.6), sharex=True, layout="constrained", height_ratios=(2, 1)
     )
@@ -199,7 +206,7 @@ def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
 
 
 def all_runs(fmu: str) -> dict[str, pd.DataFrame]:
-    """Return the three runs by name."""
+    """Return the three runs by name: with rigid liquid, without and with slosh compensation."""
     return {
         "liquid rigid": slew(fmu, slosh=False),
         "sloshing": slew(fmu),
@@ -208,7 +215,6 @@ def all_runs(fmu: str) -> dict[str, pd.DataFrame]:
 
 
 def main() -> None:
-    """Print the numbers of the README and draw its figure."""
     parser = argparse.ArgumentParser(description="Agile slew of an Earth observer.")
     parser.add_argument("--fmu", default="Spacecraft", help="FMU file, or name of a packaged FMU")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))

@@ -8,7 +8,7 @@ import hubslosh
 
 
 def after(run) -> float:
-    """Return the largest pointing error after the slew, deg."""
+    """Return the largest pointing error of a run after the end of its slew, deg."""
     return float(np.degrees(run.loc[run["time"] >= DURATION, "error"].abs().max()))
 
 

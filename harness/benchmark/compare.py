@@ -42,7 +42,7 @@ PUBLISHED = ("backbones", "forced", "measured")
 
 
 def run(name: str, folder: Path) -> None:
-    """Run an implementation, which writes its results below ``folder``."""
+    """Run the implementation ``name``, which writes its results below ``folder``."""
     script, *options = IMPLEMENTATIONS[name]
     command = [sys.executable, HERE / "implementations" / script, folder / name, *options]
     if subprocess.run(command, check=False).returncode:
@@ -66,7 +66,10 @@ def write_references(folder: Path) -> None:
 
 
 def agreement(case: str, folder: Path) -> float:
-    """Return the number of digits to which HubSlosh and the implementations `INDEPENDENT` agree."""
+    """Return the number of digits to which HubSlosh agrees with the independent implementations.
+
+    The results of ``case`` are in ``folder``.
+    """
     specified = score.specification()[case]
     if specified["kind"] == "intervals":
         return math.nan
@@ -95,7 +98,6 @@ def write_scores(folder: Path) -> None:
 
 
 def read_scores() -> list[dict[str, str]]:
-    """Return the scores in scores.csv."""
     with SCORES.open(encoding="utf-8") as file:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
@@ -126,13 +128,12 @@ def table(rows: Iterable[dict[str, str]]) -> str:
 
 
 def with_table(text: str, rows: list[dict[str, str]]) -> str:
-    """Return the page with the table between the comments that mark its place."""
+    """Return the page ``text`` with the table of scores between its comment marks."""
     begin, end = (text.index(mark) for mark in MARKS)
     return f"{text[:begin]}{MARKS[0]}\n\n{table(rows)}\n\n{text[end:]}"
 
 
 def main() -> None:
-    """Run the implementations, score their results, and write the table."""
     parser = argparse.ArgumentParser(description="Runs the slosh benchmark.")
     parser.add_argument("--only", choices=IMPLEMENTATIONS, help="run one implementation")
     parser.add_argument("--references", action="store_true", help="write new references")

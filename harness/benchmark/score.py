@@ -66,7 +66,7 @@ def specification() -> dict[str, dict]:
 
 
 def header(name: str, unit: str) -> str:
-    """Return the header of a column, such as ``omega [rad/s]``."""
+    """Return the header of a column in a results.csv, such as ``omega [rad/s]``."""
     return f"{name} [{unit}]"
 
 
@@ -141,10 +141,10 @@ def reference(case: str, specified: dict) -> Table:
 
 
 def match(path: Path, table: Table, wanted: Table) -> list[dict[str, float]]:
-    """Return the rows of a table that the reference has, too, in ascending order.
+    """Return the rows of ``table`` that the reference ``wanted`` has, too, in ascending order.
 
     Rows are matched and sorted by the first column. The table may have further rows, for example at
-    more times.
+    more times. ``path`` is the file that error messages name.
     """
     key = next(iter(wanted.columns))
     keys = sorted((row[key], i) for i, row in enumerate(table.rows))
@@ -196,7 +196,8 @@ def largest_error(
 ) -> tuple[float, str, str]:
     """Return the largest relative error of rows, its column and row, and its possible cause.
 
-    Raises ValueError if a value is not finite.
+    Errors are relative to the largest value of the column if ``scale`` is "column", else to the
+    value in the row. Raises ValueError if a value is not finite.
     """
     key, *names = wanted.columns
     whole = scales(wanted.rows, names)
@@ -224,12 +225,18 @@ def largest_error(
 
 
 def same(found: list[float], factor: float) -> bool:
-    """Return True if nearly all quotients in ``found`` equal ``factor``."""
+    """Return True if nearly all quotients in ``found`` equal ``factor``.
+
+    All errors then have one cause, for example another unit.
+    """
     return sum(abs(x / factor - 1) < 0.05 for x in found) > 0.9 * len(found)
 
 
 def scales(rows: list[dict[str, float]], names: list[str]) -> dict[str, float]:
-    """Return the largest norm of each group of columns over all rows."""
+    """Return the largest norm of each group of columns over all rows.
+
+    For example, omega_x, omega_y and omega_z are the components of one group.
+    """
     largest: dict[str, float] = {}
     for row in rows:
         squares: dict[str, float] = {}
@@ -242,7 +249,7 @@ def scales(rows: list[dict[str, float]], names: list[str]) -> dict[str, float]:
 
 
 def score_intervals(case: str, title: str, path: Path, table: Table, wanted: Table) -> Score:
-    """Return the score of a case with measurements: the number of rows within their errors."""
+    """Return the score of a case with measurements: how many rows are within their errors."""
     values = {}
     for row in table.rows:
         if row["row"] not in {exact["row"] for exact in wanted.rows}:
@@ -278,7 +285,6 @@ def collect(folder: Path) -> tuple[list[Score], list[str]]:
 
 
 def line(score: Score) -> str:
-    """Return a score as a line of text."""
     verdict = "pass" if score.passed else "FAIL"
     if score.needed > MOST_DIGITS:
         text = f"{score.digits:.0f} of {score.needed:.0f} rows pass"
@@ -291,7 +297,6 @@ def line(score: Score) -> str:
 
 
 def main() -> None:
-    """Score all results in a folder, and print the scores."""
     parser = argparse.ArgumentParser(description="Scores results of the slosh benchmark.")
     parser.add_argument("folder", type=Path, help="a folder with CASE/results.csv")
     parser.add_argument("--json", action="store_true", help="print the scores as JSON")

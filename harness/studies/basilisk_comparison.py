@@ -109,7 +109,10 @@ def starts(length: float) -> dict[str, Start]:
 
 
 def case(fmu: Path, start: str, h: float, zeta: float) -> Case:
-    """Return a case with the mass and length that the FMU calculates for the fill ``h`` (m)."""
+    """Return a case with the mass and length that the FMU computes for the fill ``h`` (m).
+
+    ``start`` is the name of an initial state, and ``zeta`` the damping ratio.
+    """
     with Plant(fmu, {"tank.h": h}) as plant:
         m_0, m, length, hub = plant.get(["tank.m_0", "slosh.mass[1]", "slosh.length[1]", "hub.I"])
     return Case(starts(length)[start], h, zeta, m, length, hub + m_0 * LEVER**2)
@@ -141,7 +144,7 @@ def ours(fmu: Path, given: Case, tolerance: float = TOLERANCE) -> Signals:
 
 
 def bob(craft: spacecraft.Spacecraft, pendulum: sphericalPendulum.SphericalPendulum) -> np.ndarray:
-    """Return the direction from the hinge to the bob, body axes.
+    """Return the direction from the hinge of Basilisk's pendulum to its slosh mass, body axes.
 
     Basilisk rotates the frame of the pendulum during a run, to avoid the singularity of its angles.
     """
@@ -228,7 +231,11 @@ def pendulum_of(given: Case) -> sphericalPendulum.SphericalPendulum:
 def pendulum_at(
     mass: float, length: float, place: Vector, drag: float, axes: Sequence[Vector], rate: Vector
 ) -> sphericalPendulum.SphericalPendulum:
-    """Return a pendulum hinged at ``place``, whose first axis points to the bob at the start."""
+    """Return Basilisk's pendulum with its hinge at ``place``, m, body axes.
+
+    The first of ``axes`` points to the slosh mass at the start; ``rate`` has the rates of the
+    angles, and ``drag`` is the damping coefficient, N·s/m.
+    """
     _, second, third = axes
     pendulum = sphericalPendulum.SphericalPendulum()
     pendulum.massInit = mass
@@ -247,12 +254,12 @@ def column(x: float, y: float, z: float) -> list[list[float]]:
 
 
 def differences(a: Signals, b: Signals) -> list[float]:
-    """Return the largest difference of each signal, relative to the signal's maximum in ``b``."""
+    """Return the largest difference of each signal in ``a``, relative to its maximum in ``b``."""
     return [np.abs(a[name] - b[name]).max() / np.abs(b[name]).max() for name in b]
 
 
 def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
-    """Call a function; return its result and the CPU time, s."""
+    """Call a function without arguments; return its result and the CPU time, s."""
     begin = time.process_time()
     return signals(), time.process_time() - begin
 
@@ -417,7 +424,6 @@ def write(out: Path, text: str, worst: float) -> None:
 
 
 def main() -> None:
-    """Run the comparison and write the page."""
     parser = argparse.ArgumentParser(description="Compares the spherical model with Basilisk's.")
     parser.add_argument("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu", metavar="FILE")
     parser.add_argument("--out", type=Path, default=PAGE, metavar="FILE", help="the page to write")

@@ -50,7 +50,7 @@ SIGNALS = ("attitude", "omega", "position", "velocity", "p[1]", "p[2]")
 
 @dataclass(frozen=True)
 class Tank:
-    """A tank with one mode; its values differ from the start values of Spacecraft.fmu."""
+    """A tank with one slosh mode; its values differ from the start values of Spacecraft.fmu."""
 
     position: tuple[float, float, float]  # m, from O
     q: tuple[float, float, float, float] = (1, 0, 0, 0)  # tank to body axes
@@ -341,7 +341,6 @@ def page(cases: list[str], cost: list[str], worst: float) -> str:
 
 
 def main() -> None:
-    """Run the comparison and write the page."""
     parser = argparse.ArgumentParser(description="Compares Spacecraft.fmu with Basilisk.")
     parser.add_argument(
         "--fmu", type=Path, default=ROOT / "dist" / "Spacecraft.fmu", metavar="FILE"

@@ -52,7 +52,10 @@ WINDOW, SHARE, LEAST = 2.0, 0.5, np.radians(3.0)
 
 
 def sweep(amplitude: float, noise: float) -> pd.DataFrame:
-    """Return the inputs: a torque sweep as in the thesis, linear in frequency, and torque noise."""
+    """Return the inputs of a run: the thesis's torque sweep, linear in frequency, and noise.
+
+    ``amplitude`` and ``noise`` (standard deviation) are torques, N·m.
+    """
     time = np.arange(round(DURATION / STEP)) * STEP
     phase = 2 * np.pi * (FIRST * time + (LAST - FIRST) / (2 * DURATION) * time**2)
     columns = {"time": time, "tau_cmd": amplitude * np.sin(phase)}
@@ -79,7 +82,11 @@ def swirls(run: pd.DataFrame) -> bool:
 
 
 def drive(model: str, growth: float, fill: float, seed: str, amplitude: float) -> pd.DataFrame:
-    """Simulate one sweep of the bench."""
+    """Simulate one sweep of the bench.
+
+    ``growth`` is the growth of damping with amplitude, ``fill`` the depth in m, ``seed`` the name
+    of noise in `SEEDS`, and ``amplitude`` the amplitude of the torque, N·m.
+    """
     more, noise = SEEDS[seed]
     parameters = {
         "slosh.model": model,
@@ -95,7 +102,7 @@ def drive(model: str, growth: float, fill: float, seed: str, amplitude: float) -
 
 
 def case(key: tuple[str, float, float, str]) -> dict[str, object]:
-    """Return accelerations and onset of rotary slosh for one combination in `cases`."""
+    """Return accelerations and onset of rotary slosh for one combination of `cases`."""
     model, growth, fill, seed = key
     row: dict[str, object] = dict(
         zip(("model", "zeta_amplitude", "fill_m", "seed"), key, strict=True)
@@ -159,7 +166,6 @@ def text(rows: pd.DataFrame) -> str:
 
 
 def main() -> None:
-    """Run all cases and print the tables."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--jobs", type=int, default=2, help="processes")
     options.add_argument("--out", type=Path, help="also write the rows to this CSV file")

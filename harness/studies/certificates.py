@@ -77,7 +77,7 @@ def random_craft(seed: int) -> tuple[hubslosh.UncertainModel, hubslosh.Loop]:
 def unstable_draws(
     model: hubslosh.UncertainModel, loop: hubslosh.Loop, found: hubslosh.Certificate, draws: int
 ) -> int:
-    """Return the number of random Δ, uniform within the certified size, with an unstable loop."""
+    """Return how many of ``draws`` random Δ within the certified size make the loop unstable."""
     random, count, linear = np.random.default_rng(1), 0, loop.linear()
     low = np.maximum(-found.size, list(found.least.values()))
     for _ in range(draws):
@@ -87,7 +87,6 @@ def unstable_draws(
 
 
 def main() -> None:
-    """Print the table with a row for each loop."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--fills", nargs="*", default=telecom.FILLS)
     parser.add_argument("--craft", type=int, default=10)

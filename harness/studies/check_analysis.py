@@ -104,7 +104,10 @@ class Sweep:
 
 
 def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real) -> Complex:
-    """Return Fourier coefficients at the sweep's phase, in Hann windows of at most 24 cycles."""
+    """Return Fourier coefficients of torque and output at the frequencies ``grid``, Hz.
+
+    They are computed at the phase of the sweep, in Hann windows of at most 24 cycles.
+    """
     carrier = np.exp(-1j * sweep.phase(time))
     response = np.empty(len(grid), complex)
     for i, (f, centre) in enumerate(zip(grid, sweep.time_of(grid), strict=True)):
@@ -116,7 +119,10 @@ def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real)
 
 
 def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Complex:
-    """Return the Blackman–Tukey estimate at the frequencies ``grid``, with lags up to ``lag`` s."""
+    """Return the frequency response at ``grid``, Hz, by Blackman and Tukey's method.
+
+    ``lag`` is the largest lag of the correlations, s, and ``step`` the time between rows, s.
+    """
     u, y = torque - torque.mean(), output - output.mean()
     last = min(round(lag / step), len(u) - 1)
     lags = np.arange(-last, last + 1)
@@ -136,7 +142,10 @@ def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Comp
 
 
 def features(grid: Real, response: Complex) -> Features:
-    """Return antiresonance and resonance, both ends of the largest rise of |H| in dB."""
+    """Return the antiresonance and the resonance of a frequency response.
+
+    They are both ends of the largest rise of |H| in dB over the frequencies ``grid``.
+    """
     level = 20 * np.log10(np.abs(response))
     lowest = np.minimum.accumulate(level)
     high = int(np.argmax(level - lowest))
@@ -185,7 +194,7 @@ class Model:
 
 
 def fit(grid: Real, measured: Complex) -> Model:
-    """Fit a model to a complex response by least squares.
+    """Fit a model to a complex response at the frequencies ``grid`` by least squares.
 
     The poles are optimised; for given poles the numerator follows from linear least squares.
     """
@@ -216,9 +225,10 @@ def fit(grid: Real, measured: Complex) -> Model:
 
 
 def residual_of(model: Model, step: float, torque: Real, rate: Real) -> Real:
-    """Return the measured rate minus the rate of the model.
+    """Return the measured rate minus the rate of ``model`` under the same torque.
 
-    The torque is interpolated linearly; the initial state of the model is fitted.
+    ``step`` is the time between rows, s. The torque is interpolated linearly; the initial state of
+    the model is fitted.
     """
     driven = signal.TransferFunction(model.numerator, model.denominator()).to_ss()
     time = np.arange(len(torque)) * step
@@ -232,7 +242,11 @@ def residual_of(model: Model, step: float, torque: Real, rate: Real) -> Real:
 
 
 def coherence(step: float, torque: Real, output: Real, length: int) -> tuple[Real, Real]:
-    """Return Welch's coherence, with half-overlapping, zero-padded Hamming windows."""
+    """Return Welch's coherence of torque and output.
+
+    It uses half-overlapping, zero-padded Hamming windows of ``length`` rows, which are ``step`` s
+    apart.
+    """
     window = signal.windows.hamming(length, sym=True)
     return signal.coherence(
         torque - torque.mean(),

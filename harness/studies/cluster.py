@@ -59,14 +59,13 @@ TORQUE_COLUMNS = ("time", hubslosh.TORQUE, "tau_slope")
 
 
 class CampaignError(Exception):
-    """Raised if the runs cannot start or cannot continue."""
+    """Raised if the runs of a campaign cannot start or cannot continue."""
 
 
 class Harness:
     """The program ``hubslosh`` with an FMU, a plan, and a directory for the results."""
 
     def __init__(self, program: Path, fmu: Path, plan: str, out: Path) -> None:
-        """Store the paths; `listing` checks whether they exist."""
         self.program, self.fmu, self.plan, self.out = program, fmu, plan, out
 
     def listing(self) -> dict[str, Any]:
@@ -111,7 +110,8 @@ class Harness:
 def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
     """Return the reason why a file is not a complete record of a run, or None if it is one.
 
-    The harness applies the same rules when it reads stored runs.
+    ``columns`` are the signals that it must have. The command ``hubslosh campaign`` applies the
+    same rules to stored runs.
     """
     try:
         file = pyarrow.parquet.ParquetFile(path)
@@ -134,7 +134,7 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
 def drive_here(
     fmu: str, run: Run, torque: list[np.ndarray], columns: list[str]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
-    """Simulate one run on a worker.
+    """Simulate one run on a worker of the cluster.
 
     Return its columns and the worker's name, or None and the reason of the failure.
     """
@@ -238,7 +238,7 @@ def make_runs(
 def make_runs_in(
     store: Store, client: Client, harness: Harness, made: Callable[[Run], None]
 ) -> dict[str, str]:
-    """Do the work of `make_runs` in a directory that is locked already."""
+    """Do the work of `make_runs` in a directory that this process has locked already."""
     todo = harness.listing()
     columns = todo["columns"]
     missing = []
@@ -313,7 +313,7 @@ def make_runs_in(
 
 
 def reason(error: BaseException) -> str:
-    """Return the reason of a run's failure, for an error that is not a message of the FMU."""
+    """Return the reason of a run's failure as text, for an error that is no message of the FMU."""
     if isinstance(error, KilledWorker):
         return f"{error.allowed_failures + 1} workers died while they simulated it"
     return f"{type(error).__name__}: {error}"
@@ -360,14 +360,13 @@ def arguments(description: str) -> argparse.ArgumentParser:
 
 
 def positive(text: str) -> int:
-    """Return a number of workers."""
+    """Return the positive integer in ``text``, a number of workers."""
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f'"{text}" is not a number of workers, 1 or more')
     return int(text)
 
 
 def main() -> None:
-    """Simulate the runs, then analyse them by ``hubslosh campaign``."""
     parser = arguments("Simulates the runs of a plan on a Dask cluster.")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",

@@ -37,7 +37,6 @@ class Killer:
     """Kills one local worker in the middle of a run, after the first run is finished."""
 
     def __init__(self, client: Client) -> None:
-        """Store the client; no worker is killed yet."""
         self.client = client
         self.process: int | None = None
         """Process of the killed worker."""
@@ -45,7 +44,7 @@ class Killer:
         """Name of the run that the worker was simulating."""
 
     def made(self, run: cluster.Run) -> None:
-        """Kill a busy worker after the first run; this method is called after each run."""
+        """Kill a busy worker after the first run; Dask's runs call this method when they end."""
         if self.process is not None:
             return
         for address, process in self.client.run(os.getpid).items():
@@ -132,7 +131,6 @@ def compare(
 
 
 def main() -> None:
-    """Run the comparison, and print the largest differences."""
     parser = cluster.arguments("Compares the runs of a plan by the harness with runs by Dask.")
     parser.add_argument(
         "--out", type=Path, metavar="DIRECTORY",

@@ -73,19 +73,21 @@ def runs(seconds: float) -> list[tuple[str, Parameters, pd.DataFrame]]:
 
 
 def signals(*fmus: Path) -> list[str]:
-    """Return the names of outputs and scalar local variables that all builds have, without gyro."""
+    """Return the outputs and scalar local variables that all FMUs have, without gyro."""
     names = [Fmu.open(fmu).names("output", "local") for fmu in fmus]
     common = set(names[0]).intersection(*names) - {"omega_imu"}
     return [name for name in names[0] if name in common and "[" not in name and "(" not in name]
 
 
 def run(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: list[str]) -> pd.DataFrame:
-    """Simulate one run with an FMU, and return the signals ``names``."""
     return simulate(fmu, parameters, torque, outputs=names, tolerance=TOLERANCE)
 
 
 def difference(one: pd.DataFrame, other: pd.DataFrame, names: list[str]) -> tuple[float, str]:
-    """Return the largest difference relative to its signal's maximum, and the signal's name."""
+    """Return the largest difference of two runs, and the signal in which it occurs.
+
+    Differences are relative to the maximum of their signal.
+    """
     largest = (0.0, "")
     for name in names:
         a, b = one[name].to_numpy(float), other[name].to_numpy(float)
@@ -96,7 +98,10 @@ def difference(one: pd.DataFrame, other: pd.DataFrame, names: list[str]) -> tupl
 
 
 def sensitivity(fmu: Path, parameters: Parameters, torque: pd.DataFrame, names: list[str]) -> float:
-    """Return the largest difference that a change of the last bit of a parameter causes."""
+    """Return the largest change of a signal if a parameter changes in its last bit.
+
+    This is how far rounding errors alone can move the results of the run.
+    """
     reference = run(fmu, parameters, torque, names)
     found = 0.0
     for name, toward in itertools.product(("hub.I", "tank.r"), (0.0, math.inf)):

@@ -24,7 +24,6 @@ NUMBER = re.compile(r"-?\d+\.?\d*")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options for the paths of the FMUs and of the program."""
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
@@ -32,19 +31,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker of tests that take several seconds each."""
     config.addinivalue_line("markers", "long: takes seconds; --long runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect the long tests, unless --long is given."""
     if not config.getoption("--long"):
         items[:] = [item for item in items if item.get_closest_marker("long") is None]
 
 
 @pytest.fixture(scope="session")
 def fmu(request: pytest.FixtureRequest) -> Path:
-    """Return HubSlosh.fmu; Spacecraft.fmu and SloshTank.fmu are in the same folder."""
+    """Return the path of HubSlosh.fmu; Spacecraft.fmu and SloshTank.fmu are in the same folder."""
     path: Path = request.config.getoption("--fmu").absolute()
     return path
 

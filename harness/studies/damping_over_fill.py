@@ -29,7 +29,10 @@ NU, GRAVITY = 1e-6, 0.3  # m²/s, m/s²
 
 
 def damping(shape: str, fills: list[str]) -> pd.DataFrame:
-    """Return the damping ratio of mode 1 at each fill, with its interval, by ``hubslosh tank``."""
+    """Return the damping ratio of mode 1 at each fill, with its interval, by ``hubslosh tank``.
+
+    ``shape`` is the shape in the notation of a tank file.
+    """
     with tempfile.TemporaryDirectory() as folder:
         tank = Path(folder) / "tank.toml"
         tank.write_text(f"density = 1000\nshape = {{ {shape} }}\n", encoding="utf-8")
@@ -40,7 +43,6 @@ def damping(shape: str, fills: list[str]) -> pd.DataFrame:
 
 
 def main() -> None:
-    """Compute the damping ratios, and draw them."""
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     percent = list(range(5, 95))
     figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")

@@ -41,7 +41,6 @@ class Time:
     """Elapsed time, s."""
 
     def __str__(self) -> str:
-        """Return a row of a Markdown table."""
         each = 1e3 * self.cpu / self.count
         return f"| {self.what} | {self.count} | {self.cpu:.2f} | {each:.1f} | {self.elapsed:.2f} |"
 
@@ -54,7 +53,10 @@ HEAD = (
 
 
 def timed(what: str, count: int, step: Callable[[], Any]) -> tuple[Time, Any]:
-    """Call ``step``; return its time and its result."""
+    """Call ``step``; return its time and its result.
+
+    ``what`` is the name of the design step, and ``count`` how many times it does its work.
+    """
     before, begin = os.times(), time.monotonic()
     found = step()
     after, end = os.times(), time.monotonic()
@@ -83,7 +85,10 @@ def loop_of(given: dict[str, Any]) -> Any:
 
 
 def loop_steps(loop: Any, inertia: float, runs: int, stop: float) -> list[Time]:
-    """Return the times of margins and of Monte Carlo runs with margins."""
+    """Return the times of margins, and of ``runs`` Monte Carlo runs to ``stop`` (s), of a loop.
+
+    ``inertia`` is the nominal value of the inertia that varies.
+    """
     from dataclasses import replace
 
     import hubslosh
@@ -105,7 +110,10 @@ def loop_steps(loop: Any, inertia: float, runs: int, stop: float) -> list[Time]:
 
 
 def now(fills: int, points: int, runs: int, stop: float) -> tuple[list[Time], dict[str, Any]]:
-    """Return the times of the design steps in this version, and the loop for `before`."""
+    """Return the times of all design steps in this version, and the loop for `before`.
+
+    ``fills``, ``points`` and ``runs`` say how large the design steps are; runs end at ``stop``, s.
+    """
     import numpy as np
 
     import hubslosh
@@ -154,7 +162,10 @@ for step in design_times.loop_steps(loop, 1150.0, int(sys.argv[3]), float(sys.ar
 
 
 def before(wheel: Path, given: dict[str, Any], runs: int, stop: float) -> str:
-    """Return the rows of the table for an older wheel of HubSlosh."""
+    """Return the rows of the table for ``wheel``, an older version of the package.
+
+    ``given`` has the loop that `now` returned.
+    """
     with tempfile.TemporaryDirectory(prefix="hubslosh-") as folder:
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(folder)
@@ -169,7 +180,6 @@ def before(wheel: Path, given: dict[str, Any], runs: int, stop: float) -> str:
 
 
 def main() -> None:
-    """Print the table of times."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--before", type=Path, metavar="WHEEL", help="an older wheel to compare")
     args = parser.parse_args()

@@ -55,19 +55,22 @@ TOLERANCES = {  # standard deviations of known values, relative or in m
 
 
 def cross(v: np.ndarray) -> np.ndarray:
-    """Return the matrix of v ×."""
+    """Return the matrix of the cross product v ×."""
     x, y, z = v
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a × b; for two short vectors this is much faster than NumPy's function."""
+    """Return the cross product a × b; for short vectors it is faster than NumPy's."""
     (a1, a2, a3), (b1, b2, b3) = a.tolist(), b.tolist()
     return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
 
 
 class Craft:
-    """The second simulator; parameters have their names in Spacecraft.fmu, body axes, about O."""
+    """An independent simulator of the craft, whose parameters have their names in Spacecraft.fmu.
+
+    Vectors are in body axes, and positions are relative to O.
+    """
 
     def __init__(self, p: dict[str, float]) -> None:
         """Compute the rigid part of the craft: dry craft and rigid liquids."""
@@ -125,7 +128,7 @@ class Craft:
         return np.linalg.solve(m, right)
 
     def rate(self, x: np.ndarray, u: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Return the derivative of the state, x'."""
+        """Return the derivative of the state x; for the arguments see `solve`."""
         solved, dx = self.solve(x, u, slope), np.empty_like(x)
         dx[:3] = solved[3:6]
         for i in range(len(self.bobs)):
@@ -205,7 +208,7 @@ def drawn_tanks(program: str, folder: Path) -> dict[str, float]:
 
 
 def manoeuvre(flight: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the commanded attitudes (rad) and the sideways forces (N) of a flight at its rows."""
+    """Return the commanded attitudes (rad) and sideways forces (N) of a flight, row by row."""
     time = STEP * np.arange(ROWS)
     slew, pulse = np.zeros((ROWS, 3)), np.zeros((ROWS, 2))
     for k, start in enumerate(range(10, 190, 20)):
@@ -224,7 +227,10 @@ def measured(
     errors: np.ndarray,
     truth: dict,
 ) -> pd.DataFrame:
-    """Return the readings of the sensors in a flight, and add their biases to ``truth``."""
+    """Return the readings of the sensors in a flight, and add their biases to ``truth``.
+
+    ``noise`` has the standard deviation of each sensor's noise, and ``errors`` their scale errors.
+    """
     number = 1 + sum(name.startswith("bias(omega[1])") for name in truth)
     table = flight.copy()
     table[OMEGA] = flight[OMEGA].to_numpy() @ (np.eye(3) + errors).T
@@ -245,7 +251,7 @@ def measured(
 
 
 def deviation(name: str, start: dict[str, float]) -> float:
-    """Return the standard deviation of a known value."""
+    """Return the standard deviation with which the value ``name`` is known before the flight."""
     size = TOLERANCES[name]
     if not size.endswith("%"):
         return float(size.removeprefix("±"))
@@ -253,7 +259,7 @@ def deviation(name: str, start: dict[str, float]) -> float:
 
 
 def free_flags(start: dict[str, float], noise: dict[str, float], known_as: str) -> list[str]:
-    """Return the flags of `hubslosh identify` and `design` without the names of files."""
+    """Return the options of `hubslosh identify` and `design`, except the names of files."""
     free = [f"craft.J{i}{i}={start[f'craft.J{i}{i}']}:200:2500" for i in "xyz"]
     free += [f"{name}={start[name]}:-1:1" for name in names("craft.r")]
     for i in (1, 2):
@@ -289,7 +295,10 @@ def free_flags(start: dict[str, float], noise: dict[str, float], known_as: str) 
 def twin(
     seed: int, kind: str, program: str, fmu: str, folder: Path, known_as: str = "exact"
 ) -> tuple[dict, dict[str, Any], float]:
-    """Simulate and identify one flight; return true values, result and CPU time (s)."""
+    """Simulate and identify one flight; return true values, result and CPU time (s).
+
+    ``known_as`` says how the actuators' scales are given: as exact, or with their uncertainty.
+    """
     random, noise = default_rng(seed), NOISE[kind]
     start = drawn_tanks(program, folder) | {"craft.mass": 1180.0}
     start |= {"craft.Jxx": 910.0, "craft.Jyy": 860.0, "craft.Jzz": 640.0}
@@ -326,7 +335,6 @@ def twin(
 
 
 def main() -> None:
-    """Print the tables of estimates and of coverage."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--gyro", default="good", choices=list(NOISE), help="which gyro")
     parser.add_argument(

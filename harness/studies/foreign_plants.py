@@ -211,12 +211,16 @@ class Setup:
 
 
 def sweep(amplitude: float, f0: float, f1: float, duration: float) -> Callable:
-    """Return a function of time, a sine sweep that is linear in frequency."""
+    """Return a sine sweep, linear in frequency from ``f0`` to ``f1``, as a function of time."""
     return lambda t: amplitude * np.sin(2 * pi * (f0 * t + (f1 - f0) / (2 * duration) * t**2))
 
 
 def noise(random: Generator, rms: float, band: tuple[float, float], period: float) -> Callable:
-    """Return a function of time, a sum of sines with random phases in a frequency band."""
+    """Return random noise as a function of time.
+
+    It is a sum of sines with random phases in the frequency ``band``, Hz, and has the standard
+    deviation ``rms``.
+    """
     lines = np.fft.rfftfreq(round(200 * period), 1 / 200)
     spectrum = np.exp(2j * pi * random.uniform(size=lines.size))
     spectrum[(lines < band[0]) | (lines > band[1])] = 0.0
@@ -228,7 +232,7 @@ def noise(random: Generator, rms: float, band: tuple[float, float], period: floa
 
 
 def turning(amplitude: float, duration: float) -> Callable:
-    """Return a function of time, a sweep plus a slow sine that turns the hub several times."""
+    """Return a torque as a function of time: a sweep, and a slow sine that turns the hub."""
     fast = sweep(amplitude, 1.5, 3.6, duration)
     return lambda t: fast(t) + 0.05 * np.sin(2 * pi * t / 60)
 
@@ -236,7 +240,7 @@ def turning(amplitude: float, duration: float) -> Callable:
 def draw(random: Generator, duration: float) -> Setup:
     """Return a random bench, whose values are within 30 % of the bench of the thesis.
 
-    Errors of its known values are within their tolerances.
+    Errors of its known values are within their tolerances. The recording takes ``duration``, s.
     """
 
     def near(value: float) -> float:
@@ -301,7 +305,7 @@ HABITS: dict[str, dict] = {
 
 @dataclass
 class Plant:
-    """An effect of the bench that the fitted models do not have."""
+    """An effect that a bench has and the fitted models do not have."""
 
     change: Callable[[Setup, Generator, float], None]  # applies the effect for a torque amplitude
     causes: str  # regular expression of the causes that are true
@@ -332,7 +336,10 @@ def actuator(law: Callable) -> Callable[[Setup, Generator, float], None]:
 
 
 def dead_zone(u: np.ndarray, x: float, _: float) -> np.ndarray:
-    """Return the torque of an actuator with a dead zone of 2 to 5 mN·m."""
+    """Return the torque for the commands ``u`` of an actuator with a dead zone of 2 to 5 mN·m.
+
+    ``x`` between 0 and 1 chooses the width.
+    """
     return np.sign(u) * np.maximum(abs(u) - 0.002 - 0.003 * x, 0.0)
 
 
@@ -343,7 +350,7 @@ def periodic_friction(setup: Setup, random: Generator, amplitude: float) -> None
 
 
 def slow_clipped_gyro(setup: Setup, random: Generator, _: float) -> None:
-    """Give the gyro a filter, and clip its readings."""
+    """Give the gyro of a bench a low-pass filter, and clip its readings."""
     setup.gyro_lag, setup.clip = random.uniform(0.01, 0.04), 0.8
 
 
@@ -419,7 +426,7 @@ PLANTS = {
 
 
 def run(program: str, twin: Twin, arguments: Iterable[str], path: Path) -> tuple[dict | str, float]:
-    """Identify a recording; return the result, or the error message, and the CPU time, s."""
+    """Identify a recording; return the result or the error, and the CPU time, s."""
     twin.table.to_csv(path, index=False)
     result = path.with_suffix(".json")
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -433,7 +440,7 @@ def run(program: str, twin: Twin, arguments: Iterable[str], path: Path) -> tuple
 
 
 def beyond(found: dict, truth: dict[str, float], spread: dict[str, float]) -> list[str]:
-    """Return the parameters whose errors exceed five standard deviations.
+    """Return the parameters whose estimates are wrong by more than five standard deviations.
 
     ``spread`` has the largest relative change of parameters that vary during the recording.
     """
@@ -457,7 +464,7 @@ def named(found: dict) -> list[str]:
 
 
 def judge(found: dict, plant: Plant, twin: Twin) -> list[str]:
-    """Return the wrong statements in a result for a bench outside the model."""
+    """Return the wrong statements in a result for a bench that has an effect outside the model."""
     off = beyond(found, twin.truth, plant.spread) if found["fits"] else []
     faults = [f"fits, but {name}" for name in off]
     causes = named(found)
@@ -475,7 +482,7 @@ def options_of(setup: Setup, seed: int, models: str | None) -> list[str]:
 
 
 def plants(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> None:
-    """Print a row for each bench outside the model."""
+    """Print a row for each effect outside the model."""
     print("| bench | amplitude, N·m | seed | fits | named | runs | CPU, s | wrong |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     only = arguments.only.split(",") if arguments.only else list(PLANTS)
@@ -531,13 +538,12 @@ def twins(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> No
 
 
 def seeds(text: str) -> range:
-    """Read a range of seeds."""
+    """Return the range of seeds that ``text`` gives, such as "0-20"."""
     first, _, last = text.partition("-")
     return range(int(first), int(last or first) + 1)
 
 
 def main() -> None:
-    """Print the table of plants or of twins."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=["plants", "twins"])
     parser.add_argument("--seeds", type=seeds, help="such as 1-12 (default; plants: 1)")

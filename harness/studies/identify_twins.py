@@ -29,7 +29,7 @@ from scipy.integrate import solve_ivp
 
 @dataclass
 class Twin:
-    """A simulated recording, with the true values of the unknowns by name."""
+    """A simulated recording (a twin of a measured one), with the true values of the unknowns."""
 
     table: pd.DataFrame
     truth: dict[str, float]
@@ -231,7 +231,6 @@ CASES = {
 
 
 def run(case: Case, twin: Twin, program: str, folder: str) -> dict:
-    """Identify one twin and return the result."""
     recording, result = Path(folder) / "twin.csv", Path(folder) / "result.json"
     twin.table.to_csv(recording, index=False)
     command = [program, "-q", "identify", recording, "--fmu", case.fmu, *case.arguments]
@@ -247,13 +246,12 @@ class Tally:
     """
 
     def __init__(self) -> None:
-        """Create an empty list of twins."""
         self.seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
         self.refused: list[int] = []
         self.unfit: list[int] = []
 
     def add(self, seed: int, found: dict | str, truth: dict[str, float]) -> None:
-        """Count the result of a twin; ``found`` is a text if the identification was refused."""
+        """Count the result of the twin ``seed``; ``found`` is the error text if it was refused."""
         if isinstance(found, str):
             self.refused.append(seed)
             return
@@ -267,7 +265,7 @@ class Tally:
                 self.seen[unknown].append((low <= truth[unknown] <= high, error, e["std"]))
 
     def rows(self) -> list[str]:
-        """Return a row of a table in Markdown for each unknown."""
+        """Return a row for each unknown of the Markdown table of coverage."""
         rows = []
         for unknown, each in self.seen.items():
             inside, off, std = (np.array(column, dtype=float) for column in zip(*each, strict=True))
@@ -279,7 +277,6 @@ class Tally:
 
 
 def main() -> None:
-    """Print the table of coverage."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="folder with the FMUs of other projects")
     parser.add_argument("--cases", default=",".join(CASES), help="which cases")

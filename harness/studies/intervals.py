@@ -38,11 +38,9 @@ class Bench:
     """Runs the command `hubslosh` in a folder."""
 
     def __init__(self, program: str, fmu: str, folder: Path) -> None:
-        """Store the paths of the program, of HubSlosh.fmu and of the folder."""
         self.program, self.fmu, self.folder = program, fmu, folder
 
     def call(self, *arguments: str) -> str:
-        """Run the command with these arguments, and return its output."""
         done = subprocess.run(
             [self.program, *arguments], cwd=self.folder, capture_output=True, text=True, check=False
         )
@@ -52,7 +50,6 @@ class Bench:
         return done.stdout
 
     def write(self, name: str, **columns: Vector) -> None:
-        """Write columns as a CSV file in the folder."""
         rows = np.column_stack(list(columns.values()))
         header = ",".join(columns)
         np.savetxt(self.folder / name, rows, delimiter=",", header=header, comments="", fmt="%.12g")
@@ -86,7 +83,7 @@ Draws = Callable[[Bench, int], Iterator[Result]]
 
 
 def ends(found: dict[str, object], truth: float) -> tuple[float, float, float]:
-    """Return the true value and the ends of its interval; an end that is null is infinite."""
+    """Return the true value and the ends of the interval in ``found``; null means infinity."""
     low, high = found["interval"]  # type: ignore[misc]
     return truth, -np.inf if low is None else low, np.inf if high is None else high
 
@@ -152,13 +149,16 @@ FREE = {"hub.I": 0.35, "friction.b": 0.05}
 
 
 def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
-    """Fit a hub in closed form; the scale of its torque is known to 1 %."""
+    """Identify the parameters of a hub, simulated in closed form, by ``identify fmu``.
+
+    The scale of its torque is known to 1 %.
+    """
     found, _ = free_fit(bench, rng)
     return {name: ends(found[name], truth) for name, truth in FREE.items()}
 
 
 def planned_free(bench: Bench, rng: np.random.Generator) -> Result:
-    """Predict the intervals of the same fit by `design`, from the torque only."""
+    """Predict the intervals of the fit in `any_fmu` by `design`, from the torque only."""
     found, asked = free_fit(bench, rng)
     # the predictions are valid near the expected values; here the true values are expected
     expected = ",".join(f"{name}={truth}:0.001:1" for name, truth in FREE.items())
@@ -193,9 +193,10 @@ def free_fit(
 
 
 def foretold(found: dict[str, object], truth: float, std: float) -> tuple[float, ...]:
-    """Return the true value, the predicted interval, and a ratio of standard deviations.
+    """Return the true value, the interval that `design` predicts, and a ratio.
 
-    The ratio is the predicted standard deviation divided by the standard deviation of the fit.
+    The ratio is the predicted standard deviation ``std`` divided by the standard deviation of the
+    fit.
     """
     value, fitted = float(found["value"]), float(found["std"])  # type: ignore[arg-type]
     return truth, value - 1.96 * std, value + 1.96 * std, std / fitted
@@ -325,7 +326,7 @@ def tank_damping(bench: Bench, rng: np.random.Generator) -> Result:
 
 
 def each(method: Callable[[Bench, np.random.Generator], Result]) -> Draws:
-    """Return a function that yields the result of a method for each of the seeds 0, 1, 2, …."""
+    """Return a function that yields the result of ``method`` for each of the seeds 0, 1, 2, …."""
 
     def draw(bench: Bench, draws: int) -> Iterator[Result]:
         for seed in range(draws):
@@ -358,7 +359,7 @@ METHODS: dict[str, Draws] = {
 
 
 def census(bench: Bench, only: str, draws: int) -> Iterator[str]:
-    """Yield the rows of the table, one for each estimated quantity."""
+    """Yield a row of the table for each quantity that the command estimates with an interval."""
     for name, method in METHODS.items():
         if only not in name:
             continue
@@ -387,7 +388,6 @@ def census(bench: Bench, only: str, draws: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """Print the table of coverage and widths."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

@@ -54,7 +54,7 @@ TAIL = """  </ModelVariables>
 
 
 def variable(k: int) -> str:
-    """Return the XML of the further variable with the index ``k``, counted from 0."""
+    """Return the XML of the additional variable with the index ``k``, counted from 0."""
     name = f"machine.drive[{k // 1000}].stage[{k // 10 % 100}]"
     if k % 10 == 0:
         name += ".preload"
@@ -91,7 +91,6 @@ def write(path: Path, variables: int) -> int:
 
 
 def main() -> None:
-    """Write the FMU, check it, and print time and memory of the check."""
     assert platform.system() == "Linux", "the binary is made for Linux"
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--variables", type=int, default=100_044)

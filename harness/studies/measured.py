@@ -80,19 +80,21 @@ class Row:
 def share(
     experiment: str, quantity: str, kind: str, inside: np.ndarray, least: int, rule: int = 2
 ) -> Row:
-    """Return the row of a set of points, of which at least ``least`` must be inside a band."""
+    """Return the comparison of a set of points, at least ``least`` of which must be in a band.
+
+    ``inside`` has, for each point, whether it is in the band.
+    """
     low = least / len(inside)
     middle, half = (1 + low) / 2, (1 - low) / 2
     return Row(experiment, quantity, kind, "share", float(np.mean(inside)), 0.0, middle, half, rule)
 
 
 def most(count: int) -> int:
-    """Return the number of points of a set of ``count`` points that must be inside a band."""
+    """Return how many of ``count`` points must be inside a band so that the comparison passes."""
     return math.floor(SHARE * count + 1e-9)
 
 
 def table(name: str) -> pd.DataFrame:
-    """Read a file of measurements as a table."""
     return pd.read_csv(DATA / name, comment="#")
 
 
@@ -105,7 +107,11 @@ def tank(
     model: str = "HubSlosh",
     contact_angle: float = 90.0,
 ) -> tuple[dict[str, float], dict]:
-    """Return the parameters that ``hubslosh tank`` writes for a tank with water, and its JSON."""
+    """Return the parameters that ``hubslosh tank`` writes for a tank with water, and its JSON.
+
+    ``text`` is the tank file; ``fill`` is in m, the surface tension ``sigma`` in N/m, the viscosity
+    ``nu`` in m²/s, and the contact angle in degrees.
+    """
     with tempfile.TemporaryDirectory() as folder:
         file, out, result = (Path(folder) / name for name in ("tank.toml", "set.toml", "out.json"))
         file.write_text(text)
@@ -123,7 +129,7 @@ def tank(
 
 
 def frequency(of: dict[str, float], mode: int = 1) -> float:
-    """Return the natural frequency of a mode with capillarity, rad/s."""
+    """Return the natural frequency of a slosh mode with surface tension, rad/s."""
     stiffness = of[f"k[{mode}]"] / of[f"mass[{mode}]"]
     return math.sqrt(G / of[f"length[{mode}]"] + stiffness)
 
@@ -145,7 +151,10 @@ def rectangular_tanks() -> tuple[list[Row], str]:
     unit = "density = 1000\nbox = [1, 1.5]\n"
 
     def band(h: float) -> tuple[float, float, float]:
-        """Return the range of natural frequencies at the depth ``h`` (third order)."""
+        """Return the range of natural frequencies at the depth ``h``, m.
+
+        Its width is the effect of unknown amplitudes according to third-order theory.
+        """
         of, found = tank(unit, h, 1)
         slow = frequency(of) / math.sqrt(G)
         # without coefficients (because of a secondary resonance) no range is known
@@ -357,7 +366,7 @@ def ramp(duration: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def path(kind: str, level: str, sigma: np.ndarray) -> np.ndarray:
-    """Return the path of the robot, m, for values ``sigma`` of the motion law."""
+    """Return the path of the robot, m, for values ``sigma`` of its motion law."""
     if kind == "LE":  # a lemniscate, with vertical motion along a saddle
         phi = 2 * np.pi * sigma
         x, y = 0.25 * np.sin(2 * phi + np.pi), 0.5 * np.cos(phi + np.pi / 2)
@@ -536,7 +545,10 @@ def cylinder_circular() -> tuple[list[Row], str]:
 
 
 def planar_wave_breaks(parameters: dict[str, float], rate: float, amplitude: float) -> bool:
-    """Return True if a wave across the motion grows, on a tank that moves to and fro."""
+    """Return True if a wave across the motion grows in a tank that moves to and fro.
+
+    ``rate`` is the angular frequency of the motion, rad/s, and ``amplitude`` its amplitude, m.
+    """
     time = np.arange(0.0, 600.0, 0.02)
     begin = np.minimum(time / 20.0, 1.0)
     motion = amplitude * rate**2 * begin * np.cos(rate * time)
@@ -896,7 +908,7 @@ def linear_sweep(amplitude: float) -> pd.DataFrame:
 
 
 def flat(settings: dict, prefix: str = "") -> dict:
-    """Return the variables in a nested table of a plan by their full names."""
+    """Return the variables in a nested TOML table by their full names."""
     out = {}
     for key, value in settings.items():
         if isinstance(value, dict):
@@ -997,7 +1009,10 @@ def short(value: float, digits: int = 3) -> str:
 
 
 def ours_of(row: Row) -> str:
-    """Return the computed value of a comparison as text, or the smallest allowed share."""
+    """Return the computed value of a comparison as text.
+
+    For a set of points it is the smallest share that must be inside the band.
+    """
     if row.unit == "share":
         return f"at least {short(row.ours - row.band)}"
     return with_band(row.ours, row.band)
@@ -1084,7 +1099,6 @@ def read_results() -> list[Row]:
 
 
 def main() -> None:
-    """Compute the comparisons, draw the pictures and write the page."""
     rows = []
     for name, experiment in EXPERIMENTS.items():
         more, drawing = experiment()

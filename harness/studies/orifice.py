@@ -12,7 +12,6 @@ class Orifice(Fmi2Slave):
     """Tank with area · h' = q - c sqrt(h), solved by Runge–Kutta in steps of 10 ms."""
 
     def __init__(self, **kwargs: object) -> None:
-        """Declare area (m²), c (m^2.5/s), inflow q (m³/s) and level h (m)."""
         super().__init__(**kwargs)
         self.area, self.c, self.h, self.q = 1.0, 0.5, 1.0, 0.0
         fixed = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}

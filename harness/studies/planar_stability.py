@@ -34,7 +34,6 @@ class Plant:
     """Hub with one slosh mode in an upright cylinder; the state is rate, x, y, x', y'."""
 
     def __init__(self, depth: float):
-        """Compute the pendulum for the depth of the liquid, m."""
         radius = DIAMETER / 2
         u = ROOT * depth / radius
         liquid = DENSITY * np.pi * radius**2 * depth
@@ -67,7 +66,10 @@ class Plant:
     def half_period(
         self, state: np.ndarray, torque: np.ndarray, phase: np.ndarray, frequency: np.ndarray
     ) -> np.ndarray:
-        """Return the mirrored states half a period later; symmetric motion returns to its start."""
+        """Return the states half a period later, with all signs changed.
+
+        A symmetric motion returns to its start.
+        """
         step = 0.5 / (frequency * STEPS)
         turn = np.pi / STEPS
         push = torque * np.sin(phase)
@@ -151,7 +153,7 @@ def onsets(plant: Plant, frequencies: np.ndarray) -> np.ndarray:
 
 
 def onset(depth: float = DEPTH) -> tuple[float, float]:
-    """Return frequency (Hz) and torque (N·m) of the onset of rotary slosh at a depth (m)."""
+    """Return frequency (Hz) and torque (N·m) at which slosh can become rotary, at a depth (m)."""
     torques = onsets(Plant(depth), FREQUENCIES)
     least = int(np.nanargmin(torques))
     return float(FREQUENCIES[least]), float(torques[least])

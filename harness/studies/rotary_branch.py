@@ -49,7 +49,6 @@ def sweep(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drive(model: str, inputs: pd.DataFrame) -> pd.DataFrame:
-    """Simulate the sweep with a slosh model."""
     outputs = ["omega", "slosh_angle", "slosh_angle_radial"]
     return hubslosh.simulate(FMU, parameters={"slosh.model": model}, inputs=inputs, outputs=outputs)
 
@@ -62,7 +61,7 @@ def envelope(signal: pd.Series) -> np.ndarray:
 
 
 class Panel:
-    """A pair of linear axes in the drawing."""
+    """A pair of linear axes in an SVG drawing."""
 
     def __init__(self, box: tuple, x: tuple, y: tuple, ticks: tuple, labels: tuple):
         """Create the axes in ``box`` (left, top, right, bottom, px).

@@ -114,7 +114,6 @@ def count_instructions(program: Path, folder: Path, case: str, tolerance: float)
 
 
 def main() -> None:
-    """Print the table, a row per case."""
     short = sys.argv[1:2] == ["--short"]
     if len(sys.argv) != 3 + short:
         sys.exit(__doc__)

@@ -148,7 +148,6 @@ def setting(text: str) -> tuple[str, float | str]:
 
 
 def main() -> None:
-    """Print the counts of one case, or the table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -51,7 +51,7 @@ def test_every_feature_is_reproduced_from_its_definition(campaign: Path) -> None
     assert rows[0]["rotary_from_hz"] == ""
 
 
-def test_a_wrong_feature_is_detected(campaign: Path) -> None:
+def test_a_wrong_number_in_a_campaigns_features_is_detected(campaign: Path) -> None:
     """The check finds an antiresonance that is 4 mHz wrong, and one that is missing."""
     path = campaign / "features_spa.csv"
     text = path.read_text(encoding="utf-8")

@@ -24,7 +24,7 @@ SHOWN = 0.1
 
 
 def kept(name: str) -> dict[str, dict[str, str]]:
-    """Return the rows of the stored table for an implementation, by case."""
+    """Return the rows of the stored table of scores for the implementation ``name``, by case."""
     return {row["case"]: row for row in compare.read_scores() if row["implementation"] == name}
 
 
@@ -92,7 +92,7 @@ def reference(case: str) -> list[str]:
 
 
 def scored(lines: list[str], folder: Path, case: str = "bench_linear") -> score.Score:
-    """Return the score that ``score.py`` gives to these lines."""
+    """Return the score that ``score.py`` gives to a results.csv with these lines."""
     path = folder / case / "results.csv"
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -134,7 +134,9 @@ def test_correct_digits_are_computed_from_the_error_over_the_largest_value(
 @pytest.mark.parametrize(
     ("factor", "hint"), [(180 / math.pi, "degrees for radians"), (-1.0, "the opposite sign")]
 )
-def test_a_hint_names_a_wrong_unit_or_sign(factor: float, hint: str, tmp_path: Path) -> None:
+def test_the_score_names_a_wrong_unit_or_sign_as_possible_cause(
+    factor: float, hint: str, tmp_path: Path
+) -> None:
     """The message names a column that is in degrees, or that has the opposite sign."""
     found = scored(changed(lambda row: [row[0], factor * row[1], *row[2:]]), tmp_path)
     assert not found.passed

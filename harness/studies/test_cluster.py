@@ -33,7 +33,7 @@ imu.seed = 2
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[Client]:
-    """Return a client of two workers."""
+    """Return a client of a Dask cluster of two local workers."""
     with cluster.cluster(2, None) as client:
         yield client
 
@@ -56,7 +56,6 @@ def long_runs(monkeypatch) -> None:
     right = cluster.drive_here
 
     def drive_here(fmu, run, torque, columns):
-        """Simulate a run after half a second of sleep."""
         import time
 
         time.sleep(0.5)
@@ -97,7 +96,6 @@ def test_a_refused_run_and_a_run_that_kills_its_workers_do_not_affect_other_runs
     right = cluster.drive_here
 
     def drive_here(fmu, run, torque, columns):
-        """Simulate a run, but end the process in one of them."""
         if run["settings"]["tank.h"] == 0.07:
             import os
 

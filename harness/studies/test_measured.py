@@ -12,7 +12,6 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture
 def built(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make the script use the FMUs of this build."""
     built = {name: fmu.with_name(f"{name}.fmu") for name in measured.FMUS}
     monkeypatch.setattr(measured, "FMUS", built)
 

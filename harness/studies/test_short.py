@@ -61,7 +61,6 @@ def half_digit(text: str) -> float:
 
 @pytest.fixture(autouse=True)
 def style() -> None:
-    """Undo the changes that studies make to matplotlib's settings."""
     plt.rcdefaults()
 
 
@@ -117,19 +116,19 @@ def test_damping_over_the_fill_of_a_capsule_has_no_step() -> None:
 
 
 def slowed(depth: float) -> float:
-    """Return the decrease of the frequency along the slope by a tilt of 60 degrees, %."""
+    """Return by how many per cent a tilt of 60 degrees lowers the frequency along the slope."""
     upright, tilted = (tilted_tank.frequencies(depth, tilt)[0] for tilt in (0, 60))
     return 100 * (1 - tilted / upright)
 
 
-def test_tilt_slows_slosh_along_the_slope() -> None:
+def test_the_tilt_of_a_shallow_tank_lowers_the_frequency_as_the_book_says() -> None:
     """The change of frequency at half a radius equals the number printed in book/liquid.md."""
     text = " ".join(lines("liquid.md"))
     shallow = re.search(r"Here it is −([\d.]+) % at a depth of half a radius", text)
     assert slowed(0.5) == pytest.approx(float(shallow[1]), abs=0.05)
 
 
-def test_tilt_slows_slosh_of_deeper_liquid() -> None:
+def test_the_tilt_of_deeper_tanks_lowers_the_frequency_as_the_book_says() -> None:
     """Changes of frequency at two larger depths equal the numbers printed in book/liquid.md."""
     deeper = re.search(r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md")))
     found = [slowed(depth) for depth in (1.0, 2.0)]

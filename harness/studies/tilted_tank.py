@@ -34,7 +34,6 @@ def frequencies(depth: float, tilt: float) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Compute the frequencies, and draw the picture."""
     mpl.rcParams["svg.hashsalt"] = "hubslosh"
     figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
     for depth, color in zip(DEPTHS, ("#0072b2", "#d55e00", "#009e73"), strict=True):

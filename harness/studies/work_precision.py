@@ -82,7 +82,10 @@ def build() -> Path:
 
 
 def run(program: Path, *arguments: str) -> tuple[float, float]:
-    """Run a method. Return its nanoseconds per 20 ms and its largest error of omega, rad/s."""
+    """Run the method that ``arguments`` name.
+
+    Return its CPU time per 20 ms of the simulation, ns, and its largest error of omega, rad/s.
+    """
     done = subprocess.run([program, *arguments], cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"error: {program.name} {' '.join(arguments)}: {done.stderr}")
@@ -163,12 +166,12 @@ def basilisk() -> list[tuple[str, float, float]]:
 
 
 def at_error(points: list[tuple], error: float) -> float:
-    """Return the smallest cost at which a method has at most this error."""
+    """Return the smallest cost of the ``points`` of a method with at most this error."""
     return min((cost for _, cost, err, _ in points if err <= error), default=math.inf)
 
 
 def draw(all_points: dict[str, list[tuple]], unit: float) -> None:
-    """Draw the diagram.
+    """Draw the diagram of error over cost.
 
     CPU times of Basilisk are known relative to the spherical model of the FMU at 1e-8.
     """
@@ -219,7 +222,6 @@ def table(all_points: dict[str, list[tuple]], unit: float) -> str:
 
 
 def main() -> None:
-    """Measure all methods, draw the diagram, and write the page."""
     if not (ROOT / "dist" / "HubSlosh.fmu").exists():
         sys.exit("error: dist/HubSlosh.fmu is missing: cargo run --release -- pack")
     program = build()

@@ -55,7 +55,10 @@ Solution = Callable[[list], np.ndarray]
 
 
 def pieces(rounds: int, every: float) -> list[tuple[float, float, np.ndarray, np.ndarray]]:
-    """Return the pieces of time in which inputs are constant, with the times of their rows."""
+    """Return the pieces of time in which inputs are constant, with the times of their rows.
+
+    Rows are ``every`` s apart; the motion is repeated for ``rounds`` rounds of 20 s.
+    """
     made = []
     for k in range(rounds):
         turned = np.array([1, 1, 1, 1, 1, 1.0]) if k % 2 == 0 else np.array([-1, -1, 1, -1, -1, -1])
@@ -70,14 +73,13 @@ class Heyoka:
     """heyoka's Taylor integrator, with dense output at the rows."""
 
     def __init__(self, tolerance: float) -> None:
-        """Compile the integrator."""
         equations, self.start = heyoka_taylor.craft_system(cases.parameters(CASE))
         self.taylor = hy.taylor_adaptive(
             equations, self.start, pars=[0.0] * 6, tol=tolerance, compact_mode=False
         )
 
     def __call__(self, given: list) -> np.ndarray:
-        """Return the states at the rows of the given pieces."""
+        """Return the states at all rows of the pieces of time ``given``."""
         ta, found = self.taylor, []
         ta.time = 0.0
         ta.state[:] = self.start
@@ -102,13 +104,12 @@ class Compiled:
     """Right-hand side of the equations, compiled by heyoka, for other integrators."""
 
     def __init__(self) -> None:
-        """Compile the right-hand side."""
         equations, self.start = heyoka_taylor.craft_system(cases.parameters(CASE))
         variables = [x for x, _ in equations]
         self.rates = hy.cfunc([hy.expression(rate) for _, rate in equations], variables)
 
     def of(self, wrench: np.ndarray) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
-        """Return the right-hand side as a function for constant force and torque."""
+        """Return the right-hand side of the equations for constant force and torque ``wrench``."""
         rates = self.rates
 
         def written(t: float, y: np.ndarray, y_d: np.ndarray) -> np.ndarray:
@@ -175,7 +176,7 @@ def fmu(tolerance: float) -> Solution:
 def error(found: np.ndarray) -> float:
     """Return the largest error over 20 s with rows every 0.1 s, relative to the largest values.
 
-    Columns of ``found`` are the rate, the velocity, and the direction of each bob.
+    Columns of ``found`` are the rate, the velocity, and the direction of each slosh mass.
     """
     columns = score.specification()[CASE]["columns"]
     wanted = score.read(score.HERE / CASE / "results.csv", columns)
@@ -309,7 +310,6 @@ def with_section(text: str, written: str) -> str:
 
 
 def main() -> None:
-    """Measure all methods and write the section."""
     written = section(measure(), compiling())
     text = with_section(PAGE.read_text(encoding="utf-8"), written)
     PAGE.write_text(text, encoding="utf-8")

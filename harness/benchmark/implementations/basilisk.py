@@ -21,7 +21,10 @@ def column(values) -> list[list[float]]:
 
 
 def pendulum_of(tank: dict) -> sphericalPendulum.SphericalPendulum:
-    """Return a pendulum whose angles are 0 at the start; its first axis points to the bob."""
+    """Return Basilisk's pendulum for a tank; its angles are 0 at the start.
+
+    The first axis of its frame points to the slosh mass at the start.
+    """
     first = tank["p_0"] / np.linalg.norm(tank["p_0"])
     third = np.cross(first, [0.6, 0.48, 0.64])
     third /= np.linalg.norm(third)
@@ -38,7 +41,10 @@ def pendulum_of(tank: dict) -> sphericalPendulum.SphericalPendulum:
 
 
 def bob(craft, pendulum) -> np.ndarray:
-    """Return the direction of the bob; Basilisk rotates the pendulum's frame during a run."""
+    """Return the present direction from the hinge to the slosh mass of ``pendulum``.
+
+    Basilisk rotates the pendulum's frame during a run.
+    """
     state = craft.dynManager.getStateObject
     phi = state(pendulum.nameOfPhiState).getState()[0][0]
     theta = state(pendulum.nameOfThetaState).getState()[0][0]

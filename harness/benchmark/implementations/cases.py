@@ -41,7 +41,7 @@ def inputs(case: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def segments(case: str) -> list[tuple[float, float, np.ndarray]]:
-    """Return begin, end and input of each piece of time in which the inputs are constant."""
+    """Return the pieces of time in which the inputs are constant: begin, end and inputs."""
     p = parameters(case)
     if case == "draining":
         return [(0.0, p["end"], np.hstack([p["force"], p["torque"]]))]
@@ -66,7 +66,7 @@ def inertia(p: dict) -> np.ndarray:
 
 
 def linearised_craft() -> dict:
-    """Return the craft of the case linearisation in the form of the cases in six axes."""
+    """Return the parameters of the case "linearisation" under the names of the six-axis cases."""
     p = parameters("linearisation")
     tank = {"hinge": np.array([0, 0, p["hinge"]]), "axis": np.array([0, 0, 1.0]), "m": p["m"],
             "l": p["l"], "c": p["c"], "k": 0.0, "p_0": np.array([0, 0, -1.0]),
@@ -77,12 +77,11 @@ def linearised_craft() -> dict:
 
 
 def frequencies() -> np.ndarray:
-    """Return the frequencies of the case linearisation, rad/s."""
+    """Return the frequencies at which the case "linearisation" is evaluated, rad/s."""
     return np.round(np.geomspace(0.05, 20.0, 131), 6)
 
 
 def write(folder: Path, case: str, rows: np.ndarray, comment: str = "") -> None:
-    """Write results.csv of a case."""
     columns = score.specification()[case]["columns"]
     path = folder / case / "results.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -104,12 +103,15 @@ def run(cases: Mapping[str, Callable[[], np.ndarray]]) -> None:
 
 
 def inputs_of_backbones() -> list[tuple[float, float, float, float]]:
-    """Return depth over radius, angle in degrees, s and kappa of each row."""
+    """Return the rows of the case "backbones": depth over radius, angle (deg), s and kappa.
+
+    s and kappa are the coefficients of third order of the slosh frequency.
+    """
     return [tuple(row[1:]) for row in _numbers("backbones")]
 
 
 def _numbers(case: str) -> list[list[float]]:
-    """Return the rows of input.csv."""
+    """Return the rows of the case's input.csv as an array."""
     with HERE.joinpath(case, "input.csv").open(encoding="utf-8") as file:
         lines = [line for line in file if not line.startswith("#")]
     return [[float(x) for x in row] for row in csv.reader(lines[1:])]

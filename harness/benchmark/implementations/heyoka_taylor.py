@@ -18,22 +18,18 @@ BREAKS_AWAY = 1e-4
 
 
 def dot(a, b):
-    """Return the scalar product of expressions or numbers."""
     return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)
 
 
 def cross(a, b):
-    """Return the vector product."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def add(*vectors):
-    """Return the sum of vectors."""
     return [sum(parts, 0.0) for parts in zip(*vectors, strict=True)]
 
 
 def scale(factor, a):
-    """Return a multiple of a vector."""
     return [factor * x for x in a]
 
 
@@ -43,7 +39,10 @@ def is_zero(x) -> bool:
 
 
 def solve(matrix: Matrix, right: list) -> list:
-    """Solve linear equations by Gaussian elimination without pivoting."""
+    """Solve linear equations by Gaussian elimination without pivoting.
+
+    ``matrix`` and ``right`` have expressions or numbers as elements.
+    """
     n = len(right)
     a = [[*row, b] for row, b in zip(matrix, right, strict=True)]
     for i in range(n):
@@ -72,7 +71,7 @@ def names(*groups: str) -> list:
 
 
 def attitude(q, w, a):
-    """Return the derivative of the quaternion q, and ``a`` transformed to inertial axes."""
+    """Return q' for the quaternion q at the rate ``w``, and ``a`` in inertial axes."""
     s, v = q[0], q[1:]
     q_d = [-0.5 * dot(v, w), *(0.5 * x for x in add(scale(s, w), cross(v, w)))]
     t = scale(2.0, cross(v, a))
@@ -83,7 +82,10 @@ def attitude(q, w, a):
 
 
 def lagrange(lagrangian, force, coordinates, rates):
-    """Return matrix and right-hand side of the linear equations for accelerations (Lagrange)."""
+    """Return matrix and right-hand side of Lagrange's equations, linear in the accelerations.
+
+    ``force`` has the generalised forces.
+    """
     matrix, right = [], []
     for q, v, f in zip(coordinates, rates, force, strict=True):
         momentum = hy.diff(lagrangian, v)
@@ -97,7 +99,11 @@ def lagrange(lagrangian, force, coordinates, rates):
 
 
 class Bench:
-    """Hub and bob; coordinates are theta and alpha, or theta and the bob's stereographic ones."""
+    """Hub and slosh mass (bob) of the bench, with dry friction.
+
+    The coordinates are theta and alpha, or theta and the stereographic coordinates of the slosh
+    mass.
+    """
 
     def __init__(self, case: str):
         """Create an integrator for each contact: sliding forwards, sliding backwards, sticking."""
@@ -163,7 +169,6 @@ class Bench:
         self.p = p
 
     def start(self):
-        """Return the start values."""
         p = self.p
         if not self.spherical:
             return np.array([0.0, p["alpha_0"], 0.0, 0.0])
@@ -172,14 +177,12 @@ class Bench:
         return np.array([0.0, x / k, y / k, 0.0, 0.0, 0.0])
 
     def columns(self, y):
-        """Return the values of one row of results.csv after the time."""
         if not self.spherical:
             return [y[0], y[2], y[1]]
         k = 2 / (1 + y[1] ** 2 + y[2] ** 2)
         return [y[0], y[3], k * y[1], k * y[2]]
 
     def run(self, case: str):
-        """Simulate a case and return its rows."""
         times, rows = cases.row_times(case), []
         y, n = self.start(), self.n
         sign, breaks_away = 0, False
@@ -220,7 +223,7 @@ class Bench:
         return np.array(rows)
 
     def contact(self, y, tau: float) -> int:
-        """Return 0 if a hub at rest sticks, or the sign of the sliding that begins."""
+        """Return 0 if a hub at rest sticks under the torque ``tau``, or the sign of its sliding."""
         load = self.load(y, pars=np.array([tau]))[0]
         return 0 if abs(load) <= self.most else int(np.sign(load))
 
@@ -229,7 +232,11 @@ class Bench:
 
 
 def rigid_rows(p: dict, first, origin) -> Matrix:
-    """Return the mass matrix of a rigid body with this first moment and inertia about O."""
+    """Return the mass matrix of a rigid body about O: six rows for force and torque.
+
+    ``p`` is the mass, ``first`` the mass times the centre of mass, and ``origin`` the inertia about
+    O.
+    """
     x, y, z = first
     mass = p
     top = [[mass, 0.0, 0.0, 0.0, z, -y], [0.0, mass, 0.0, -z, 0.0, x], [0.0, 0.0, mass, y, -x, 0.0]]
@@ -238,7 +245,10 @@ def rigid_rows(p: dict, first, origin) -> Matrix:
 
 
 def craft_system(p: dict):
-    """Return the equations of a craft with pendulums, with force and torque as parameters."""
+    """Return the equations of motion of a craft with pendulums.
+
+    Force and torque are parameters of the equations.
+    """
     q, w, v = names("q:4"), names("w:3"), names("v:3")
     force, torque = hy.par[0], hy.par[3]
     force, torque = [hy.par[i] for i in range(3)], [hy.par[i] for i in range(3, 6)]
@@ -443,7 +453,10 @@ def linearisation():
 
 
 def wave(s, kappa, g, l):
-    """Return the Lagrangian of the bob divided by m l^2, its coordinates and their rates."""
+    """Return the Lagrangian of a slosh mass on its surface, divided by m l², coordinates and rates.
+
+    s and kappa are the coefficients of third order, g the specific force, and l the length.
+    """
     x, y, x_d, y_d = names("x", "y", "u", "v")
     u = x * x + y * y
     rise = 1.0 - hy.sqrt(1.0 - u) + (kappa - 1) / 8 * u * u
@@ -455,7 +468,10 @@ def wave(s, kappa, g, l):
 
 
 def backbones():
-    """Return frequencies of free waves by quarter periods or, for circles, by balance of forces."""
+    """Return the frequency of free waves at each amplitude of the case "backbones".
+
+    Planar waves are integrated over a quarter period; in circular waves forces balance.
+    """
     rows = []
     s, kappa = hy.par[0], hy.par[1]
     lagrangian, _, places, rates = wave(s, kappa, 1.0, 1.0)
@@ -485,7 +501,10 @@ def backbones():
 
 
 def forced():
-    """Return cosine and sine amplitude of the liquid's centre over the last 15 of 150 periods."""
+    """Return cosine and sine amplitude of the liquid's centre in the case "forced".
+
+    They are fitted to the last 15 of 150 periods.
+    """
     p = cases.parameters("forced")
     natural = np.sqrt(p["g"] / p["l"])
     lagrangian, motion, places, rates = wave(p["s"], p["kappa"], p["g"], p["l"])

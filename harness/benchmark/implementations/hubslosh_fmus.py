@@ -36,7 +36,6 @@ def put(settings: dict, name: str, values) -> None:
 
 
 def bench(case: str) -> np.ndarray:
-    """Simulate a case of the bench and return its rows."""
     p = cases.parameters(case)
     spherical = case == "bench_spherical"
     settings = {
@@ -94,7 +93,7 @@ def matrix_of(q: np.ndarray) -> np.ndarray:
 
 
 def rigid(p: dict) -> dict:
-    """Return the settings of the rigid part of a craft."""
+    """Return the FMU's parameters of the rigid part of a craft."""
     settings = {f"craft.J{a}": float(p[f"J_{a}"]) for a in ("xx", "yy", "zz", "xy", "xz", "yz")}
     settings["craft.mass"] = p["mass"]
     put(settings, "craft.r", p["center"])
@@ -103,9 +102,9 @@ def rigid(p: dict) -> dict:
 
 
 def with_tanks(p: dict) -> tuple[dict, list[np.ndarray]]:
-    """Return the settings of a craft with pendulums, and the matrices from tank to body axes.
+    """Return the FMU's parameters of a craft with pendulums, and matrices from tank to body axes.
 
-    The tanks have no rigid liquid, because the rigid part on the page contains it.
+    The tanks have no rigid liquid, because the rigid part in the specification contains it.
     """
     settings = {**rigid(p), "tanks": len(p["tank"])}
     axes = []
@@ -130,7 +129,7 @@ def with_tanks(p: dict) -> tuple[dict, list[np.ndarray]]:
 
 
 def that_drains(p: dict) -> tuple[dict, list[np.ndarray]]:
-    """Return the settings of the craft whose tank drains: a fill table with two points."""
+    """Return the FMU's parameters of the craft whose tank drains: a fill table with two points."""
     settings = {**rigid(p), "tanks": 1, "mass_flow[1]": p["flow"]}
     name = "tank[1]"
     settings |= {
@@ -157,13 +156,16 @@ WRENCH = [f"{port}[{i}]" for port in ("force", "torque") for i in (1, 2, 3)]
 
 
 def columns_of(count: int) -> list[str]:
-    """Return the names of rate, velocity and directions of bobs in the FMU."""
+    """Return the names of rate, velocity and directions of ``count`` slosh masses in the FMU."""
     names = [f"{name}[{i}]" for name in ("omega", "velocity") for i in (1, 2, 3)]
     return names + [f"tank[{i}].p[1,{k}]" for i in range(1, count + 1) for k in (1, 2, 3)]
 
 
 def body(values: np.ndarray, axes: list[np.ndarray]) -> np.ndarray:
-    """Return rows in which directions of bobs are transformed to body axes."""
+    """Return rows of results with the directions of slosh masses transformed to body axes.
+
+    ``axes`` has the matrix from tank to body axes of each tank.
+    """
     rows = [values[:, :6]]
     rows += [values[:, 6 + 3 * i : 9 + 3 * i] @ turn.T for i, turn in enumerate(axes)]
     return np.hstack(rows)
@@ -232,7 +234,11 @@ def linearisation() -> np.ndarray:
 
 
 def still_tank(s: float, kappa: float, g: float, place, rate=(0.0, 0.0, 0.0)) -> dict:
-    """Return the settings of a tank at rest with only a bob, of mass 1 kg and length 1 m."""
+    """Return the FMU's parameters of a tank at rest with only a slosh mass of 1 kg and 1 m.
+
+    s and kappa are its coefficients of third order, g is the specific force, ``place`` its
+    direction and ``rate`` the rate of the direction at the start.
+    """
     settings = {
         "tank.modes": 1, "tank.m_0": 0.0, "tank.I_0": 0.0, "tank.H_0": 0.0,
         "tank.position[3]": 0.0, "tank.mass[1]": 1.0, "tank.length[1]": 1.0, "tank.hinge[1]": 0.0,
@@ -244,7 +250,10 @@ def still_tank(s: float, kappa: float, g: float, place, rate=(0.0, 0.0, 0.0)) ->
 
 
 def backbones() -> np.ndarray:
-    """Return frequencies of free waves by quarter periods or, for circles, by balance of forces."""
+    """Return the frequency of free waves at each amplitude of the case "backbones".
+
+    Planar waves are integrated over a quarter period; in circular waves forces balance.
+    """
     rows = []
     names = ["tank.p[1,1]", "tank.p_dot[1,1]"]
     for number, (_, degrees, s, kappa) in enumerate(cases.inputs_of_backbones(), 1):
@@ -292,7 +301,10 @@ def hermite(x: np.ndarray, y: np.ndarray, slope: np.ndarray) -> float:
 
 
 def forced() -> np.ndarray:
-    """Return cosine and sine amplitude of the liquid's centre over the last 15 of 150 periods."""
+    """Return cosine and sine amplitude of the liquid's centre in the case "forced".
+
+    They are fitted to the last 15 of 150 periods.
+    """
     p, rows = cases.parameters("forced"), []
     natural = math.sqrt(p["g"] / p["l"])
     pieces = 384  # linear pieces of the input per period; every sixth point is used, as on the page
@@ -319,7 +331,7 @@ def forced() -> np.ndarray:
 
 
 def measured() -> np.ndarray:
-    """Return the results of harness/studies/measured.py for the comparisons in the benchmark."""
+    """Return the results of harness/studies/measured.py for the cases with measurements."""
     with MEASURED.open(encoding="utf-8") as file:
         ours = {
             (row["experiment"], row["quantity"]): row
@@ -350,7 +362,6 @@ CASES = {
 
 
 def main() -> None:
-    """Run the cases and write their results."""
     global FOLDER
     parser = argparse.ArgumentParser(description="Runs the slosh benchmark with HubSlosh's FMUs.")
     parser.add_argument("folder", type=Path, help="where to write CASE/results.csv")

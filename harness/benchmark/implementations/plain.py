@@ -47,7 +47,6 @@ class Bench:
     """A hub with dry friction and liquid; `liquid` has the equations of the liquid."""
 
     def __init__(self, case):
-        """Read the parameters of a case."""
         self.p = cases.parameters(case)
         p = self.p
         self.spherical = case == "bench_spherical"
@@ -55,7 +54,6 @@ class Bench:
         self.fixed = p["I"] + p["m_0"] * p["r"] ** 2
 
     def start(self):
-        """Return theta, omega and the liquid's states."""
         p = self.p
         if not self.spherical:
             return np.array([0.0, 0.0, p["alpha_0"], 0.0])
@@ -63,10 +61,11 @@ class Bench:
         return np.array([0, 0, x, y, -np.sqrt(1 - x * x - y * y), 0, 0, 0])
 
     def liquid(self, y):
-        """Return the equations of the liquid.
+        """Return how the liquid acts on the hub and moves in the state ``y``.
 
-        These are the inertia J that the liquid adds to the hub, its torque T on the hub, its rates
-        without acceleration of the hub, and the change of these rates per acceleration of the hub.
+        The results are the inertia J that the liquid adds to the hub, its torque T on the hub, the
+        rates of its states without acceleration of the hub, and the change of these rates per
+        acceleration of the hub.
         """
         p, c = self.p, self.c
         m, l, r, g, w = p["m"], p["l"], p["r"], p["g"], y[1]
@@ -86,12 +85,15 @@ class Bench:
         return m * r * r * d[1] ** 2, torque, np.hstack([d_d, v_d]), np.hstack([np.zeros(3), per])
 
     def friction(self, w, sign):
-        """Return the friction torque of a sliding hub."""
+        """Return the friction torque at the rate ``w``, with the direction ``sign`` of sliding."""
         p = self.p
         return -p["b"] * w - sign * (p["c_f"] + p["d_f"] * np.exp(-((w / p["omega_s"]) ** 2)))
 
     def rates(self, y, tau, sign):
-        """Return the derivatives of the states; `sign` is 1 or -1 in sliding, 0 in sticking."""
+        """Return the derivatives of the states under the torque ``tau``.
+
+        ``sign`` is 1 or -1 if the hub slides, 0 if it sticks.
+        """
         inertia, torque, free, per = self.liquid(y)
         acceleration = 0.0
         if sign:
@@ -100,7 +102,7 @@ class Bench:
         return np.hstack([y[1] if sign else 0.0, acceleration, free + per * acceleration])
 
     def contact(self, y, tau):
-        """Return 0 if a hub at rest sticks, or the sign of the sliding that begins."""
+        """Return 0 if a hub at rest sticks under the torque ``tau``, or the sign of its sliding."""
         load = tau + self.liquid(y)[1]
         return 0 if abs(load) <= self.p["c_f"] + self.p["d_f"] else int(np.sign(load))
 
@@ -162,7 +164,10 @@ class Bench:
 
 
 def craft_rates(p, y, force, torque):
-    """Return the derivatives of the states of a craft with pendulums: q, omega, velocity, p, p'."""
+    """Return the derivatives of the states of a craft with pendulums: q, omega, velocity, p, p'.
+
+    ``p`` has the parameters, and ``y`` the states; force and torque act in body axes.
+    """
     q, w = y[:4], y[4:7]
     s, mass = p["center"], p["mass"]
     origin = cases.inertia(p) - mass * skew(s) @ skew(s)
@@ -198,7 +203,10 @@ def craft_rates(p, y, force, torque):
 
 
 def draining_rates(p, y, force, torque):
-    """Return the derivatives of the states of a draining craft; the last is the liquid's mass."""
+    """Return the derivatives of the states of a craft that drains; the last is the liquid's mass.
+
+    ``p`` has the parameters, and ``y`` the states; force and torque act in body axes.
+    """
     q, w, d, d_d, liquid = y[:4], y[4:7], y[10:13], y[13:16], y[16]
     f, l, e = p["flow"], p["l"], np.array([0.0, 0.0, 1.0])
     place, out = p["position"], p["position"] + p["outlet"] * e
@@ -289,7 +297,6 @@ def craft(case):
 
 
 def linearisation():
-    """Return the frequency responses."""
     p, rows = cases.parameters("linearisation"), []
     m, l, c, mass, z_c, z_p = (p[name] for name in ("m", "l", "c", "mass", "z_c", "hinge"))
     g, z_b = p["thrust"] / (mass + m), z_p - l
@@ -314,7 +321,7 @@ def linearisation():
 
 
 def backbones():
-    """Return the frequency of free waves for each amplitude in the input of the case."""
+    """Return the frequency of free waves at each amplitude of the case "backbones"."""
     rows = []
     for number, (_, degrees, s, kappa) in enumerate(cases.inputs_of_backbones(), 1):
         largest = np.sin(np.radians(degrees))
@@ -336,7 +343,10 @@ def backbones():
 
 
 def forced():
-    """Return cosine and sine amplitude of the liquid's centre over the last 15 of 150 periods."""
+    """Return cosine and sine amplitude of the liquid's centre in the case "forced".
+
+    They are fitted to the last 15 of 150 periods.
+    """
     p, rows = cases.parameters("forced"), []
     m, l, g, s, kappa = (p[name] for name in ("m", "l", "g", "s", "kappa"))
     natural = np.sqrt(g / l)

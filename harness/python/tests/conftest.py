@@ -33,7 +33,6 @@ Harness = Callable[..., dict[str, np.ndarray]]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add options for the paths of FMU, wheel and program, and for the choice of tests."""
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     wheels = sorted((ROOT / "dist").glob("hubslosh-*.whl"))
@@ -44,13 +43,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the markers of tests that need Octave and of long tests."""
     config.addinivalue_line("markers", "octave: needs Octave; --octave (.ci/octave) runs it")
     config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests) runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect tests that need Octave unless it is wanted, and either long or short tests."""
+    """Deselect tests that need Octave without --octave, and either the long or the short tests."""
     if not config.getoption("--octave"):
         items[:] = [item for item in items if item.get_closest_marker("octave") is None]
     long = config.getoption("--long")
@@ -67,13 +65,11 @@ def option(request: pytest.FixtureRequest, name: str) -> Path:
 
 @pytest.fixture(scope="session")
 def fmu(request: pytest.FixtureRequest) -> Path:
-    """Return the packed FMU."""
     return option(request, "--fmu")
 
 
 @pytest.fixture(scope="session")
 def wheel(request: pytest.FixtureRequest) -> Path:
-    """Return the wheel."""
     return option(request, "--wheel")
 
 
@@ -117,7 +113,10 @@ def drive(
     fmu: Path, time: Sequence, torque: Sequence, settings: dict | None = None, *,
     slope: Sequence | None = None, columns: Sequence[str] = COLUMNS, **options,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Simulate HubSlosh under a torque history, and return the time histories by name."""
+    """Simulate HubSlosh under a torque history, and return the columns as arrays by name.
+
+    ``time`` (s) and ``torque`` (N·m) are interpolated linearly, or with ``slope`` (N·m/s).
+    """
     inputs = pd.DataFrame({"time": np.asarray(time), TORQUE: np.asarray(torque)})
     if slope is not None:
         inputs["tau_slope"] = np.asarray(slope)
@@ -128,7 +127,10 @@ def drive(
 def single_calls(
     fmu: Path, parameters: dict, inputs: pd.DataFrame, columns: list[str], hold: bool
 ) -> pd.DataFrame:
-    """Return the result of `simulate`, computed by one call for each input, step and output."""
+    """Return what `simulate` returns, computed by one call for each input, step and output.
+
+    ``hold`` says whether inputs are held from row to row.
+    """
     time, names = inputs["time"].to_numpy(), list(inputs)[1:]
     start = {name: inputs[name][0] for name in names}
     rows = []

@@ -51,7 +51,7 @@ def crossed(v: np.ndarray) -> np.ndarray:
 
 
 def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
-    """Return the linear model of the craft under thrust, by Lagrange's equations.
+    """Return the linear model of the craft under thrust, derived by Lagrange's equations.
 
     The model is from torque to `MEASURED`. Its coordinates are the rotation, the displacements of
     the slosh masses across z, and the modal displacements. ``of`` has the parameters of the FMU,

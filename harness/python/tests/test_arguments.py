@@ -118,7 +118,7 @@ WRONG = [
 
 @pytest.fixture(scope="module")
 def given(fmu: Path) -> SimpleNamespace:
-    """Return an FMU's file, a run and a linear model, which some of the calls need."""
+    """Return what the calls with wrong arguments need: an FMU, a run and a linear model."""
     model = hubslosh.linearize(fmu, VISCOUS, "tau_cmd", "omega")
     return SimpleNamespace(run=hubslosh.simulate(fmu, VISCOUS, SWEEP), model=model, fmu=fmu)
 

@@ -10,7 +10,10 @@ from hubslosh import FmuError, attitude, simulate
 
 
 def turn(axis: int, angle: float) -> np.ndarray:
-    """Return the rotation matrix from axes that are turned about x, y or z to the original axes."""
+    """Return the matrix from axes turned about x, y or z to the original axes.
+
+    ``angle`` is in rad.
+    """
     c, s = np.cos(angle), np.sin(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     matrix = np.eye(3)

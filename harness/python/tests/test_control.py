@@ -20,7 +20,6 @@ OUTPUTS = ["theta", "omega", "slosh_angle"]
 
 @pytest.fixture
 def spacecraft(fmu: Path) -> Path:
-    """Return Spacecraft.fmu."""
     return fmu.with_name("Spacecraft.fmu")
 
 
@@ -39,7 +38,7 @@ def craft() -> dict[str, float]:
 
 
 def three_axes(model: Path) -> Loop:
-    """Return the loop of that craft with a PD controller of quaternion and rate.
+    """Return the loop about three axes of `craft`, with a PD controller of quaternion and rate.
 
     The loop has a filter and a delay of 0.13 s.
     """

@@ -42,7 +42,7 @@ def craft(fmu: Path) -> Craft:
 
 
 def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
-    """Return the inertia of a point mass at a position relative to the reference point."""
+    """Return the inertia of a point mass (kg) at ``arm`` (m) from the reference point."""
     x, y, z = arm
     return mass * np.array(
         [[y * y + z * z, -x * y, -x * z], [-x * y, x * x + z * z, -y * z],

@@ -42,7 +42,7 @@ PARAMETERS = {
 
 
 def three(fmu: Path, model: str = "HubSlosh") -> Path:
-    """Return the path of the FMI 3.0 version of a model, next to its FMI 2.0 version."""
+    """Return the FMI 3.0 version of a model, which lies next to its FMI 2.0 version ``fmu``."""
     return fmu.with_name(f"{model}-fmi3.fmu")
 
 
@@ -83,7 +83,7 @@ def test_linear_inputs_are_passed_by_intermediate_update(fmu: Path, model: str) 
 
 
 def _sizes(table: pd.DataFrame) -> list[tuple[str, float]]:
-    """Return the columns of a table that change, each with its largest value."""
+    """Return the largest value of each column that changes."""
     return [(name, np.abs(table[name]).max()) for name in table if table[name].any()]
 
 
@@ -117,7 +117,7 @@ def test_a_controller_in_the_loop_is_bit_identical_to_fmi_2(fmu: Path) -> None:
     assert np.abs(first["omega"]).max() > 0.05
 
 
-def test_errors_of_an_fmu_3_are_passed_on(fmu: Path) -> None:
+def test_errors_of_an_fmi_3_fmu_become_python_errors(fmu: Path) -> None:
     """A value out of range, a failed step and a failed initialisation raise errors of fmi3."""
     with pytest.raises(FmuError, match=r"fmi3.*tank\.h"):
         simulate(three(fmu), {"tank.h": -1.0}, stop=0.1)

@@ -50,7 +50,7 @@ def test_every_name_of_the_stub_is_imported_when_it_is_used() -> None:
 
 
 def imports(path: Path) -> set[str]:
-    """Return the modules of the package that a module imports, also within functions.
+    """Return the modules of the package that the module in ``path`` imports, also in functions.
 
     Imports for type checkers are left out, because they are not executed.
     """
@@ -109,19 +109,22 @@ def own_methods(item: type) -> Iterator[tuple[str, Any]]:
 
 
 def section(text: str, title: str) -> str:
-    """Return a section of a numpydoc docstring, or an empty string."""
+    """Return the section ``title`` of a numpydoc docstring, or an empty string."""
     found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n---|\Z)", text, re.DOTALL | re.MULTILINE)
     return found[1] if found else ""
 
 
 def entries(text: str, title: str) -> list[str]:
-    """Return the names of the parameters or attributes in a section."""
+    """Return the names of the parameters or attributes in the section ``title`` of a docstring."""
     named = re.findall(r"^(\S.*?)(?: : .*)?$", section(text, title), re.MULTILINE)
     return [one.lstrip("*") for names in named for one in names.split(", ")]
 
 
 def check_function(path: str, function: Any) -> None:
-    """Check that the docstring describes all parameters in their order, and the result."""
+    """Check that the docstring describes all parameters in their order, and the result.
+
+    ``path`` is the function's name in messages.
+    """
     text = inspect.getdoc(function) or ""
     signature = inspect.signature(function)
     parameters = [name for name in signature.parameters if name not in ("self", "cls")]

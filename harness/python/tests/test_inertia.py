@@ -17,7 +17,6 @@ TABLE = {
 
 
 def total(parts: dict) -> float:
-    """Return the sum of the inertias of all parts."""
     return float(bottom_up(parts)["inertia"].sum())
 
 

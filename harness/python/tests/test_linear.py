@@ -105,7 +105,7 @@ def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bo
     if hold:
 
         def part(g: np.ndarray) -> np.ndarray:
-            """Return the response at frequencies g times the spectrum of a held torque there."""
+            """Return the response at ``g`` (Hz) times the spectrum of a held torque there."""
             share = np.sinc(g * 0.02) * np.exp(-1j * np.pi * g * 0.02)
             return model.response(g)[:, 0, 0] * share
 

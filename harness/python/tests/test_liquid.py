@@ -22,30 +22,36 @@ def lambdas(found: LiquidModes) -> np.ndarray:
 
 
 def error(found: LiquidModes, mode: int = 0) -> float:
-    """Return the estimated relative error of λ, which is twice the error of the frequency."""
+    """Return the estimated relative error of the eigenvalue of ``mode``.
+
+    It is twice the estimated error of the frequency.
+    """
     return 2 * float(found.error["frequency"][mode])
 
 
 def line(a: complex, b: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points x + i z, derivatives and quadrature weights of a straight boundary."""
+    """Return points x + i z, derivatives and quadrature weights of a straight piece of boundary."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
     return a + (b - a) * (nodes + 1) / 2, np.full_like(nodes, b - a, complex), weights / 2
 
 
 def arc(radius: float, start: float, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points x + i z, derivatives and quadrature weights of an arc about the origin."""
+    """Return points x + i z, derivatives and quadrature weights of an arc about the origin.
+
+    ``start`` and ``end`` are angles, rad.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(80)
     w = radius * np.exp(1j * (start + (end - start) * (nodes + 1) / 2))
     return w, 1j * (end - start) * w, weights / 2
 
 
 def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -> np.ndarray:
-    """Return upper bounds of λ of a plane liquid by Ritz's method, which needs no mesh.
+    """Return upper bounds of the eigenvalues λ of a plane liquid, by Ritz's method without a mesh.
 
     Trial functions are Re f and Im f with f = w^k, w = x + i z, k = 1..22. They solve Laplace's
-    equation, so that ∫(∇φ)² = ∮ φ ∂φ/∂n ds. By the Cauchy–Riemann equations,
-    ∂/∂n Re f ds = d Im f along the boundary counter-clockwise. ``wall`` has the pieces of the wall
-    counter-clockwise, from the left end of the surface to its right end.
+    equation, so that ∫(∇φ)² = ∮ φ ∂φ/∂n ds. By the Cauchy–Riemann equations, ∂/∂n Re f ds = d Im f
+    along the boundary counter-clockwise. ``surface`` has both ends of the free surface. ``wall``
+    has the pieces of the wall counter-clockwise, from the left end of the surface to its right end.
     """
     size = max(np.abs(w).max() for w, _, _ in wall)
 
@@ -92,7 +98,7 @@ def test_a_fill_in_per_cent_gives_the_height_with_this_volume(
 
 
 @pytest.mark.long
-def test_an_upright_cylinder_equals_its_closed_forms() -> None:
+def test_modes_of_an_upright_cylinder_equal_closed_forms() -> None:
     """Frequency, slosh mass and its height, wave height and inertia agree to 1e-4.
 
     This accuracy is required of the default mesh; finer meshes are more accurate.
@@ -121,7 +127,7 @@ def test_an_upright_cylinder_equals_its_closed_forms() -> None:
     assert abs(found.lid_inertia[2, 2]) < 1e-6 * inertia
 
 
-def test_a_sphere_equals_the_axisymmetric_solver(
+def test_modes_of_a_sphere_equal_those_of_the_axisymmetric_solver(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The axisymmetric solver is `tank`, which discretises the contour; its error is 1e-9."""

@@ -15,7 +15,7 @@ OUTPUTS = ["theta", "omega", "slosh_angle"]
 
 
 def command(time: float) -> float:
-    """Return a torque that jumps at every cycle, N·m."""
+    """Return a torque, N·m, that jumps at the start of every control cycle."""
     return 0.05 * np.sin(3.0 * time) + 0.02 * np.cos(17.0 * time)
 
 

@@ -20,7 +20,7 @@ TURN = 2 * np.pi
 
 
 def crossings(found, kind: str) -> np.ndarray:
-    """Return the frequencies of the crossings of one kind, gain or phase, rad/s."""
+    """Return the frequencies, rad/s, at which |L| = 1 ("gain") or the phase is ±180° ("phase")."""
     table = found.crossings
     return table.loc[table["crossing"] == kind, "frequency"].to_numpy() * TURN
 

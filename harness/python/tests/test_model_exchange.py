@@ -31,7 +31,7 @@ MODELS = {"frozen": 1, "linear": 2, "planar": 3, "spherical": 4, "liquid": 5}
 
 
 def quickly(chosen: str) -> list:
-    """Return all slosh models; tests with any model but ``chosen`` are long tests."""
+    """Return all slosh models as test cases; all except ``chosen`` are long tests."""
     long = pytest.mark.long
     return [name if name == chosen else pytest.param(name, marks=long) for name in MODELS]
 
@@ -57,7 +57,7 @@ def steps_for_fmpy(torque: np.ndarray, held: int) -> np.ndarray:
 
 
 def difference(a: dict[str, np.ndarray], b: dict[str, np.ndarray], name: str) -> float:
-    """Return the largest difference of a signal between two runs, in SI units."""
+    """Return the largest difference of the signal ``name`` between two runs, in SI units."""
     largest = float(np.abs(a[name] - b[name]).max())
     print(f"{name}: {largest:.1e} of {np.abs(b[name]).max():.1e}")
     return largest
@@ -77,7 +77,10 @@ def model_exchange(
     interval: float = STEP,
     **arguments,
 ) -> dict[str, np.ndarray]:
-    """Return the signals at TIME, simulated by the integrator of fmpy (Model Exchange)."""
+    """Return the signals at TIME, simulated by the integrator of fmpy (Model Exchange).
+
+    The torque has a value for each interval of ``held`` steps.
+    """
     result = simulate_fmu(
         str(fmu),
         fmi_type="ModelExchange",

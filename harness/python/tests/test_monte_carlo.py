@@ -19,7 +19,7 @@ RANGES = {
 
 
 def largest_rate(fmu: Path):
-    """Return an outcome function: the largest rate of the hub in 2 s under a controller."""
+    """Return the outcome function of a study: the largest rate of a controlled hub in 2 s."""
 
     def outcome(values: dict) -> dict[str, float]:
         parameters = {"friction.model": "viscous", "init.slosh_angle": 0.05} | values

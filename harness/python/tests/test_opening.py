@@ -13,7 +13,7 @@ BROKEN = '<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g"/>'
 
 
 def packed(folder: Path, files: dict[str | zipfile.ZipInfo, bytes | str]) -> Path:
-    """Write an archive with these files, and return its path."""
+    """Write a ZIP file with these files to ``folder``, and return its path."""
     path = folder / "hostile.fmu"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -22,7 +22,7 @@ def packed(folder: Path, files: dict[str | zipfile.ZipInfo, bytes | str]) -> Pat
 
 
 def link() -> zipfile.ZipInfo:
-    """Return an archive entry that is a symbolic link."""
+    """Return an entry for a ZIP file that is a symbolic link."""
     entry = zipfile.ZipInfo("resources/link")
     entry.external_attr = (stat.S_IFLNK | 0o777) << 16
     return entry

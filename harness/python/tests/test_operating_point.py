@@ -34,7 +34,7 @@ def craft(fmu: Path) -> Craft:
 
 
 def numbers(found: hubslosh.Margins) -> np.ndarray:
-    """Return all crossings of the loops, with their margins, as numbers."""
+    """Return the numbers in a table of margins: all crossings with their margins."""
     return found.crossings[["frequency", "gain_margin", "phase_margin"]].to_numpy()
 
 
@@ -184,7 +184,7 @@ def test_every_method_reports_a_wrong_name_with_one_message(craft: Craft, name: 
         assert WRONG[name] in str(told.value)
 
 
-def test_uncertain_values_can_be_named_by_tanks(craft: Craft) -> None:
+def test_an_uncertain_quantity_can_be_named_by_the_name_of_its_tank(craft: Craft) -> None:
     """A tank's name and its number give the same uncertain model."""
     model = craft.uncertain("50%", {"NTO.frequency[1]": "5%", "craft.Jxx": "5%"})
     for name in ("NTO.frequency[1]", "tank[1].frequency[1]"):
@@ -215,7 +215,7 @@ def test_frequency_mass_and_height_of_a_mode_change_independently(craft: Craft) 
         assert after == pytest.approx(before | {kind: value}, rel=1e-9, abs=1e-9), kind
 
 
-def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
+def test_a_review_varies_slosh_frequencies_by_default(craft: Craft) -> None:
     """By default the frequencies of a tank's modes vary together by 10 %.
 
     The argument can be "nominal" or another share.
@@ -246,7 +246,7 @@ def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
         assert str(pickle.loads(pickle.dumps(thing))) == str(thing)
 
 
-def test_names_of_tanks_must_not_hide_parameters(craft: Craft) -> None:
+def test_a_tank_with_the_name_of_a_parameter_is_refused(craft: Craft) -> None:
     """A name with which a parameter of the FMU begins is refused.
 
     If the name of a tank begins with the name of another tank, the longer name counts.

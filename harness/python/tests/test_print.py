@@ -21,7 +21,7 @@ MOST = 20
 def made(
     request: pytest.FixtureRequest, fmu: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Callable]:
-    """Return functions that create a large object of each public class, by the class's name."""
+    """Return, for each public class by name, a function that creates a large object of it."""
     program, model = option(request, "--hubslosh"), fmu.with_name("Spacecraft.fmu")
     of = hubslosh.MountedTank(SPHERE, (0.1, 0.5, -0.3), nu=9e-7)
     tanks = {f"tank {i}": of for i in range(4)}

@@ -83,7 +83,7 @@ def test_analyse_returns_a_row_for_a_recording_and_for_the_model(
     assert np.ptp(found["fit_freq_pct"]) < 1e-4
 
 
-def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
+def test_a_variable_accepts_the_same_units_in_python_as_in_the_command(fmu: Path, request) -> None:
     """Every variable accepts the same units in Python as in the program, with the same factors."""
     command = [option(request, "--hubslosh"), "variables", "--json", "--fmu", fmu]
     listed = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
@@ -102,7 +102,9 @@ def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
     assert opened.convert("tank.h", "50 mm") == opened.convert("tank.h", "50mm") == 0.05
 
 
-def test_errors_of_the_command_are_passed_on(fmu: Path, tmp_path: Path, request) -> None:
+def test_the_message_of_a_failed_command_is_that_of_the_python_error(
+    fmu: Path, tmp_path: Path, request
+) -> None:
     """A file that is no plan is given as a plan; the error is the message of the command."""
     binary = option(request, "--hubslosh")
     with pytest.raises(FmuError, match=r"(?s)hubslosh campaign: .*sewer"):
@@ -122,7 +124,7 @@ def test_a_missing_command_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def with_binary(fmu: Path, binary: bytes, path: Path) -> Path:
-    """Write a copy of an FMU with another binary, and return its path."""
+    """Write a copy of an FMU to ``path`` in which the library is ``binary``; return ``path``."""
     with zipfile.ZipFile(fmu) as packed, zipfile.ZipFile(path, "w") as new:
         for name in packed.namelist():
             new.writestr(name, binary if "binaries/" in name else packed.read(name))

@@ -34,7 +34,7 @@ def craft(fmu: Path) -> Craft:
 
 
 def gains(kp: float = 40.0, kd: float = 400.0) -> np.ndarray:
-    """Return a PD controller of half angles and rates."""
+    """Return a PD controller of half angles and rates, the same for each axis."""
     return np.hstack([2 * kp * np.eye(3), kd * np.eye(3)])
 
 

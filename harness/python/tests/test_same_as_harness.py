@@ -31,9 +31,9 @@ def by_fmpy(
     fmu: Path, folder: Path, time: np.ndarray, torque: np.ndarray, settings: dict,
     tolerance: float | None = None, hold: bool = False,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Simulate an FMU with single calls of fmpy.
+    """Simulate an FMU with single calls of fmpy; the table is written to ``folder``.
 
-    The torque is interpolated linearly between the rows, or held.
+    The torque is interpolated linearly between the rows or, with ``hold``, held.
     """
     description = read_model_description(str(fmu))
     variables = {v.name: v for v in description.modelVariables}
@@ -68,7 +68,7 @@ def by_fmpy(
 
 
 def shared(quick: set[tuple], *values: list) -> list:
-    """Return all combinations of values as test cases; cases outside ``quick`` are long tests."""
+    """Return all combinations of ``values`` as test cases; all except ``quick`` are long tests."""
     long = pytest.mark.long
     return [
         case if case in quick else pytest.param(*case, marks=long)

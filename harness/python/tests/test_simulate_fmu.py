@@ -58,7 +58,7 @@ def repaired(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation, "Input", Input)
 
 
-def test_with_default_parameters_only_hubslosh_moves(fmu: Path) -> None:
+def test_of_the_three_fmus_only_hubslosh_moves_with_default_parameters(fmu: Path) -> None:
     """A user's first simulation shows a slosh angle of HubSlosh that spans at least 0.06 rad.
 
     SloshTank and Spacecraft stay at rest.

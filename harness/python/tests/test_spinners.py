@@ -42,12 +42,14 @@ TUMBLING = POINT | {
 
 @pytest.fixture
 def spacecraft(fmu: Path) -> Path:
-    """Return the path of the packed FMU Spacecraft."""
     return fmu.with_name("Spacecraft.fmu")
 
 
 def loop_difference(loop: Loop, model: UncertainModel, delta: np.ndarray) -> float:
-    """Return the relative difference between the model's loop gain and that of a new loop at Δ."""
+    """Return how far the loop gain of ``model`` at Δ is from that of a new ``loop``, relatively.
+
+    The new loop has the parameters that the model has at Δ.
+    """
     new = replace(loop, parameters=model.parameters(delta)).gain()
     mine = loop._gain(model.at(delta), loop.linear())
     f = np.geomspace(0.01, 4.9, 40)

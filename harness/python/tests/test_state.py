@@ -25,7 +25,10 @@ EVERYTHING = {
 
 
 def go_on(plant: Plant, steps: int) -> bytes:
-    """Continue with a small torque, with which the hub sticks at times; return signals as bytes."""
+    """Continue with a small torque for some steps, and return the signals as bytes.
+
+    Under this torque the hub sticks at times.
+    """
     names = plant.names("output", "local")
     rows = []
     first = round(plant.time / STEP)

@@ -14,7 +14,10 @@ TORQUE = 0.05 * np.sin(2 * np.pi * 2.35 * KNOTS)
 
 
 def communication_points(cut: str) -> np.ndarray:
-    """Return ascending communication points, s, which include all knots of the torque."""
+    """Return ascending times, s, at which steps end; all rows of the torque are among them.
+
+    ``cut`` says how the time between two rows is divided.
+    """
     if cut == "random":
         between = np.random.default_rng(1).uniform(0, DURATION, 1200)
         return np.union1d(KNOTS, between)

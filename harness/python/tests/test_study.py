@@ -44,7 +44,7 @@ RANGES = {
 
 
 def outcome(values: dict) -> dict[str, float]:
-    """Return finite and non-finite numbers of a draw."""
+    """Return the results of a draw in a study; some are finite and some are not."""
     ratio = values["tank.h"] / 3
     limits = (ratio, np.float64(np.nan), np.inf, -0.0)
     return {"ratio": ratio, "limit found": limits[int(1e6 * ratio) % 4], "on found": values["on"]}
@@ -56,12 +56,12 @@ def cells(table: pd.DataFrame) -> list[str]:
 
 
 def study(folder: Path | None, runs: int = 40, **more) -> pd.DataFrame:
-    """Run a study with this file's `outcome` in a folder."""
+    """Run a study with the outcome function `outcome`, and store its runs in ``folder``."""
     return monte_carlo(RANGES, runs, 3, more.pop("outcome", outcome), folder=folder, **more)
 
 
 def not_called(values: dict) -> dict[str, float]:
-    """Fail, because a stored run must not be simulated again."""
+    """Fail, because a run that is stored must not be simulated again."""
     raise AssertionError(values)
 
 
@@ -103,13 +103,13 @@ def test_seed_and_runs_may_be_integers_of_numpy(tmp_path: Path) -> None:
 
 
 def edited(path: Path, change) -> None:
-    """Change the text of a stored run by ``change``."""
+    """Apply the function ``change`` to the text of the stored run ``path``."""
     stored = json.loads(path.read_text())
     change(stored)
     path.write_text(json.dumps(stored) + "\n")
 
 
-def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
+def test_an_edited_stored_run_is_named_and_simulated_again(tmp_path: Path) -> None:
     """A run with values that the seed does not give, or with a wrong SHA-256, is simulated again.
 
     A warning names the run.
@@ -199,7 +199,7 @@ def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
 
 
 def simulated(folder: Path) -> list[dict]:
-    """Run the study, and return the draws that it has simulated."""
+    """Run the study in ``folder``, and return the draws that were not yet stored."""
     called: list[dict] = []
     study(folder, outcome=lambda values: called.append(values) or outcome(values))
     return called
@@ -263,7 +263,10 @@ Door = Callable[[Path], tuple[bool, str]]
 
 @pytest.fixture
 def doors(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str, Door]:
-    """Return two functions that open a folder: the command's campaign and the package's study."""
+    """Return two functions that open a folder with stored runs.
+
+    One is the command's campaign, the other is the package's study.
+    """
     program = option(request, "--hubslosh")
     plan = tmp_path / "plan.toml"
     plan.write_text('profile = "sine:duration=0.2"\n[vary]\nhub.I = [0.3, 0.31]\n')

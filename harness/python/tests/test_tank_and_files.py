@@ -30,7 +30,7 @@ def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return path
 
 
-def test_tank_equals_the_command_line(program: Path, tmp_path: Path) -> None:
+def test_the_function_tank_gives_what_the_command_tank_gives(program: Path, tmp_path: Path) -> None:
     """Python and ``hubslosh tank`` give the same result, picture and parameters for one file."""
     file = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     mine = tank(file, fill="40%", modes=2, gravity=3.0, nu=1e-6)
@@ -211,7 +211,7 @@ def three_axes(fmu: Path) -> hubslosh.Loop:
 
 
 def labels_of(*axes: Any) -> list[Any]:
-    """Return the bounding boxes of all labels, after checking that they do not overlap."""
+    """Return the bounding boxes of all labels in diagrams, after checking that none overlap."""
     labels = [text.get_window_extent() for ax in axes for text in ax.texts]
     assert not any(a.overlaps(b) for k, a in enumerate(labels) for b in labels[:k])
     return labels
@@ -283,7 +283,7 @@ SSV = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def parameter(name: str, value: str, unit: str = "", kind: str = "Real") -> str:
-    """Return the XML element of a parameter."""
+    """Return the XML element of a parameter of SSP."""
     unit = f' unit="{unit}"' if unit else ""
     return f'<ssv:Parameter name="{name}"><ssv:{kind} value="{value}"{unit}/></ssv:Parameter>'
 

@@ -24,7 +24,7 @@ with temporary.folder():
 
 
 def started(fmu: Path, how: str, folder: Path) -> int:
-    """Unpack an FMU in a process that ends in the given way; return the process's exit code."""
+    """Unpack an FMU in a process that ends in the way ``how``; return the process's exit code."""
     environment = os.environ | {
         "PYTHONPATH": str(Path(__file__).parents[1]),
         "TMPDIR": str(folder),

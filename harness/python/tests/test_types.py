@@ -19,12 +19,15 @@ USERS = sorted((HERE / "users").glob("*.py"))
 
 @pytest.fixture(scope="module")
 def checkers() -> Path:
-    """Return the Python of an environment with mypy and pyright."""
+    """Return the Python of a virtual environment with mypy and pyright."""
     return environment.ensure(TARGET / "python" / "types", ROOT / ".ci" / "requirements-types.txt")
 
 
 def check(checkers: Path, name: str, scripts: list[Path], folder: Path) -> tuple[int, str]:
-    """Return exit code and output of a type checker that sees the package as installed."""
+    """Return exit code and output of the type checker ``name`` for ``scripts``.
+
+    It sees the package as installed.
+    """
     package = str(HERE.parent)
     if name == "mypy":
         command = [checkers, "-m", "mypy", "--strict", "--follow-imports=silent"]

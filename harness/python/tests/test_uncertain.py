@@ -48,12 +48,14 @@ RANGES = {
 
 @pytest.fixture
 def spacecraft(fmu: Path) -> Path:
-    """Return the path of the packed FMU Spacecraft."""
     return fmu.with_name("Spacecraft.fmu")
 
 
 def difference(model: UncertainModel, delta: np.ndarray, spacecraft: Path) -> float:
-    """Return the largest difference from `linearize`, relative to each matrix's largest element."""
+    """Return how far ``model`` at Δ is from `linearize`.
+
+    The result is the largest difference relative to the largest element of its matrix.
+    """
     mine = model.at(delta)
     theirs = linearize(spacecraft, model.parameters(delta), list(mine.inputs), list(mine.outputs))
     kept = [theirs.states.index(state) for state in mine.states]
@@ -78,7 +80,9 @@ def test_every_draw_is_the_linear_model_of_the_fmu(spacecraft: Path) -> None:
     assert model.values(deltas[0])["tank[2].frequency[1]"] == pytest.approx(0.215, rel=1e-12)
 
 
-def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
+def test_the_number_of_copies_of_each_parameter_in_delta_equals_the_derivation(
+    spacecraft: Path,
+) -> None:
     """The numbers of copies of each parameter are those of a free surface at rest.
 
     With inputs and outputs of only one axis, a mode needs half as many copies.
@@ -133,7 +137,7 @@ STILL = {
 
 
 def fit(names: list[str], matrix: np.ndarray) -> Identification:
-    """Return a result of `identify` for these unknowns, with this covariance."""
+    """Return a result of `identify` in which ``names`` have the covariance ``matrix``."""
     of_fit = {"correlations": [dict.fromkeys(names)], "covariance": matrix.tolist()}
     return Identification({}, {}, None, {}, True, True, (), of_fit)
 
@@ -393,7 +397,10 @@ def test_the_upper_bound_of_two_parameters_is_near_the_true_value() -> None:
         matrix[1] /= 1e3
 
         def seen(first: float, N: np.ndarray = matrix) -> complex:
-            """Return 1/δ of the second parameter that makes I - N Δ singular, given the first."""
+            """Return 1/δ of the second parameter at which I - N Δ is singular.
+
+            ``first`` is 1/δ of the first parameter.
+            """
             closing = np.linalg.solve(np.eye(3) - N[:3, :3] * first, N[:3, 3])
             return complex(N[3, 3] + first * N[3, :3] @ closing)
 

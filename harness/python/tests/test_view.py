@@ -16,7 +16,7 @@ from hubslosh import FmuError
 
 
 def shown(page: str) -> dict:
-    """Return the data that a page draws."""
+    """Return the data that a page of `view` draws."""
     found = re.search(r'<script type="application/json" id="run">(.*?)</script>', page, re.DOTALL)
     assert found
     return json.loads(found[1])

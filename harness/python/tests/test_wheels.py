@@ -51,7 +51,7 @@ def craft(fmu: Path) -> Craft:
 
 
 def rotated(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return vectors, one in each row, transformed from body to inertial axes."""
+    """Return vectors, one in each row, transformed from body to inertial axes by ``q``."""
     w, xyz = q[:, :1], q[:, 1:]
     across = np.cross(xyz, vectors)
     return vectors + 2 * (w * across + np.cross(xyz, across))
