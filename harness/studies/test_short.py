@@ -124,7 +124,7 @@ def slowed(depth: float) -> float:
 def test_the_tilt_of_a_shallow_tank_lowers_the_frequency_as_the_book_says() -> None:
     """The change of frequency at half a radius equals the number printed in book/liquid.md."""
     text = " ".join(lines("liquid.md"))
-    shallow = re.search(r"Here it is −([\d.]+) % at a depth of half a radius", text)
+    shallow = re.search(r"give −([\d.]+) % at a depth of half a radius", text)
     assert slowed(0.5) == pytest.approx(float(shallow[1]), abs=0.05)
 
 
