@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from .arguments import caller
 from .fmu import Fmu, FmuWarning, Parameters, Quantity
-from .plant import Plant
-from .quantities import ModeQuantity, Modes
+from .plant import Plant, read_vector
+from .quantities import ModeQuantity, Modes, force_in_tank
 
 Vector = NDArray[np.float64]
 
@@ -63,21 +63,14 @@ class OperatingPoint:
     def _remaining(self) -> tuple[Vector, dict[str, float]]:
         modes = Modes(self.model, self.parameters)
         with Plant(self.model, self.parameters) as plant:
-
-            def get(name: str, count: int = 3) -> Vector:
-                return np.array(plant.get([f"{name}[{i}]" for i in range(1, count + 1)]))
-
-            turning, force, across = get("omega_dot"), get("specific_force"), {}
-            omega = get("omega")
+            spins, across = read_vector(plant, "omega").any(), {}
             for number, name in enumerate(self.tanks, 1):
-                w, x, y, z = (q := get(f"tank[{number}].q", 4)) / np.linalg.norm(q)
-                axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-                place = get(f"tank[{number}].position")
-                if omega.any() and plant.get([f"tank[{number}].modes"])[0]:
-                    place = place + axis * modes.value(ModeQuantity(number, "bob", 1))
-                here = force + np.cross(turning, place) + np.cross(omega, np.cross(omega, place))
+                sloshes = plant.get([f"tank[{number}].modes"])[0]
+                bob = ModeQuantity(number, "bob", 1)
+                height = modes.value(bob) if spins and sloshes else 0.0
+                axis, here = force_in_tank(plant, number, height)
                 across[name] = float(np.linalg.norm(here - axis * (axis @ here)))
-        return turning, across
+            return read_vector(plant, "omega_dot"), across
 
     @cached_property
     def untrimmed_acceleration(self) -> Vector:
@@ -137,11 +130,7 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
     if not is_spacecraft(fmu) or not any(forces):
         return OperatingPoint(model, every, none, None, tuple(tanks))
     with Plant(model, every) as plant:
-
-        def get(name: str) -> Vector:
-            return np.array(plant.get([f"{name}[{i}]" for i in (1, 2, 3)]))
-
-        force, center = get("force"), get("center_of_mass")
+        force, center = read_vector(plant, "force"), read_vector(plant, "center_of_mass")
         kind, mount, count = plant.get(["mount_kind", "mount", "tanks"])
         if (kind or mount) != 1 or not force.any():
             return OperatingPoint(model, every, none, before, tuple(tanks))
@@ -150,12 +139,12 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
         if any(deflections.values()):
             every |= deflections
             with Plant(model, every) as deformed:
-                center = np.array(deformed.get([f"center_of_mass[{i}]" for i in (1, 2, 3)]))
+                center = read_vector(deformed, "center_of_mass")
         shift = center - force * (force @ center) / (force @ force)
         places = ["craft.r", *(f"tank[{number}].position" for number in range(1, int(count) + 1))]
         places += [f"{name}position" for name in flexible]
         for place in places:
-            moved = get(place) - shift
+            moved = read_vector(plant, place) - shift
             every |= {f"{place}[{i + 1}]": float(x) for i, x in enumerate(moved)}
     return OperatingPoint(model, every, shift, before, tuple(tanks))
 
@@ -184,7 +173,7 @@ def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
         start |= dict.fromkeys((f"{name}eta_dot_0" for name in names), 0.0)
         with Plant(model, {**parameters, **start}) as plant:
             modal = plant.get([f"der({name}eta_dot)" for name in names])
-            return np.array(modal), np.array(plant.get([f"omega_dot[{i}]" for i in (1, 2, 3)]))
+            return np.array(modal), read_vector(plant, "omega_dot")
 
     eta = np.zeros(len(names))
     rest, turning = accelerations(eta)
@@ -199,7 +188,7 @@ def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
 
 def _participation(plant: Plant, name: str) -> Vector:
     """Return the six participation factors of the appendage mode with the prefix ``name``."""
-    return np.array(plant.get([f"{name}participation[{i}]" for i in range(1, 7)]))
+    return read_vector(plant, f"{name}participation", 6)
 
 
 def _deflections(plant: Plant, names: Sequence[str], force: Vector) -> dict[str, Quantity]:

@@ -446,3 +446,8 @@ class Plant(Instance):
         """
         self.native.restore(saved[1])
         self.time = saved[0]
+
+
+def read_vector(plant: Instance, name: str, count: int = 3) -> np.ndarray:
+    """Return the elements ``name[1]`` to ``name[count]`` of a vector variable."""
+    return np.array(plant.get([f"{name}[{i}]" for i in range(1, count + 1)]))

@@ -11,12 +11,13 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .arguments import refuse
 from .fmu import Fmu, FmuError, Parameters, Quantity, did_you_mean
-from .plant import Plant
+from .plant import Plant, read_vector
 
 TURN = 2 * np.pi
 
@@ -252,15 +253,8 @@ class Modes:
         """Return the specific force along the tank's axis at the slosh mass of ``mode``, m/s²."""
         bob = self.number(mode.name("hinge")) - self._length(mode)
         with Plant(self.model, self.given) as plant:
-
-            def get(name: str, count: int = 3) -> np.ndarray:
-                return np.array(plant.get([f"{name}[{i}]" for i in range(1, count + 1)]))
-
-            w, x, y, z = (q := get(f"tank[{mode.tank}].q", 4)) / np.linalg.norm(q)
-            axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-            place, omega = get(f"tank[{mode.tank}].position") + bob * axis, get("omega")
-            turning = np.cross(get("omega_dot"), place) + np.cross(omega, np.cross(omega, place))
-            return float(axis @ (get("specific_force") + turning))
+            axis, force = force_in_tank(plant, mode.tank, bob)
+        return float(axis @ force)
 
     def scale_frequency(self, mode: ModeQuantity, factor: float) -> None:
         """Multiply a mode's frequency by a factor.
@@ -321,15 +315,29 @@ class Modes:
         m_0, H_0, I_0, lent = rigid_rest(m_0, H_0, I_0, more, points)
         found = {f"{prefix}.m_0": m_0, f"{prefix}.H_0": H_0, f"{prefix}.I_0": I_0}
         if lent:
-            w, x, y, z = q = np.array([self.number(f"{prefix}.q[{i}]") for i in range(1, 5)])
-            w, x, y, z = q / np.linalg.norm(q)
-            axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+            axis = axis_of([self.number(f"{prefix}.q[{i}]") for i in range(1, 5)])
             J = lent * (np.eye(3) - np.outer(axis, axis))
             for i in range(3):
                 for j in range(i, 3):
                     name = f"craft.J{'xyz'[i]}{'xyz'[j]}"
                     found[name] = self.number(name) + float(J[i, j])
         self.given |= found
+
+
+def axis_of(q: Any) -> np.ndarray:
+    """Return the axis (unit vector, body axes) of a tank with the attitude ``q``, scalar first."""
+    w, x, y, z = np.asarray(q) / np.linalg.norm(q)
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+
+
+def force_in_tank(plant: Plant, tank: int, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return a tank's axis, and the specific force (m/s²) at a height (m) on it, body axes."""
+    axis = axis_of(read_vector(plant, f"tank[{tank}].q", 4))
+    place = read_vector(plant, f"tank[{tank}].position") + height * axis
+    omega = read_vector(plant, "omega")
+    turning = np.cross(read_vector(plant, "omega_dot"), place)
+    turning = turning + np.cross(omega, np.cross(omega, place))
+    return axis, read_vector(plant, "specific_force") + turning
 
 
 def nominal_value(modes: Modes, untrimmed: Parameters, name: str) -> float | None:

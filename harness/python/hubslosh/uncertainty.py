@@ -70,7 +70,7 @@ from .fmu import FmuError, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
 from .operating_point import warn_of_attitude, warn_of_rotation
-from .plant import Plant
+from .plant import Plant, read_vector
 from .progress import Progress
 from .quantities import KINDS, TURN, full_name, rigid_rest, short_name, slosh_mass_error
 from .short import names
@@ -306,7 +306,7 @@ def _read(
             return np.array(plant.get(names))
 
         def vector(name: str, count: int = 3) -> Matrix:
-            return get(*(f"{name}[{i}]" for i in range(1, count + 1)))
+            return read_vector(plant, name, count)
 
         if plant.fmu.name != "Spacecraft":
             raise FmuError(f"uncertain models exist only for Spacecraft, not for {plant.fmu.name}")
