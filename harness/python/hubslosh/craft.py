@@ -729,10 +729,10 @@ class Craft:
         >>> round(craft.parameters("60%")["tank[1].mass[1]"], 2)
         82.38
         """
-        options: dict[str, Any] = {
-            "rigid": rigid, "detach": detach, "mass_flow": mass_flow, "between": between,
-        }  # fmt: skip
-        point, late = self._point(fill, parameters, trimmed=trimmed, **options)
+        point, late = self._point(
+            fill, parameters, trimmed=trimmed, rigid=rigid, detach=detach, mass_flow=mass_flow,
+            between=between,
+        )  # fmt: skip
         if late is not None:
             raise FmuError(f"{DELAY} belongs to a loop, not to the craft: give it to Craft.loop")
         if not trimmed and (text := rotation(f"{self!r}, untrimmed,", point.angular_acceleration)):
@@ -786,8 +786,9 @@ class Craft:
     ) -> tuple[OperatingPoint, float | None]:
         """Return the operating point at ``fill``, and the loop's delay (s) or None.
 
-        The delay is an entry of ``parameters``, although it is no parameter of the FMU. ``options``
-        are passed to `_untrimmed`.
+        The point is trimmed if ``trimmed``, so that the thrust acts through the centre of mass. The
+        delay is an entry of ``parameters``, although it is no parameter of the FMU. ``options`` are
+        passed to `_untrimmed`.
         """
         every, modes, late = self._resolve(fill, parameters, **options)
         return self._realised(every, modes, trimmed=trimmed), late

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,7 +138,9 @@ class DeltaSearch:
     def limit(self, delta: Matrix) -> WorstCase | None:
         """Return the limit of stability on the line from 0 to an unstable Δ."""
         size = float(np.abs(delta).max())
-        return min(self.limits(delta[None] / size, size, LINE_STEPS), key=_size, default=None)
+        return min(
+            self.limits(delta[None] / size, size, LINE_STEPS), key=attrgetter("size"), default=None
+        )
 
     def worst(self, largest: float) -> WorstCase:
         """Return the smallest unstable Δ that is found; see `UncertainModel.worst_case`."""
@@ -148,10 +151,10 @@ class DeltaSearch:
                 "the loop is unstable at Δ = 0, that is with nominal parameters: "
                 "hubslosh.margins(loop) shows its margins"
             )
-        best = min(self._followed(start, largest), key=_size, default=NOTHING)
+        best = min(self._followed(start, largest), key=attrgetter("size"), default=NOTHING)
         self.say(best, 0.1)
         found = self.limits(corners(count), min(best.size, largest), CORNER_STEPS)
-        best = min([best, *found], key=_size)
+        best = min([best, *found], key=attrgetter("size"))
         return self.smallest([self._drawn(min(best.size, largest))], best, largest)
 
     def _followed(self, start: Complex, largest: float) -> Iterator[WorstCase]:
@@ -297,7 +300,3 @@ class DeltaSearch:
 
 
 NOTHING = WorstCase({}, np.inf, np.nan, {})
-
-
-def _size(case: WorstCase) -> float:
-    return case.size

@@ -17,18 +17,9 @@ from .native import FmuError, FmuWarning, Variable, source_tree
 from .native import read_parameters as _read_parameters
 
 __all__ = [
-    "Fmu",
-    "FmuError",
-    "FmuWarning",
-    "Parameters",
-    "Quantity",
-    "Value",
-    "did_you_mean",
-    "fmu_path",
-    "read_parameters",
-    "source_tree",
-    "text_of",
-]
+    "Fmu", "FmuError", "FmuWarning", "Parameters", "Quantity", "Value", "did_you_mean", "fmu_path",
+    "read_parameters", "source_tree", "text_of",
+]  # fmt: skip
 
 # Value of a variable: in SI units, or a string with a unit, such as ``"50 mm"``. The value of an
 # enumeration may also be the name of an item.

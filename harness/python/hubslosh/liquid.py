@@ -35,7 +35,7 @@ import numpy as np
 
 from .arguments import array, not_positive, parse_share, refuse, vector
 from .fmu import FmuError
-from .tanks import SIX_AXES, prefix_of
+from .tanks import SIX_AXES, _from_z, prefix_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,7 +126,7 @@ class LiquidModes:
         slosh mass that swings only along y belongs to the fixed mass for motions along x.
         """
         found = {}
-        for name, part in (("x", _cos(self.all)), ("y", _sin(self.all))):
+        for name, part in zip("xy", _directions(self.all), strict=True):
             moving = self.all["mass"].to_numpy() * part**2
             height = np.nan_to_num(self.all["bob"].to_numpy())
             left = self.mass - moving.sum()
@@ -167,7 +167,7 @@ class LiquidModes:
         """
         if direction not in ("x", "y"):
             raise FmuError(f'direction must be "x" or "y", not {direction!r}')
-        along = np.abs(_cos(self.all) if direction == "x" else _sin(self.all))
+        along = np.abs(_directions(self.all)["xy".index(direction)])
         moving = self.all["mass"].to_numpy() > _MASSLESS * self.mass
         mixed = moving & (along > 1e-3) & (along < 1 - 1e-3)
         if mixed.any():
@@ -253,8 +253,7 @@ class LiquidModes:
             raise FmuError(f"modes must be 1 to {most} here, not {modes!r}")
         kept = moving.sort_values("mass", ascending=False, kind="stable").head(count)
         center = np.array(self.center)
-        turn = np.radians(kept["direction"].to_numpy())
-        along = np.array([np.cos(turn), np.sin(turn)])
+        along = np.array(_directions(kept))
         arm = kept["arm"].to_numpy() - (center[0] * along[1] - center[1] * along[0])
         masses, height = kept["mass"].to_numpy(), kept["bob"].to_numpy() - center[2]
         bobs = np.array([arm * along[1], -arm * along[0], height])
@@ -406,13 +405,9 @@ def _level(force: np.ndarray) -> np.ndarray:
 
     It is the shortest rotation. In the rotated tank the free surface is level.
     """
-    a = force / np.linalg.norm(force)
-    axis = np.cross(a, [0.0, 0.0, 1.0])
-    s, c = np.linalg.norm(axis), a[2]
-    if s < 1e-15:
-        return np.diag([1.0, np.sign(c), np.sign(c)])
-    k = np.cross(np.eye(3), axis / s)  # k v = v × axis, so that -k turns about the axis
-    return np.eye(3) - s * k + (1 - c) * k @ k
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(_from_z(force), scalar_first=True).as_matrix()).T
 
 
 def _heights(
@@ -711,8 +706,8 @@ def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
 def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int) -> LiquidModes:
     """Return the slosh modes of the liquid that ``mesh`` fills, without an estimate of errors.
 
-    The free surface is at the height ``surface``, m; ``gravity`` is the specific force, m/s²;
-    ``count`` is the number of modes.
+    The free surface is at the height ``surface``, m; ``density`` is in kg/m³, ``gravity`` is the
+    specific force, m/s², and ``count`` the number of modes.
     """
     import pandas as pd
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
@@ -807,8 +802,9 @@ def _mode(
 ) -> dict[str, float]:
     """Return the pendulum that acts on the tank like one slosh mode.
 
-    ``lam`` is the eigenvalue ω²/g, 1/m; ``b`` couples the mode with the tank's six motions;
-    ``norm`` is the mode's norm over the free surface; ``liquid`` is the mass of the liquid, kg.
+    ``density`` is in kg/m³, and ``gravity`` is the specific force, m/s². ``lam`` is the eigenvalue
+    ω²/g, 1/m; ``b`` couples the mode with the tank's six motions; ``norm`` is the mode's norm over
+    the free surface; ``liquid`` is the mass of the liquid, kg.
     """
     a = np.hypot(b[0], b[1])
     mass = density * lam * a**2 / norm
@@ -830,9 +826,7 @@ def _mode(
     }  # fmt: skip
 
 
-def _cos(modes: "pd.DataFrame") -> np.ndarray:
-    return np.cos(np.radians(np.nan_to_num(modes["direction"].to_numpy())))
-
-
-def _sin(modes: "pd.DataFrame") -> np.ndarray:
-    return np.sin(np.radians(np.nan_to_num(modes["direction"].to_numpy())))
+def _directions(modes: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
+    """Return the components along x and along y of the direction of each mode."""
+    turn = np.radians(np.nan_to_num(modes["direction"].to_numpy()))
+    return np.cos(turn), np.sin(turn)

@@ -172,7 +172,8 @@ class Loop:
                 found.append(f"the command {name} is of type {fmu.kind(name)}, not Real")
         measured = fmu.components(names_of(self.measured, "measured", found))
         check_outputs(fmu, measured, found, real=True)
-        found += [f"the command {name} is given twice" for name in _repeated(commands)]
+        twice = [name for name in dict.fromkeys(commands) if commands.count(name) > 1]
+        found += [f"the command {name} is given twice" for name in twice]
         if not commands:
             found.append("command is empty: name at least one input of the FMU")
         if not found:
@@ -473,14 +474,8 @@ class Loop:
             cycles, grid[:-1:substeps], reference, measured, constants
         )
         feedback = Feedback(
-            controller,
-            seen,
-            command,
-            cycles=cycles,
-            parts=parts,
-            switch=switch,
-            latency=min(latency, cycles),
-            wheels=rows_of(turned, command),
+            controller, seen, command, cycles=cycles, parts=parts, switch=switch,
+            latency=min(latency, cycles), wheels=rows_of(turned, command),
             momentum=self._momentum(fmu, every),
         )  # fmt: skip
 
@@ -656,10 +651,6 @@ def closed_loop(
     )  # fmt: skip
 
 
-def _repeated(names: list[str]) -> list[str]:
-    return [name for name in dict.fromkeys(names) if names.count(name) > 1]
-
-
 def _points(
     grid: NDArray[np.float64], substeps: int, period: float, rest: float
 ) -> tuple[NDArray[np.float64], int, NDArray[np.bool_] | None]:
@@ -711,7 +702,7 @@ def _reference(
 ) -> dict[str, History]:
     """Return each column of the table ``reference`` as a time history, by the column's name.
 
-    Allowed columns are time, the measured variables, the commands and q[1] to q[4].
+    Allowed columns are time, the variables ``measured`` and ``command``, and q[1] to q[4].
     """
     if reference is None:
         return {}
@@ -800,10 +791,11 @@ def _tustin(model: LinearModel, period: float) -> LinearModel:
 def _bilinear(
     given: tuple[tuple[tuple[int, ...], bytes], ...], period: float
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return A, B, C and D of a system discretised by SciPy; each is given as shape and bytes.
+    """Return A, B, C, D of a system discretised by SciPy with the period ``period``, s.
 
-    Results are cached, because the threads of SciPy wait for each other: on two cores a call can
-    take as long as all margins of a loop.
+    ``given`` has each matrix of the system as its shape and its bytes, because results are cached:
+    the threads of SciPy wait for each other, so that on two cores a call can take as long as all
+    margins of a loop.
     """
     from scipy.signal import cont2discrete
 

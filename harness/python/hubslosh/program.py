@@ -316,10 +316,10 @@ def _free_flags(
     outputs: Sequence[str],
     prior: Mapping[str, tuple[float, float]],
 ) -> list[str]:
-    """Return the options of ``hubslosh identify fmu`` for these unknowns and signals.
+    """Return the options of ``hubslosh identify fmu`` for unknowns and signals.
 
-    ``free`` has the start value or range of each unknown, ``prior`` its known value with standard
-    deviation.
+    ``free`` has the start value or range of each unknown, ``prior`` the mean and standard deviation
+    of its prior; ``inputs`` and ``outputs`` are names of the recorded signals.
     """
     flags = []
     for name, start in free.items():

@@ -377,7 +377,7 @@ def _from_transfer_functions(num: Any, den: Any, period: float | None) -> Linear
     """Return a matrix of transfer functions as a state-space model.
 
     ``num`` and ``den`` have a row for each command and a column for each measurement; each entry is
-    a list of coefficients, the highest power first.
+    a list of coefficients, the highest power first. ``period`` is the sampling period, s, or None.
     """
     from scipy.linalg import block_diag
     from scipy.signal import tf2ss

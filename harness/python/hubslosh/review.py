@@ -285,7 +285,7 @@ class Review:
     @property
     def summary(self) -> str:
         """Two sentences: whether every operating point is stable, and which requirements fail."""
-        return " ".join([self._stability(), *self._failures()])
+        return " ".join([self._stable_points() + self._neutral(), *self._failures()])
 
     def _failures(self) -> list[str]:
         """Return a sentence about the requirements that fail; empty if none fails."""
@@ -303,9 +303,6 @@ class Review:
         return [
             f"It FAILS {len(failed)} of {_plural(len(table), 'requirement')}: {'; '.join(words)}."
         ]
-
-    def _stability(self) -> str:
-        return self._stable_points() + self._neutral()
 
     def _neutral(self) -> str:
         """Return a sentence on neutral poles of nominal points, or an empty string if none."""
@@ -812,6 +809,7 @@ def _quantities(
     fmu = Fmu.open(loops[0].model)
     allowed = [DELAY]
     allowed += [n for n in fmu.names("parameter", "structuralParameter") if fmu.kind(n) == "Real"]
+    known = Modes(loops[0].model, loops[0].parameters)  # type: ignore[arg-type]
     problems, found = [], []
     for full, (name, range_) in ranges.items():
         shown = short_name(full, tanks)
@@ -823,7 +821,8 @@ def _quantities(
                 f"uncertain has {shown}, which is neither a Real parameter of {fmu.name} nor delay"
             )
             continue
-        if (mode := mode_quantity(full)) and (bad := _problem(loops[0], mode)) != NO_MODE and bad:
+        bad = known.problem(mode) if (mode := mode_quantity(full)) else ""
+        if bad not in ("", NO_MODE):
             problems.append(f"uncertain: {shown} {bad}")
             continue
         nominals = [_nominal(loop, every, full) for loop, every in zip(loops, given, strict=True)]
@@ -850,14 +849,11 @@ def _unit(fmu: Fmu, name: str) -> str:
     return "s" if name == DELAY else fmu.unit(name).replace("1", "").replace(".", "·")
 
 
-def _problem(loop: Loop, mode: ModeQuantity) -> str:
-    return Modes(loop.model, loop.parameters).problem(mode)  # type: ignore[arg-type]
-
-
 def _nominal(loop: Loop, untrimmed: Parameters, name: str) -> float | None:
-    """Return the nominal value of a quantity, or None if its mode does not exist at this fill.
+    """Return the nominal value of the quantity ``name``, or None if its mode does not exist.
 
-    ``untrimmed`` has the parameters before the craft is trimmed.
+    ``loop`` is the loop at one fill, and ``untrimmed`` has the parameters before the craft is
+    trimmed.
     """
     if name == DELAY:
         return float(loop.delay)

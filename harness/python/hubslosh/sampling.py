@@ -90,7 +90,10 @@ def draw(
 
 
 def _drawn(ranges: Mapping[str, Range], run: int, seed: int) -> dict[str, Any]:
-    """Return the random values of run number ``run``; all limits are absolute numbers."""
+    """Return the random values of run number ``run`` of a study with the seed ``seed``.
+
+    The limits in ``ranges`` are absolute numbers.
+    """
     shares = iter(uniforms(int(seed), int(run), len(ranges)))
     return {name: _value(of, next(shares)) for name, of in ranges.items()}
 

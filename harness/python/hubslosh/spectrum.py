@@ -127,14 +127,7 @@ def frequency_response(
     with np.errstate(divide="ignore", invalid="ignore"):
         coherence = np.clip(np.abs(s_uy) ** 2 / (s_uu * s_yy), 0.0, 1.0)
         std = gain * np.sqrt((1 - coherence) * np.sum(window**2) / (2 * coherence))
-    return pd.DataFrame(
-        {
-            "frequency": frequency,
-            "real": response.real,
-            "imag": response.imag,
-            "gain": gain,
-            "phase": np.degrees(np.unwrap(np.angle(response))),
-            "coherence": coherence,
-            "gain_std": std,
-        }
-    )
+    return pd.DataFrame({
+        "frequency": frequency, "real": response.real, "imag": response.imag, "gain": gain,
+        "phase": np.degrees(np.unwrap(np.angle(response))), "coherence": coherence, "gain_std": std,
+    })  # fmt: skip

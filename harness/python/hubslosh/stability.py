@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -283,14 +283,8 @@ def _margins(
             near = _nearby_modes(row["frequency"], moved[i], tanks)
             rows.append(row | {"delay_margin": late, "near": near})
     columns = [
-        "loop",
-        "crossing",
-        "frequency",
-        "gain_margin",
-        "phase_margin",
-        "delay_margin",
-        "near",
-    ]
+        "loop", "crossing", "frequency", "gain_margin", "phase_margin", "delay_margin", "near",
+    ]  # fmt: skip
     table = pd.DataFrame(rows, columns=columns).sort_values("frequency", kind="stable")
     table = table.reset_index(drop=True)
     units = {"frequency": "Hz", "gain_margin": "dB", "phase_margin": "deg", "delay_margin": "s"}
@@ -313,16 +307,12 @@ def _broken_at(gain: LinearModel, i: int) -> LinearModel:
     A, B, C, D = gain
     closing = np.linalg.inv(np.eye(len(others)) + D[np.ix_(others, others)])
     from_x, from_u = -closing @ C[others], -closing @ D[others, i]
-    return LinearModel(
-        A + B[:, others] @ from_x,
-        (B[:, i] + B[:, others] @ from_u)[:, None],
-        (C[i] + D[i, others] @ from_x)[None],
-        np.array([[D[i, i] + D[i, others] @ from_u]]),
-        gain.states,
-        gain.inputs[i : i + 1],
-        gain.outputs[i : i + 1],
-        gain.period,
-    )
+    B_i = (B[:, i] + B[:, others] @ from_u)[:, None]
+    D_i = np.array([[D[i, i] + D[i, others] @ from_u]])
+    return replace(
+        gain, A=A + B[:, others] @ from_x, B=B_i, C=(C[i] + D[i, others] @ from_x)[None], D=D_i,
+        inputs=gain.inputs[i : i + 1], outputs=gain.outputs[i : i + 1],
+    )  # fmt: skip
 
 
 def _closed_matrix(gain: LinearModel) -> Matrix:
@@ -359,7 +349,7 @@ def _errors(
 
 
 def _may_be_neutral(A: Matrix, poles: NDArray[np.complex128], period: float | None) -> Any:
-    """Return True if rounding errors can move a pole to the limit of stability.
+    """Return True if rounding errors can move one of ``poles`` to the limit of stability.
 
     ``A`` is the closed loop's matrix; for ``period`` see `_errors`.
     """
@@ -603,10 +593,10 @@ def _exact_delay(
 def _unit_eigenvalues(
     gain: LinearModel, closed: NDArray[np.complex128]
 ) -> list[tuple[float, float]]:
-    """Return each frequency at which an eigenvalue of L has the magnitude 1, with a delay.
+    """Return each frequency at which an eigenvalue of a loop gain has the magnitude 1.
 
     Each item is the delay (s) that rotates the eigenvalue to -1, followed by the frequency (rad/s).
-    ``closed`` has the poles of the closed loop.
+    ``gain`` is the loop gain, and ``closed`` has the poles of the closed loop.
     """
     period = gain.period or 0.0
     roots = [np.linalg.eigvals(gain.A).astype(complex), closed]

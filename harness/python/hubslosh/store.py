@@ -49,11 +49,6 @@ def encoded(value: Any) -> Any:
     raise TypeError(f"{value!r} of type {type(value).__name__}")
 
 
-def decoded(value: Any) -> float:
-    """Return the number that `encoded` has written, including NaN and infinite numbers."""
-    return float(value["float"] if isinstance(value, dict) else value)
-
-
 class Store:
     """The folder of a study, which is locked within a ``with`` statement."""
 
@@ -116,7 +111,10 @@ def _row(
             for name, value in _texts(draw).items()
             if json.dumps(drawn.get(name)) != json.dumps(value)
         ]
-        row = {name: decoded(value) for name, value in stored["found"].items()}
+        row = {
+            name: float(value["float"] if isinstance(value, dict) else value)
+            for name, value in stored["found"].items()
+        }
         more = {key: stored[key] for key in stored if key not in ("run", "drawn", "found")}
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         return {}, damage or f"the file is not the file of a run: {error!r}"

@@ -369,9 +369,7 @@ def tank(
         _tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle, spin,
         large_waves,
     )  # fmt: skip
-    (found,) = solve([case])
-    if isinstance(found, FmuError):
-        raise found
+    found = _solve_case(case)
     for warning in found._solved.warnings():
         warnings.warn(warning, FmuWarning, stacklevel=2)
     return found

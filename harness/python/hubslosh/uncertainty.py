@@ -50,6 +50,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -277,7 +278,7 @@ def _gyroscopic(M: Matrix, w: Matrix) -> Matrix:
 
 
 def _gyroscopic_slope(M: Matrix, w: Matrix) -> Matrix:
-    """Return the derivative of `_gyroscopic` with respect to the angular velocity w (6 × 3)."""
+    """Return the derivative of `_gyroscopic` with respect to w (6 × 3), for the mass matrix M."""
     momentum = (M[:, 3:] @ w).reshape(2, 3)
     found: Matrix = _twice(w) @ M[:, 3:] - np.vstack([_cross(of) for of in momentum])
     return found
@@ -305,9 +306,7 @@ def _read(
         def get(*names: str) -> Matrix:
             return np.array(plant.get(names))
 
-        def vector(name: str, count: int = 3) -> Matrix:
-            return read_vector(plant, name, count)
-
+        vector = partial(read_vector, plant)
         if plant.fmu.name != "Spacecraft":
             raise FmuError(f"uncertain models exist only for Spacecraft, not for {plant.fmu.name}")
         free = (get("mount_kind")[0] or get("mount")[0]) == 1
@@ -382,7 +381,8 @@ def _read(
         modes = []
         for number in range(1, int(get("appendages")[0]) + 1):
             of = f"appendage[{number}]"
-            participation, place = vector(f"{of}.participation", 6), vector(f"{of}.position")
+            participation = vector(f"{of}.participation", 6)
+            place = vector(f"{of}.position")
             if not participation.any():
                 continue
             eta, eta_dot, frequency, zeta = get(*(
@@ -556,8 +556,10 @@ def _partitioned(
 ) -> tuple[Matrix, list[int], tuple[str, ...]]:
     """Return M from (states, channels, all inputs) to (derivatives, channels, all outputs).
 
-    A channel is a row of Δ. Also return the number of channels of each column of ``spread``, and
-    the names of the states. At the operating point the acceleration is γ X_f + X_c.
+    A channel is a row of Δ. ``craft`` is the craft at its operating point, where its acceleration
+    is γ X_f + X_c; ``values`` are its parameters at Δ = 0, and ``spread`` has the change of each
+    parameter (row) with each δ (column). Also return the number of channels of each column of
+    ``spread``, and the names of the states.
     """
     states = [*OUTPUTS, *(
         f"tank[{bob.tank}].{of}[{bob.mode},{i}]"
