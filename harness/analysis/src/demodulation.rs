@@ -17,10 +17,10 @@ use fourier::Complex64;
 /// from other components of the signal.
 pub const LEAST_CYCLES: f64 = 3.0;
 
-/// Number of cycles in the window for a slow sweep. 24 cycles are 10 s at 2.4 Hz, during which the
-/// thesis's sweep moves by 9 mHz. This is little compared with the 14 mHz half-power width of the
-/// slosh in 10 cm of water, and long enough to separate the harmonics of a sticking bearing from
-/// the sweep.
+/// Number of cycles in the window for a slow sweep. 24 cycles last 10 s at 2.4 Hz. In this time the
+/// frequency of the sweep in Rubaga's thesis changes by 9 mHz, which is less than the half-power
+/// width of the slosh in 10 cm of water, 14 mHz. The window is also long enough to separate the
+/// harmonics that a sticking bearing causes from the sweep.
 pub const CYCLES: f64 = 24.0;
 
 const MOST_MOVE: f64 = 0.015;

@@ -91,7 +91,7 @@ impl Features {
     /// Finds antiresonance and resonance: the lower and the upper end of the largest rise of the
     /// magnitude |H|, in dB, with the frequency.
     ///
-    /// The thesis defines them as the smallest and the largest |H| in the band (its equations 6.9
+    /// Rubaga's thesis defines them as the smallest and the largest |H| in the band (equations 6.9
     /// and 6.10). This gives the same result if the resonance is the highest and the antiresonance
     /// the lowest point of the band. It fails if a damped resonance is lower than |H| at the band's
     /// edge of 1.25 Hz, where the hub's inertia dominates, or if a ripple above the resonance is

@@ -104,9 +104,9 @@ const FINE: usize = 4;
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
-    /// Estimates start values for a fit of the model from the spectrum of `record` and from the
-    /// decay of its amplitude. Returns `None` if the record has fewer than [`LEAST_PERIODS`]
-    /// periods or does not oscillate.
+    /// Estimates start values for a fit of the free-decay [`model`] from the spectrum of `record`
+    /// and from the decay of its amplitude. Returns `None` if the record has fewer than
+    /// [`LEAST_PERIODS`] periods or does not oscillate.
     pub fn fit(record: &Record) -> Option<Start> {
         let Record { time, signal } = *record;
         let n = time.len();

@@ -17,12 +17,14 @@ use serde::Serialize;
 use crate::statistics::{mean, median};
 
 pub const LAGS: usize = 50;
-/// Number of rows in a time window of the test, which is 20 s at 50 Hz.
+/// Number of rows in each of the time windows whose power is compared with the white noise; 1000
+/// rows are 20 s at 50 Hz.
 pub const WINDOW: usize = 1000;
 const BANDS: usize = 100;
 const FEWEST_LINES: usize = 4;
-/// Limit of each test, in standard deviations. If the residual is the gyro's noise, one test
-/// exceeds it with the probability 1e-6, and one of about a hundred tests with 1e-4.
+/// Largest acceptable result of a test, in standard deviations. If the residual is only the gyro's
+/// noise, a single test exceeds this limit with the probability 1e-6, and at least one of a hundred
+/// tests exceeds it with the probability 1e-4.
 pub const LIMIT: f64 = 5.0;
 
 /// Results of the tests of a residual. They are in standard deviations of the result that pure

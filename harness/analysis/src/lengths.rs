@@ -7,18 +7,19 @@ use crate::response::BAND;
 use crate::sweep::Sweep;
 use crate::{spa, welch};
 
-/// Number of samples per cycle of the band's highest frequency that an estimate from a whole record
-/// needs. The thesis's sweep has 14.3 samples per cycle.
+/// Smallest number of samples per cycle, at the highest frequency of the band, to which a record
+/// may be decimated. The sweep of Rubaga's thesis has 14.3 and is not decimated.
 const SAMPLES: f64 = 14.0;
 const MOST_LAG: f64 = 0.5;
 
 /// Lengths that an estimate of a frequency response from a whole record uses.
 ///
-/// - `lag`: longest lag of [`spa`], s. It has as many cycles at the band's centre as 200 s of the
-///   thesis's sweep, but is at most half of the record. The resolution is 1/lag.
-/// - `segment`: length of the segments for the coherence, s. For a sweep, six half-overlapping
-///   segments cover each frequency, which gives sqrt(1/(3 rate)) with the rate of the sweep in
-///   Hz/s. For noise, a segment has as many cycles as 20 s of the thesis's sweep.
+/// - `lag`: longest lag of [`spa`], s. It contains as many cycles at the centre of the band as 200
+///   s contain for the sweep of Rubaga's thesis, but is at most half of the record. The frequency
+///   resolution is 1/lag.
+/// - `segment`: length of the segments for the coherence, s. For a sweep it is sqrt(1/(3 rate))
+///   with the sweep rate in Hz/s, so that six half-overlapping segments contain each frequency. For
+///   noise, a segment has as many cycles as 20 s of the sweep of Rubaga's thesis.
 /// - `decimation`: number of samples that are averaged to one sample, in torque and rate alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lengths {

@@ -157,9 +157,9 @@ impl Linear {
 }
 
 impl Linear {
-    /// Returns the model of the thesis's bench with 10 cm of water: Table 4.1 with the exact first
-    /// root of J1', the density 1000 kg/m³ and g = 9.81 m/s². `damping` is the damping ratio of the
-    /// slosh mode.
+    /// Returns the model of the bench of Rubaga's thesis with 10 cm of water. The slosh mode has
+    /// the values of the thesis's Table 4.1, recomputed with the exact first root of J1', the
+    /// density 1000 kg/m³ and g = 9.81 m/s². `damping` is the damping ratio of the slosh mode.
     pub fn bench_10_cm(damping: f64) -> Self {
         Self::bench(1.3304311085, 0.7562932719, 2.3436181431, damping)
     }

@@ -96,8 +96,8 @@ mod tests {
 
     const STEP: f64 = 0.02;
 
-    /// Returns the thesis's sweep with the torque amplitude `amplitude`, N·m, its torque at every
-    /// sample, and the rate of the linear bench under this torque.
+    /// Returns the sweep of Rubaga's thesis with the torque amplitude `amplitude`, N·m, its torque
+    /// at every sample, and the rate of the linear bench under this torque.
     fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
         let sweep = Sweep { amplitude, ..Sweep::THESIS };
         let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();

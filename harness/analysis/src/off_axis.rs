@@ -18,9 +18,10 @@ use crate::statistics::about_mean;
 /// Off-axis part of the liquid's force in a run, in three measures. F_r is the radial force, which
 /// does not turn the hub, and F_t the tangential force, which does.
 ///
-/// - `median`: median over the samples of F_r²/(F_r² + F_t²), 0 to 1, as in the thesis.
+/// - `median`: median over the samples of F_r²/(F_r² + F_t²), 0 to 1, as in Rubaga's thesis.
 /// - `energy`: ratio for the whole record, Σ F_r² / Σ (F_r² + F_t²).
-/// - `leakage`: root mean square of the leakage over the frequencies.
+/// - `leakage`: root mean square over the frequencies of the moment of the radial force per torque
+///   ([`leakage`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OffAxis {
     pub median: f64,
@@ -29,8 +30,8 @@ pub struct OffAxis {
 }
 
 impl OffAxis {
-    /// Computes the off-axis figures from the radial and the tangential force of the liquid, N, at
-    /// every sample, and from the leakage at every frequency.
+    /// Computes the three measures from the `radial` and the `tangential` force of the liquid, N,
+    /// at every sample, and from the result of [`leakage`].
     pub fn from_forces(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
         let (mut off, mut all) = (0.0, 0.0);
         let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());
@@ -56,11 +57,12 @@ impl OffAxis {
     }
 }
 
-/// Computes the off-axis figures of a platform that may tilt. `rate` is the rate about the hub's
-/// axis, rad/s, and `response` its frequency response H to the torque; `others` has responses H_i
-/// and rates ω_i about other axes. As in the thesis, the cross-axis energy fraction is
-/// Σω_i²/(Σω_i² + ω²), and the leakage is √(Σ|H_i|²)/|H|. Returns the leakage at the frequencies of
-/// the response and the figures, which are `None` without a rate about another axis.
+/// Computes the off-axis part of the motion of a platform that may tilt. `rate` is the rate about
+/// the hub's axis, rad/s, and `response` its frequency response H to the torque; `others` has
+/// responses H_i and rates ω_i about other axes. As in Rubaga's thesis, the cross-axis energy
+/// fraction is Σω_i²/(Σω_i² + ω²), and the leakage is √(Σ|H_i|²)/|H|. Returns the leakage at the
+/// frequencies of the response, and its root mean square with the median and the ratio of the
+/// energies as [`OffAxis`], which is `None` without a rate about another axis.
 ///
 /// The mean of each rate is subtracted. Otherwise the bias of a gyro would count as energy: a bias
 /// of 1 deg/s about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`]

@@ -31,7 +31,8 @@ type Spread = [[f64; 6]; 9];
 
 /// Transfer function from torque to rate, fitted to the spectra of a record.
 ///
-/// - `unit`: centre of the band, rad/s, in units of which s is expressed.
+/// - `unit`: centre of the band, rad/s. The coefficients belong to the frequency variable s divided
+///   by `unit`.
 /// - `misfit`: root mean square of the fit's residual, relative to the spectrum of the rate.
 /// - `spread`: square root of the covariance matrix of numerator and denominator, with one column
 ///   for each unknown of the fit.

@@ -155,10 +155,10 @@ impl Rest {
         out as f64 / rest.len().max(1) as f64
     }
 
-    /// Compares the scatter between chunks of `chunk` samples with its value for white, stationary,
-    /// normal noise. Returns the standard deviation of the chunks' means, and the standard
-    /// deviation of the chunks' variances, each divided by this value. Both ratios are about 1 for
-    /// white, stationary noise.
+    /// Returns the standard deviation of the means of chunks of `chunk` samples, and the standard
+    /// deviation of the variances of these chunks. Each is divided by the value that is expected
+    /// for white, stationary, normal noise. A ratio far above 1 therefore shows that the noise is
+    /// not white or not stationary.
     pub fn scatter(&self, chunk: usize) -> [f64; 2] {
         let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
         let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();
@@ -279,7 +279,8 @@ mod tests {
         assert!(off.fold(0.0, f64::max) < 0.03);
     }
 
-    /// Readings of the thesis's gyro have normal noise of 0.4 mrad/s and steps of 0.15 mrad/s.
+    /// The readings are those of the gyro of Rubaga's thesis: normal noise of 0.4 mrad/s, rounded
+    /// to steps of 0.15 mrad/s.
     #[test]
     fn quantised_normal_noise_is_normal_between_its_levels() {
         let mut random = Random::new(3, 0);

@@ -12,8 +12,8 @@
 use crate::response::FrequencyResponse;
 use fourier::Complex64;
 
-/// Magnitude of the swirl number above which a motion counts as rotary. An ellipse with the axis
-/// ratio 1 : 3.7 has this swirl number.
+/// Magnitude of the swirl number (0 for motion in a plane, ±1 for motion on a circle) above which a
+/// motion counts as rotary. It belongs to an ellipse with the axis ratio 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
 
 /// Smallest slosh angle at which the swirl number is evaluated, rad. At smaller angles the small

@@ -14,8 +14,8 @@ use fourier::Complex64;
 
 /// Spectra of input and output at one frequency, which give one equation of the fit.
 ///
-/// - `s`: complex frequency jω, in a unit near the middle of all lines, so that the equations are
-///   well conditioned.
+/// - `s`: complex frequency jω, divided by a frequency near the middle of all lines, so that the
+///   equations are well conditioned.
 /// - `scale`: divisor that weights the equation.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
@@ -25,7 +25,7 @@ pub struct Line {
     pub scale: f64,
 }
 
-/// Coefficients of a transfer function, with s in the unit of [`Line::s`].
+/// Coefficients of a transfer function of the scaled frequency [`Line::s`].
 ///
 /// - `numerator`: b2, b1, b0 of b2 s² + b1 s + b0.
 /// - `denominator`: a2, a1, a0 of s³ + a2 s² + a1 s + a0.

@@ -12,9 +12,9 @@ use crate::response::FrequencyResponse;
 use crate::statistics;
 use fourier::Complex64;
 
-/// Longest lag for the frequency band of the thesis, s. The resolution is about 1/lag: 100 s give
-/// 10 mHz. With 200 s the shape of the antiresonance, whose half-power width is 14 mHz, hardly
-/// changes.
+/// Longest lag for the frequency band of Rubaga's thesis, 1.25 to 3.5 Hz, s. The resolution is
+/// about 1/lag: 100 s give 10 mHz. With 200 s the shape of the antiresonance, whose half-power
+/// width is 14 mHz, hardly changes.
 pub const LAG: f64 = 200.0;
 
 /// A frequency response with the data from which its uncertainty follows.

@@ -96,7 +96,8 @@ impl TransferFunction {
 
     /// Returns the share of the measured response that the model explains in the frequency domain,
     /// %: 100 (1 − |H_meas − H_mod| /
-    /// |H_meas − mean H_meas|) with the measured response H_meas and the model's response H_mod (thesis, equation 6.15).
+    /// |H_meas − mean H_meas|) with the measured response H_meas and the model's response H_mod
+    /// (Rubaga's thesis, equation 6.15).
     pub fn fit_frequency(&self, measured: &FrequencyResponse) -> f64 {
         let count = measured.response.len() as f64;
         let mean = measured.response.iter().sum::<Complex64>() / count;
@@ -177,7 +178,7 @@ impl TransferFunction {
 }
 
 /// Returns the share of the measured signal y that the model's output ŷ reproduces, %: 100 (1 − |y
-/// − ŷ| / |y − mean y|) (thesis, equation 6.14). It is 100 for a perfect model and 0 for a
+/// − ŷ| / |y − mean y|) (Rubaga's thesis, equation 6.14). It is 100 for a perfect model and 0 for a
 /// constant.
 pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     let mean = mean(measured);

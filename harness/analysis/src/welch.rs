@@ -106,8 +106,8 @@ impl Spectra {
         (0..self.cross.len()).map(at).collect()
     }
 
-    /// Returns the mean coherence of the frequency bins between `from` and `to`, Hz (thesis,
-    /// equation 6.17).
+    /// Returns the mean coherence of the frequency bins between `from` and `to`, Hz (Rubaga's
+    /// thesis, equation 6.17).
     pub fn mean_coherence(&self, from: f64, to: f64) -> f64 {
         let (from, to) = (from.min(to), from.max(to));
         let first = (from / self.resolution).ceil() as usize;
@@ -117,7 +117,7 @@ impl Spectra {
     }
 
     /// Returns the signal-to-noise ratio for each frequency bin, dB. It follows from the coherence
-    /// γ² as 10 log10(γ²/(1 − γ²)) (thesis, equation 6.19).
+    /// γ² as 10 log10(γ²/(1 − γ²)) (Rubaga's thesis, equation 6.19).
     pub fn snr_db(&self) -> Vec<f64> {
         self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
     }

@@ -17,21 +17,22 @@ use nalgebra::DMatrix;
 use super::Term;
 use std::f64::consts::PI;
 
-/// Number of lags per averaging time at which the sum for a covariance is evaluated. If an
-/// averaging time has at most this many samples, the sum contains every lag and is exact.
+/// Number of lags per averaging time in the sum over lags that gives the covariance of two Allan
+/// variances. If an averaging time has at most this many samples, the sum contains every lag and is
+/// exact.
 const PER_TIME: usize = 8;
-/// Longest lag in the sum for a covariance, as a multiple of the sum of the two averaging times.
-/// Beyond one such sum only flicker noise contributes, and its terms fall with the square of the
-/// lag.
+/// Longest lag in the sum that gives the covariance of two Allan variances, as a multiple of the
+/// sum of their averaging times. Beyond the multiple 1 only flicker noise contributes, and its
+/// contributions fall with the square of the lag.
 const RANGE: usize = 2;
 /// Largest ratio of two averaging times whose Allan variances are treated as correlated. For larger
 /// ratios the covariance is set to 0.
 const RATIO: usize = 32;
 
-/// Precomputed sums from which the covariance matrix of Allan variances follows for any
+/// Precomputed data from which the covariance matrix of Allan variances follows for any
 /// coefficients of the noise. For each pair of averaging times and each lag they contain the weight
-/// of the lag, and, for each term of the noise with the coefficient 1, the covariance C_mn of the
-/// second differences of the angle.
+/// of the lag, and, for each term of the noise with the coefficient 1, the covariance of the gyro
+/// angle's second differences over the two averaging times.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,
@@ -59,7 +60,7 @@ fn angle(term: Term, lag: f64, time: f64) -> f64 {
 }
 
 impl Covariance {
-    /// Computes the sums for records of `count` samples that are `step` seconds apart. `factors`
+    /// Precomputes the data for records of `count` samples that are `step` seconds apart. `factors`
     /// are the numbers of samples per average, ascending; `terms` are the terms of the noise;
     /// `time` is the correlation time of the Gauss–Markov bias, s.
     pub fn new(step: f64, count: usize, factors: &[usize], terms: &[Term], time: f64) -> Self {

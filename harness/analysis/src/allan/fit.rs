@@ -120,11 +120,11 @@ impl Octaves {
         Problem { octaves: self, terms, from }.fit()
     }
 
-    /// Fits white noise, flicker noise and a rate random walk. If this fit fails its test, two
-    /// other explanations are tried: short averaging times are left out, because a filter in the
-    /// gyro may affect them, or a ramp or a Gauss–Markov bias is added. If every fit fails, the fit
-    /// of the three basic terms to all octaves is returned; its `fits` is then false. Returns
-    /// `None` if no fit is possible ([`Octaves::fit`]).
+    /// Fits white noise, flicker noise and a rate random walk. If χ² shows that this model does not
+    /// fit, two other explanations are tried: short averaging times are left out, because a filter
+    /// in the gyro may affect them, or a ramp or a Gauss–Markov bias is added. If no model fits,
+    /// the fit of the three basic terms to all octaves is returned; its `fits` is then false.
+    /// Returns `None` if no fit is possible ([`Octaves::fit`]).
     pub fn describe(&self) -> Option<Fit> {
         const BASIC: [Term; 3] = [Term::White, Term::Flicker, Term::Walk];
         let first = self.fit(&BASIC, 0)?;
@@ -199,8 +199,9 @@ impl Problem<'_> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns first estimates of the coefficients, for which every octave has an assumed relative
-    /// error. The iteration of the weights starts from them.
+    /// Returns first estimates of the coefficients, from which [`Problem::iterate_weights`] starts.
+    /// They assume that the relative error of each Allan variance is the square root of its
+    /// averaging time, times a constant, because the weights of the iteration need coefficients.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
@@ -234,8 +235,8 @@ impl Problem<'_> {
 
     /// Repeats the generalized least squares, each time with weights that follow from the last
     /// result, until the coefficients converge. If `fixed` is a coefficient's index and value, this
-    /// coefficient and the correlation time are not fitted. `tables` is recomputed when the
-    /// correlation time changes.
+    /// coefficient and the correlation time are not fitted. The precomputed covariances `tables`
+    /// are updated when the correlation time changes.
     fn iterate_weights(
         &self,
         mut state: State,
