@@ -10,10 +10,12 @@ use signals::recording::Columns;
 
 use super::{RunsArgs, bench_day, campaign, open, setting};
 
-/// Analyses recordings of a bench like runs of a campaign, and compares them with simulations under the same torque.
+/// Analyses recordings of a bench as `hubslosh campaign` analyses simulated runs, and compares them with simulations
+/// under the same torque.
 ///
 /// A recording has torque and one to three rates: time (s), tau_cmd (N·m), omega (rad/s), and optionally omega_x and
-/// omega_y; --columns names other columns and units. The command writes the tables and the report of a campaign.
+/// omega_y; --columns names other columns and units. The command writes the same tables and report as `hubslosh
+/// campaign`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh analyse bench_050.csv bench_100.csv --columns time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s\n  \

@@ -23,8 +23,8 @@ use crate::terminal;
 #[command(next_help_heading = "Options for any FMU")]
 pub struct AnyFmuArgs {
     /// Unknowns to estimate: Real parameters and start values of the FMU, each with an initial guess and optionally
-    /// bounds [default bounds: min and max of the FMU]. NAME@each estimates a separate value of NAME for each recording.
-    /// scale(NAME) is the relative error of the scale of an input or output; an error of 0 means an exact scale.
+    /// bounds [default bounds: min and max of the FMU]. NAME@each estimates a separate value of NAME for each
+    /// recording. scale(NAME) is the relative scale error of the input or output NAME; 0 means an exact scale.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
     /// Prior knowledge of an unknown: its mean and standard deviation.
@@ -105,8 +105,8 @@ const STARTS: usize = 8;
 /// Options that request the likelihood at given points instead of a fit.
 #[derive(clap::Args)]
 pub struct PointsArgs {
-    /// Table of points, one column for each unknown. The command then writes −2 ln L at each point to --out, for
-    /// `hubslosh.posterior` in Python, instead of fitting.
+    /// Table of points, one column for each unknown. The command then writes −2 ln L, where L is the likelihood of the
+    /// recordings, at each point to --out, for `hubslosh.posterior` in Python, instead of fitting.
     #[arg(long, hide = true, value_name = "CSV", requires_all = ["free", "found"])]
     points: Option<PathBuf>,
     /// Result of an earlier identification (.json) whose noise the likelihood uses.
@@ -114,8 +114,7 @@ pub struct PointsArgs {
     found: Option<PathBuf>,
 }
 
-/// Options that `identify --free` and `design --free` have in common with the other kinds of
-/// recordings.
+/// Options of `identify --free` and `design --free` that these commands also have without `--free`.
 pub struct Request<'a> {
     pub data: &'a [PathBuf],
     pub settings: &'a [(String, String)],

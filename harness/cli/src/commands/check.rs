@@ -46,7 +46,8 @@ pub struct CheckArgs {
 #[error("{0}")]
 pub struct Unchecked(String);
 
-/// Process that `check` starts for the calls of one rule.
+/// Arguments of the separate process in which `check` makes the calls of one rule, so that a crash
+/// or a hang of the FMU does not end the check.
 #[derive(clap::Args)]
 pub struct CheckCallsArgs {
     rule: String,

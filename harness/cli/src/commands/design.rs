@@ -46,7 +46,7 @@ pub struct DesignArgs {
     /// Period of the multisine, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 100.0, conflicts_with = "profile")]
     period: f64,
-    /// Length of the multisine, s. The length of a profile is its `duration=…`.
+    /// Length of the multisine, s. A torque profile has its own length, set by `duration=…`.
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0, conflicts_with = "profile")]
     duration: f64,
     /// Lowest and highest frequency of the multisine, or of the sine for --snr, Hz.
@@ -266,8 +266,8 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
 
 struct Bench<'f> {
     fmu: &'f Fmu,
-    /// Settings of the FMU, with the damping ratio that the user has set, or otherwise the damping
-    /// ratio of the correlation.
+    /// Settings of the FMU. If they contain no damping ratio of the slosh, the FMU computes it by
+    /// its correlation of measured damping.
     setup: Setup,
     sensor_errors: bool,
     noise: Noise,
@@ -346,8 +346,8 @@ struct Plan {
 }
 
 impl Plan {
-    /// Returns the plain sweep if it determines the parameters more precisely than the planned
-    /// torque, otherwise `None`.
+    /// Returns the linear sweep with the same peak torque if it determines the parameters more
+    /// precisely than the planned multisine, otherwise `None`.
     fn more_precise_sweep(&self) -> Option<&Sweep> {
         let merit = design::merit(&self.bounds);
         self.sweep.as_ref().filter(|sweep| design::merit(&sweep.bounds) < merit)
@@ -448,8 +448,8 @@ impl Plan {
 impl DesignArgs {
     /// Prints the torque amplitude of a sine for which the gyro's samples have the signal-to-noise
     /// ratio `snr`, dB: at both ends of the band, at resonance and antiresonance, and for a rigid
-    /// hub (thesis 8.6.1). `limit` is the largest torque of the reaction wheel, N·m, and `real`
-    /// returns the value of a parameter of the FMU.
+    /// hub (section 8.6.1 of Rubaga's thesis). `limit` is the largest torque of the reaction wheel,
+    /// N·m, and `real` returns the value of a parameter of the FMU.
     fn torque_for(
         &self,
         snr: f64,

@@ -16,8 +16,8 @@ pub struct Out<'a> {
 }
 
 impl Out<'_> {
-    /// Runs the search `search` and shows its progress, which the search reports to its argument,
-    /// as a spinner.
+    /// Runs `search` and shows its progress as a spinner. `search` receives a function that it
+    /// calls with each message about its progress.
     ///
     /// # Errors
     ///

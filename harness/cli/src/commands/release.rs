@@ -10,9 +10,9 @@ const DEFAULT_RELEASE: &str = "dist/release";
 /// Builds and checks the files of a release for all platforms.
 ///
 /// Each FMU is built for both versions of FMI, with its software bill of materials (SBOM) and the report of its check.
-/// Wheels of the Python package have SBOMs too; the folder of the release keeps the wheel for Linux. SHA256SUMS lists the
-/// files in the folder. SHA256SUMS.all also lists wheels that the folder does not keep, and files of older versions,
-/// which are removed from it.
+/// The wheels of the Python package are built in the folder of --wheels. The folder of --out receives their SBOMs and
+/// the wheel for Linux. SHA256SUMS lists the files in the folder of --out. SHA256SUMS.all also lists the other wheels,
+/// and the files of older versions, which the command removes from the folder.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On Debian, harness/platforms/setup installs the tools that building for all platforms needs.")]

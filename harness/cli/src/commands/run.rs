@@ -228,8 +228,9 @@ impl RunArgs {
 }
 
 /// Returns the columns to record by default. For the bench these are four signals; for another FMU
-/// they are all numeric outputs and the slosh angles, as in a campaign. `hubslosh view` also needs
-/// the states of the bench's modes after the first mode, and the liquid left in draining tanks.
+/// they are all numeric outputs and the slosh angles, as in a campaign. In addition they are the
+/// quantities that `hubslosh view` draws: the displacements of the bench's second and further slosh
+/// modes, and the liquid left in draining tanks.
 fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -244,8 +245,8 @@ fn default_columns(
     names
 }
 
-/// Joins the parts of a list that was split at commas again where the comma belongs to an index, as
-/// in `inertia[1,2]`.
+/// Restores names with a comma in their index, such as `inertia[1,2]`, from a list that was split
+/// at all commas.
 fn whole_names(parts: Vec<String>) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for part in parts {

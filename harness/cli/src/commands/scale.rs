@@ -81,7 +81,8 @@ enum Scale {
         #[arg(long, default_value_t = 0.005)]
         flight_alpha: f64,
     },
-    /// Computes the factors from quantities of a model to quantities of the full size, by equal Froude numbers.
+    /// Computes the factors by which quantities of a scale model are multiplied to obtain quantities at full size, by
+    /// equal Froude numbers.
     #[command(after_help = "Example:\n  hubslosh scale froude --lambda 25 --density-ratio 1.14")]
     Froude {
         /// Scale factor: a length at full size divided by the same length of the model.
@@ -96,7 +97,7 @@ enum Scale {
     },
 }
 
-/// A tank under acceleration; by default the bench's with water.
+/// A tank under acceleration; by default the tank of the bench, filled with water.
 #[derive(clap::Args)]
 struct TankAtRest {
     /// Density of the liquid, kg/m³.

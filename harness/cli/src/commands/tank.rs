@@ -37,9 +37,9 @@ pub struct TankArgs {
     /// Mass of the liquid, kg, instead of --fill.
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
-    /// Several fills, m or %, for a table of modes over the fill (CSV). With --parameters the command writes the fill table
-    /// of a draining tank: if two fills are given, the command chooses the points of the table between them; if 3 to 12
-    /// fills are given, these fills are the points.
+    /// Several fills, m or %, at which the modes are computed for a table (CSV). With --parameters the command writes
+    /// the fill table with which an FMU simulates a draining tank. Two fills are the ends of this table, and the
+    /// command chooses the points between them; 3 to 12 fills are the points of the table.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
     /// Number of lateral modes, 1 to 20.
@@ -72,8 +72,8 @@ pub struct TankArgs {
     /// ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
-    /// Surface tension, N/m, for the frequencies at --gravity, for the stiffness with which it centres the liquid
-    /// (written by --parameters) and for the damping [default: no surface tension].
+    /// Surface tension, N/m. It changes the frequencies and the damping at --gravity, and gives each mode a stiffness
+    /// that centres the liquid, which --parameters writes [default: no surface tension].
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
     /// Contact angle between surface and wall, degrees; 90 is a flat surface. For an upright cylinder, the frequency and

@@ -19,8 +19,8 @@ pub struct VariablesArgs {
     /// Lists only variables with this causality: input, output, parameter, calculatedParameter or local.
     #[arg(long, value_name = "NAME")]
     causality: Option<String>,
-    /// Prints the variables as JSON, one object for each. In it `units` lists the units in which a value may be given,
-    /// where value in this unit = factor · SI value + offset.
+    /// Prints the variables as JSON, one object for each. The entry `units` lists the units in which a value may be
+    /// given; the value in a unit is factor · SI value + offset.
     #[arg(long)]
     json: bool,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).

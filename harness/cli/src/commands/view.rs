@@ -190,8 +190,9 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     Ok(Table::new(table.names().to_vec(), table.names().iter().map(column).collect()))
 }
 
-/// Number of intervals into which each segment of a drawn contour is divided. The height of the
-/// surface is computed for four times as many masses of the liquid.
+/// Number of intervals into which each segment of a drawn contour is divided. The range of the
+/// liquid's mass is divided into four times as many intervals, and the height of the surface is
+/// computed at their ends.
 const POINTS: usize = 24;
 
 const STEPS: usize = 80;

@@ -33,7 +33,7 @@ const THESIS: [(&str, f64); 5] = [
     (friction::OMEGA_S, 0.08581),
     (hub::I, 0.322414),
 ];
-/// Radius of the oxygen tank of the upper stage Centaur, m (thesis 7.2.1).
+/// Radius of the oxygen tank of the upper stage Centaur, m (section 7.2.1 of Rubaga's thesis).
 const CENTAUR: f64 = 2.0425;
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;

@@ -22,12 +22,12 @@ use crate::terminal;
 
 const MANIFEST: &str = "day.toml";
 
-/// Kind of a recording that day.toml lists.
+/// Kind of a recording that day.toml lists. Numbers in parentheses are sections of Rubaga's thesis.
 ///
-/// - `Friction`: A ramp, step or sweep of the torque with the tank empty (thesis 5.2).
-/// - `Decay`: A push and the free decay after it with the tank empty and an encoder (thesis 5.4).
-/// - `Rest`: A recording of the gyro while the hub stands still (thesis 5.5).
-/// - `Sweep`: A sine sweep with liquid (thesis 6 and 7).
+/// - `Friction`: a ramp, step or sweep of the torque with the tank empty (5.2).
+/// - `Decay`: a push and the free decay after it, with the tank empty and an encoder (5.4).
+/// - `Rest`: a recording of the gyro while the hub stands still (5.5).
+/// - `Sweep`: a sine sweep with liquid (chapters 6 and 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
