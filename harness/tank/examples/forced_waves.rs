@@ -225,8 +225,8 @@ impl Filled {
     }
 
     /// Prints the rotary wave for each forcing, which is a frequency ratio, an acceleration over g,
-    /// and a damping ratio. Newton's method starts from the amplitudes and phases of the last slosh
-    /// mass in rotary motion.
+    /// and a damping ratio. Newton's method starts from the amplitudes and phases of the rotary
+    /// motion of a slosh mass with the last coefficients in `bobs`.
     fn swirl(&self, resolution: [usize; 2], forcings: &[[f64; 3]]) {
         for &[ratio, push, zeta] in forcings {
             let bob = Bob { zeta, ..self.bobs[self.bobs.len() - 1] };

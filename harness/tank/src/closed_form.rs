@@ -52,9 +52,9 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
 }
 
 /// Returns slosh mode number `n` of a tank with vertical walls and a flat bottom, whose wave number
-/// is `k`, 1/m, at the fill `h`, m. `m` is the slosh mass and `m_liq` the mass of the liquid, kg.
-/// The eigenvalue is lambda = k tanh(k h), and the slosh mass is at the height h - (2/k) tanh(k
-/// h/2).
+/// is `k`, 1/m, at the fill `h`, m. `m` is the slosh mass and `m_liq` the mass of the liquid, kg;
+/// for `surface` and `beta` see [`Mode`]. The eigenvalue is lambda = k tanh(k h), and the slosh
+/// mass is at the height h - (2/k) tanh(k h/2).
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();

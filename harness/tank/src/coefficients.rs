@@ -4,10 +4,10 @@ use serde::Serialize;
 
 /// Amplitude dependence of the first mode of a tank.
 ///
-/// - `mode`, `mode_y`: its coefficients, for a box along the first and along the second length;
-///   `None` if not known.
-/// - `pendulum_limit`, `pendulum_limit_y`: slosh angle, rad, above which a pendulum (s = kappa = 1)
-///   is out of range as a model of this mode.
+/// - `mode`, `mode_y`: coefficients of the first mode, for a box along its first and along its
+///   second side; `None` if not known.
+/// - `pendulum_limit`, `pendulum_limit_y`: slosh angle, rad, above which a pendulum is out of range
+///   as a model of this mode.
 /// - `warnings`: limits of the coefficients, and the reasons why coefficients are missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FiniteAmplitude {
@@ -22,9 +22,11 @@ pub struct FiniteAmplitude {
 
 /// Third-order coefficients of a mode.
 ///
-/// - `nonlinear_inertia`, `nonlinear_stiffness`: s and kappa as in the FMUs; both are 1 for a
-///   pendulum.
-/// - `error`: estimated error of both, relative to 1 + |s| and 1 + |kappa|.
+/// - `nonlinear_inertia`, `nonlinear_stiffness`: coefficients s and kappa of an equivalent mass m
+///   with the displacement q, the length l and the frequency omega of small motion. In a plane its
+///   inertia is m (1 + s q^2/l^2), and its restoring force is m omega^2 q (1 + kappa q^2/(2 l^2)).
+///   Both coefficients are 1 for a pendulum.
+/// - `error`: estimated error of s and kappa, relative to 1 + |s| and 1 + |kappa|.
 /// - `planar`, `circular`: relative shift of the squared frequency per squared slosh angle; a mode
 ///   along one length of a box has no circular motion.
 /// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At a slosh
@@ -61,8 +63,8 @@ pub struct Coefficients {
 }
 
 /// Coefficients of a mode that also give the energy of the wave (`formulas::energy_terms`), and are
-/// then used instead of the third-order coefficients. The first six fields are s, kappa, s_2,
-/// kappa_2, t and t_2 under the names of the FMUs.
+/// then used instead of the third-order coefficients. The first six fields, which have the names of
+/// the FMUs' parameters, are the coefficients s, kappa, s_2, kappa_2, t and t_2 of that module.
 ///
 /// - `angle_limit`: slosh angle above which the mode is out of range, rad.
 /// - `swirl_limit`: slosh angle above which rotary motion is out of range, rad, if this angle is

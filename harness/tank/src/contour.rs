@@ -209,10 +209,11 @@ impl Contour {
     }
 
     /// Returns the integral of `density` dz along the wetted wall, up the outer wall and down the
-    /// inner wall. The free surface may be level, or curved by a spin: at the height z the liquid
-    /// reaches inwards to the radius sqrt(`surface(z)`), m, so that `surface` returns infinity
-    /// above a level surface and 0 below it. `density` receives the point (r, z) of the wall and
-    /// `surface(z)`, m². `kinks` are heights at which the slope of `surface` jumps.
+    /// inner wall. `surface(z)` describes the free surface, which may be level or curved by a spin:
+    /// it is the square, m², of the radius inside which there is no liquid at the height z. For a
+    /// level surface it is 0 below the surface and infinite above it. `density` receives the point
+    /// (r, z) of the wall and `surface(z)`, m². `kinks` are heights at which the slope of `surface`
+    /// jumps.
     pub(crate) fn integrate_wetted<const N: usize>(
         &self,
         surface: impl Fn(f64) -> f64,
@@ -500,8 +501,9 @@ fn defect(segment: &Segment) -> Option<String> {
     None
 }
 
-/// Lets the list of segments of a torus, which is closed away from the axis, begin at the highest
-/// point. Other contours are returned unchanged. `size` is the size of the tank, m.
+/// Returns the segments of a torus in an order that begins at its highest point. A torus is a
+/// contour that is closed away from the axis; other contours are returned unchanged. `size` is the
+/// size of the tank, m.
 fn start_at_highest_point(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     let (start, end) = (segments[0].start(), segments[segments.len() - 1].end());
     if norm(sub(start, end)) > JOINED * size || start[0] <= JOINED * size {

@@ -44,8 +44,8 @@ use crate::third_order::circle_basis;
 /// rest. The first mode of a cylinder has 2e-5 of its motion at this depth.
 const DEEP: f64 = 3.0;
 
-/// Smallest eigenvalue of the matrix of kinetic energy, relative to the largest eigenvalue, whose
-/// eigenvector is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
+/// Smallest eigenvalue of the matrix of kinetic energy, divided by its largest eigenvalue, for
+/// which the eigenvector is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
 const NOISE: f64 = 1e-13;
 
 /// Periodic waves of the first mode up to third order, with lengths divided by the radius of the
@@ -335,9 +335,10 @@ fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
 }
 
-/// Values of the first mode and of the coordinates at the points of the surface, which the
-/// equations of higher order need. The first mode has the elevation f, with int f^2 rho drho = 1,
-/// and the potential U; `along` the lines of the coordinates, w is the volume element.
+/// Values at the points of the surface at rest that the equations of higher order need. The first
+/// mode has the elevation f, with int f^2 rho drho = 1, and the potential U. The lines of the
+/// coordinates run from the surface into the liquid and follow the wall; w is the volume element in
+/// these coordinates.
 ///
 /// - `along`: first and second derivative of U w along the lines.
 /// - `gradient`: U_r, U_z and U/r.
@@ -354,9 +355,10 @@ struct First {
     slope: Vec<f64>,
 }
 
-/// A second-order field: the coefficients `p` and `r` of its elevation, constant and at twice the
-/// frequency, the coefficients `d` of its potential, and its contribution `l_4` to the functional
-/// in the fourth order of the amplitude.
+/// Second-order part of a motion, for one azimuthal number. `p` are the coefficients of its
+/// constant elevation, and `r` and `d` the coefficients of its elevation and of its potential at
+/// twice the frequency. `l_4` is its contribution to the term of Luke's functional with the fourth
+/// power of the amplitude.
 struct Second {
     l_4: f64,
     p: DVector<f64>,
@@ -378,9 +380,10 @@ pub(crate) struct Harmonics {
 }
 
 /// Computes the waves of the first mode to third order with solid harmonics up to `degree`. The
-/// slope of the coordinate lines is proportional to the radius to the power `lines`, an odd number;
-/// the result must not depend on it. The second-order response is computed at the frequency 2 omega
-/// (1 + `detuning`), so that the influence of a nearby resonance can be seen. Returns `None` for a
+/// coordinates have lines that run from the surface into the liquid and follow the wall. The slope
+/// of a line is proportional to its radius to the power `lines`, an odd number, on which the result
+/// must not depend. The second-order response is computed at the frequency 2 omega (1 +
+/// `detuning`), so that the influence of a nearby resonance can be seen. Returns `None` for a
 /// liquid with a hole, such as a ring.
 pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Option<Waves> {
     let liquid = Liquid::new(wall, degree)?;
@@ -630,9 +633,10 @@ mod tests {
         }
     }
 
-    /// Luke's functional of the first and the second order is evaluated without any expansion: the
-    /// integrals over the liquid run up to the surface, with the true wall of the sphere. The test
-    /// compares its coefficient of the fourth power of the amplitude.
+    /// The test evaluates Luke's functional for a motion of first and second order without a Taylor
+    /// expansion about the surface at rest: the integrals run over the liquid up to the moving
+    /// surface, with the true wall of a sphere. The coefficient of the fourth power of the
+    /// amplitude gives the frequency shift, which is compared with the shift that `waves` returns.
     #[test]
     fn fourth_order_terms_equal_those_of_the_functional() {
         let (fill, degree, count) = (0.7, 14, 7);

@@ -196,9 +196,9 @@ impl Nearest {
     }
 
     /// Returns a sentence that explains to the user how the damping ratio follows from this shape.
-    /// `factor` is the ratio of the damping to the laminar layer, `correlation` the damping ratio
-    /// by the shape's correlation, and `layers` is 1.45 times the damping ratio of the laminar
-    /// layer.
+    /// `factor` is the damping ratio divided by the damping ratio of the laminar boundary layer,
+    /// `correlation` the damping ratio by the shape's correlation, and `layers` is 1.45 times the
+    /// damping ratio of the laminar layer.
     fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
         let (name, unmeasured) = (shape_name(self.shape), formula::UNMEASURED);
         let formula::Part { weight, .. } = self.part;

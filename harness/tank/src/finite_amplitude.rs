@@ -54,9 +54,9 @@ const ESTIMATED_SHARE: f64 = 0.12;
 const STEEPEST: f64 = 0.5;
 
 const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
-/// Largest accepted difference between two shifts of omega^2 per squared slosh angle: of the
-/// smallest computed waves, and by third-order theory. At 10 degrees this difference changes the
-/// frequency by 0.03 %.
+/// Largest accepted difference between the shift of omega^2 per squared slosh angle that the
+/// smallest computed waves have, and the shift that third-order theory predicts. At 10 degrees this
+/// difference changes the frequency by 0.03 %.
 const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
 const ASSUMED: &str = "without them the FMUs model a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
@@ -67,9 +67,9 @@ const ASSUMED: &str = "without them the FMUs model a pendulum (s = kappa = 1: om
 pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 impl Coefficients {
-    /// Combines the results of two computations, of which the second uses more functions; the
-    /// difference between them gives the error. `wave` is the elevation at the wall per slosh
-    /// angle, m/rad.
+    /// Combines the results of two computations, of which `fine` uses more base functions than
+    /// `rough`. The coefficients come from `fine`, and the difference between the two results gives
+    /// their error. `wave` is the elevation at the wall per slosh angle, m/rad.
     fn new([rough, fine]: [Found; 2], wave: f64) -> Coefficients {
         let [s, kappa] = fine.equivalent;
         let differ = |i: usize| {
@@ -94,8 +94,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns these coefficients with the limits of an upright cylinder filled to h/R = `fill`.
-    /// Near the poles of the third-order theory, s, kappa and the second-order wave are
+    /// Adds the angle limits and the energy coefficients of an upright cylinder filled to h/R =
+    /// `fill`. Near the poles of the third-order theory, s, kappa and the second-order wave are
     /// interpolated over the fill; `second` returns this wave at a fill. `wave` is the elevation at
     /// the wall per slosh angle, m/rad.
     fn cylinder_coefficients(

@@ -771,9 +771,9 @@ const OUTLIER: [f64; 2] = [5e-4, 3e-3];
 
 /// Removes waves whose frequency or rise lies off the straight line through the other waves,
 /// because the truncated expansion has a resonance there. Each wave comes with the index of its
-/// slosh angle. With the squared sine u of the angle, the shift of omega^2 divided by u, and the
-/// excess of the rise divided by u, are almost linear in u. The slope of each line is the median
-/// over all pairs of waves with different angles.
+/// slosh angle. Two quantities are almost linear in u, the squared sine of the slosh angle: the
+/// shift of omega^2 divided by u, and the relative excess of the rise over u/2, divided by u. The
+/// slope of each line is the median over all pairs of waves with different angles.
 fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave)> {
     for (i, allowed) in OUTLIER.into_iter().enumerate() {
         let point = |wave: &LargeWave| {

@@ -468,9 +468,10 @@ struct Approximation {
     i_eff: f64,
 }
 
-/// Returns the numbers of Gauss points per panel of the discretisations that are compared. The
-/// first discretisation serves only to estimate the error. The largest one of `panels` panels has
-/// at most about 800 unknowns.
+/// Returns the numbers of Gauss points per panel of four discretisations, whose results are
+/// compared to estimate the error. The first discretisation serves only for this estimate, and the
+/// last is solved only if the first three are not accurate enough. Many `panels` get fewer points,
+/// so that the matrices stay small.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -529,10 +530,11 @@ fn pair_on(wall: &Wall, volume: &Volume, rho: f64, modes: usize, fine: bool) -> 
     })
 }
 
-/// Estimates the error of a result from the last two differences between discretisations, `before`
-/// and `last`: the geometric mean of `before`, `last` and `last`, or `last` if this is larger.
-/// `last` by itself is not a bound, because convergence is irregular and two discretisations may
-/// agree by chance. The more suddenly the difference falls, the farther the mean stays above it.
+/// Estimates the error of a result from the last two differences between successive
+/// discretisations, `before` and `last`. It is (`before` `last`^2)^(1/3), or `last` if this is
+/// larger. `last` by itself is not a bound, because convergence is irregular and two
+/// discretisations may agree by chance. The more suddenly the differences fall, the farther the
+/// estimate stays above `last`.
 fn estimate(before: f64, last: f64) -> f64 {
     last.max((before * last * last).cbrt())
 }
@@ -771,8 +773,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// If only twice the last difference were stated, the true error would be 0.74 of it for the seed
-    /// 7 and 0.99 for the seed 114, which leaves no margin.
+    /// The true error must be below half of the stated error. If the stated error were only twice the last difference
+    /// between two discretisations, the true error would be 0.74 of it for the seed 7 and 0.99 for the seed 114.
     #[test]
     fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -140,10 +140,10 @@ impl Boundary {
         }
     }
 
-    /// Returns the place on the panel that is nearest to a point x, and its distance from x. The
-    /// place is a fraction v^gamma of the panel's length, which may lie outside 0..1; the distance
-    /// is divided by the local length element ds. `w` is the vector from the start of the panel to
-    /// x.
+    /// Returns the place s on the panel's curve that is nearest to a point x, and its distance from
+    /// x. s is the fraction of the panel up to this place; it may lie outside 0..1, because the
+    /// curve is continued beyond the panel. The distance is divided by the length of the derivative
+    /// of the curve with respect to s. `w` is the vector from the start of the panel to x.
     pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
         let segment = &self.segments[panel.segment];
         let run = (segment.to - segment.from).signum();
@@ -200,8 +200,8 @@ impl Boundary {
     }
 
     /// Returns panels that are at most `gap` times as long as their distance from another part of
-    /// the boundary. On the free surface they are at most `width` of its width. The result is
-    /// `None` if there would be more than `many` panels.
+    /// the boundary. On the free surface a panel is at most the fraction `width` of the surface's
+    /// width. The result is `None` if there would be more than `many` panels.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
         let (longest, z_surface) = match self.ends.get(self.surface) {
@@ -455,7 +455,8 @@ mod tests {
     }
 
     /// The nearest place to a point near an arc has the same polar angle as the point. Each of the
-    /// four iterations reduces the error to the ratio of distance to radius, 1e-1.
+    /// four iterations multiplies the error by the distance of the point from the arc divided by
+    /// the radius of the arc, which is about 0.1 here.
     #[test]
     fn the_nearest_place_on_a_panel_is_found_for_every_point() {
         for wall in [sphere(), ring(), step()] {

@@ -140,9 +140,10 @@ pub struct ParameterSet {
     pub third_order: Vec<(usize, Coefficients)>,
 }
 
-/// Returns the stiffnesses of `modes` by capillarity. They are computed by the formula for a flat
-/// surface; for the first mode of an upright cylinder with another contact angle (the second
-/// element of the pair, degrees) by the table for a curved meniscus. Warnings are added to `set`.
+/// Returns the effect of capillarity on `modes` for the liquid `fluid` and the contact angle
+/// `angle`, degrees. It follows from the formula for a flat surface. The first mode of an upright
+/// cylinder at a contact angle other than 90 degrees uses the table for a curved meniscus instead.
+/// Warnings are added to `set`.
 fn with_capillarity(
     tank: &Tank,
     data: &ModalData,

@@ -67,13 +67,14 @@ const FAR: f64 = 2.3;
 /// sum of semi-axes, the panel is integrated with its own points, without bisection.
 const FAR_WHOLE: f64 = 3.0;
 const ITERATIONS: usize = 30;
-/// Number of integration points on each side of a point on its own panel, where the kernel has a
-/// logarithm. [`OWN_POWER`] is the power with which the points are concentrated so that the
-/// logarithm is integrated exactly.
+/// Number of integration points on each side of a point x that lies on the integrated panel itself,
+/// because there the kernel has a logarithmic singularity at x. [`OWN_POWER`] is the power with
+/// which the points are concentrated near x, so that the logarithm is integrated exactly.
 const OWN: usize = 20;
 const OWN_POWER: i32 = 5;
 /// Longest interval of the panel's coordinate over which [`OWN`] points integrate. It is limited
-/// because the density is a polynomial of the degree order - 1.
+/// because the points must also integrate the function on the panel, a polynomial of the degree
+/// order - 1.
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
@@ -202,9 +203,10 @@ impl Discretisation {
         Some(Solution { lambda, phi, psi })
     }
 
-    /// Assembles the matrices of the boundary integral equation: 1/2 + D with the double layer D,
-    /// and the single layer S. The sources are each point of the free surface, and the sources `q`
-    /// on the whole boundary.
+    /// Assembles the matrix 1/2 + D, with the double layer D, and the right-hand sides of the
+    /// boundary integral equation. The right-hand sides are the potentials (single layer) of a unit
+    /// source at each point of the free surface and, in the last column, of the sources `q` on the
+    /// whole boundary.
     fn assemble(&self, q: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
         let (count, order) = (self.len(), self.order);
         let own = self.own_rules();
@@ -411,8 +413,8 @@ impl Discretisation {
     /// u^2/r^2] r ds, over the free surface if `on_surface` is true and otherwise over the wall.
     /// `u` is given at all points, and u_s is its derivative along the contour. Near a corner u_s
     /// behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. Therefore the
-    /// integral over the last 1e-6 of the panel follows from the exponent (1 if nu > 1, where u_s
-    /// has a limit).
+    /// integral over the last 1e-6 of the panel is computed in closed form from this power law,
+    /// with a constant u_s if nu > 1.
     pub(crate) fn gradient(&self, u: &[f64], on_surface: bool) -> f64 {
         let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];
@@ -550,8 +552,9 @@ mod tests {
         |[r, z]| (r * (4.0 * z * z - r * r), [4.0 * z * z - 3.0 * r * r, 8.0 * r * z]),
     ];
 
-    /// Green's third identity holds to the quadrature error of 16 points per panel. At the step's
-    /// inner edge, where r behaves as v^9, a cubic in r is a polynomial of degree 27 in v.
+    /// Green's third identity holds to the quadrature error of 16 points per panel. One of the
+    /// walls has a step with a re-entrant edge, near which r behaves as v^9, so that a cubic in r
+    /// is a polynomial of degree 27 in v.
     #[test]
     fn harmonic_functions_satisfy_the_integral_equation() {
         for wall in walls() {
@@ -579,8 +582,9 @@ mod tests {
     }
 
     /// r cos theta is a uniform flow, whose int [u_s^2 + u^2/r^2] r ds over the free surface and
-    /// the walls is known by hand. Near the step's inner edge the last 1e-6 of a panel counts three
-    /// times, as it should for a flow around the edge.
+    /// the walls is known by hand. At the re-entrant edge of the wall with a step, the closed form
+    /// for the last 1e-6 of a panel is 3 times the true integral, because it assumes a flow around
+    /// the edge; the tolerance covers this.
     #[test]
     fn the_surface_gradient_of_a_uniform_flow_is_exact() {
         let (sin, cos) = 20f64.to_radians().sin_cos();
@@ -677,9 +681,10 @@ mod tests {
         }
     }
 
-    /// For a point and its mirror image behind the axis, v^gamma is the nearest place on the panel
-    /// plus i times the distance divided by the length. The tested points are too close for the
-    /// panel's own points.
+    /// The preimage v of a point, or of its mirror image behind the axis, obeys v^gamma = s + i d:
+    /// s is the nearest place on the panel, and d the distance from it, both as [`Boundary::foot`]
+    /// returns them. The tested points are too close to the panel for integration with the panel's
+    /// own points.
     #[test]
     fn the_preimage_of_a_point_under_a_panel_s_map_is_found() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);

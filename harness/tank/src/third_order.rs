@@ -59,10 +59,12 @@ pub const DETUNING: f64 = 0.01;
 /// - `kappa`: its wave number, 1/m.
 /// - `mode`: azimuthal number and number from 1 in round sections; half waves over the angle and
 ///   number from 1 in sectors; half waves along the motion and across it in boxes.
-/// - `planar`, `circular`: squared projections on this mode, in the notation of the module divided
-///   by N and by the first mode's N. The first element belongs to (X^2 + Y^2)/2, which excites the
-///   frequency 0; the second belongs to (X^2 - Y^2)/2 and X Y, which excite 2 omega.
-/// - `at_wall`: C chi/N at the wall, for planar motion.
+/// - `planar`, `circular`: squared overlap integrals of the shape chi of this mode with squares of
+///   the first mode psi in planar and in circular motion, divided by int chi^2 and int psi^2. X and
+///   Y are the shapes of the first mode's elevation at two instants a quarter of a period apart.
+///   The first element is the overlap with (X^2 + Y^2)/2, which excites the frequency 0; the second
+///   is the overlap with (X^2 - Y^2)/2 and X Y, which excite twice the frequency of the first mode.
+/// - `at_wall`: chi at the wall times int chi psi^2/int chi^2, for planar motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
     pub mode: [usize; 2],
@@ -79,7 +81,8 @@ pub struct Excited {
 /// - `amplitude`: amplitude of the elevation per slosh angle, m: int psi x/int psi^2, with x along
 ///   the motion.
 /// - `fourth`: int psi^4/int psi^2 of planar motion, and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int
-///   psi^2 of circular motion; `None` if the section has no circular motion.
+///   psi^2 of circular motion (for X and Y see [`Excited`]); `None` if the section has no circular
+///   motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
     pub k: f64,
@@ -100,8 +103,9 @@ impl Overlaps {
         Overlaps::from_waves(&first, &mean, &double)
     }
 
-    /// Computes the overlap integrals of the first mode u(r) cos(nu theta), the first of the modes
-    /// `first`, with the modes `mean` of the order 0 and `double` of the order 2 nu.
+    /// Computes the overlap integrals of the first mode u(r) cos(nu theta) with the modes that its
+    /// square excites: `mean` of the azimuthal order 0 and `double` of the order 2 nu. The first
+    /// mode is the first of the modes `first` of the order nu.
     fn from_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
         let psi = first.mode(0);
         let mut excited = Vec::new();
@@ -273,9 +277,10 @@ impl Overlaps {
     }
 }
 
-/// Equations of an excited mode chi, divided by its overlap C with the first mode: `t` is kappa
-/// tanh(kappa h), `elevated` the source of the mean elevation, and `matrix` and `vector` belong to
-/// the equations for its elevation and potential at twice the frequency.
+/// Equations for an excited mode with the wave number kappa at the depth h, divided by its overlap
+/// integral with the square of the first mode. `t` is kappa tanh(kappa h), and `elevated` the
+/// source of the constant elevation. The elevation and the potential at twice the frequency of the
+/// first mode are a vector x with `matrix` x + `vector` = 0.
 struct Response {
     t: f64,
     elevated: f64,

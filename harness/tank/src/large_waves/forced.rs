@@ -167,8 +167,8 @@ fn second_derivative(values: &[f64], tau: f64) -> f64 {
 
 /// Solver for steady waves in a tank that moves sideways.
 ///
-/// - `drag`: damping matrix for the coefficients of the potential: the sum over all modes of 2 zeta
-///   omega_n u_n u_n^T.
+/// - `drag`: damping matrix for the coefficients of the potential: the sum of 2 zeta omega_n u_n
+///   u_n^T over all modes n, where u_n is the vector of the coefficients of mode n.
 /// - `first`: indices of the terms of the first mode: cos(tau) and sin(tau) along x, and then along
 ///   y.
 pub struct Forced<'a> {
@@ -408,8 +408,9 @@ enum Held {
     Push(usize, f64),
 }
 
-/// Returns the sum of omega_n u_n u_n^T over the modes of the azimuthal number `m`, divided by the
-/// square root of the specific force, as a matrix for the combinations of harmonics.
+/// Returns the sum of omega_n u_n u_n^T over the modes n of the azimuthal number `m`, divided by
+/// the square root of the specific force. The vector u_n has the coefficients of the mode's
+/// potential in the orthonormal combinations of harmonics.
 fn drag_of_modes(solver: &Solver, m: usize) -> DMatrix<f64> {
     let Resolution { degree, polynomials, .. } = solver.resolution;
     let (f, harmonics) =
