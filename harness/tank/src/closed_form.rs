@@ -18,7 +18,8 @@ const ERROR: f64 = 1e-11;
 /// Returns the remainder of the series sum tanh(k h/2)/k^5 after the wave number `last`. The
 /// remaining wave numbers k are `step` apart, and `h` is the depth. The sum is replaced by the
 /// integral (1/step) int dk (midpoint rule in reverse), with u = 1/k. The terms fall as k^-5 for
-/// large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
+/// large k h and as k^-4 for small k h. In shallow liquid the terms after the first 400 add 4e-10 m
+/// R^2 to the effective inertia, with the mass m of the liquid and the radius R.
 fn series_remainder(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);

@@ -56,8 +56,8 @@ const NOISE: f64 = 1e-13;
 ///   motion.
 /// - `second_wave`: second-order elevation at the wall per squared slosh angle, at the instant of
 ///   largest elevation in planar motion.
-/// - `excited`: modes that the square of the first mode excites: azimuthal number, number from 1,
-///   and omega^2/g.
+/// - `excited`: modes that the square of the first mode excites, each with its azimuthal number,
+///   its number among the modes with this azimuthal number (counted from 1), and omega^2/g.
 #[derive(Clone, Debug)]
 pub(crate) struct Waves {
     pub lambda: f64,

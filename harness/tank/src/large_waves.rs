@@ -293,8 +293,9 @@ impl Points {
 /// u_r, u_z and u_theta/r.
 struct Potentials {
     values: [DMatrix<f64>; 4],
-    /// Second derivatives of the sum of all base functions at each point, with respect to zz, rz,
-    /// rr, theta, (z, theta) and (r, theta).
+    /// Derivatives of the sum of all base functions at each point: the second derivatives with
+    /// respect to z z, r z and r r, the first with respect to theta, and the second with respect to
+    /// z theta and r theta.
     second: Vec<[f64; 6]>,
 }
 

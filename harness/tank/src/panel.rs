@@ -45,7 +45,7 @@ pub(crate) struct BoundaryPoint {
 /// counter-clockwise in (r, z).
 ///
 /// - `surface`: index of the free surface; without a free surface the number of segments.
-/// - `ends`: ends of every segment, exactly on the axis where they belong there.
+/// - `ends`: end points of every segment. An end point on the axis has exactly the radius 0.
 /// - `grading`: exponents (gamma, nu) at the start and at the end of every segment, see [`Panel`].
 #[derive(Clone, Debug)]
 pub(crate) struct Boundary {

@@ -143,7 +143,8 @@ pub fn spin(
     })
 }
 
-/// Free surface of the rotating liquid: the heights z and radii r with g z - Omega^2 r^2/2 = c.
+/// Free surface of the rotating liquid: the heights z and radii r with g z - Omega^2 r^2/2 = c,
+/// where g is the specific force, Omega the spin rate and c a constant.
 struct Surface {
     omega: f64,
     gravity: f64,

@@ -57,8 +57,9 @@ pub const DETUNING: f64 = 0.01;
 /// A mode that the square of the first mode excites.
 ///
 /// - `kappa`: its wave number, 1/m.
-/// - `mode`: azimuthal number and number from 1 in round sections; half waves over the angle and
-///   number from 1 in sectors; half waves along the motion and across it in boxes.
+/// - `mode`: in round sections the azimuthal number, in sectors the number of half waves over the
+///   angle, each followed by the number of the mode counted from 1; in boxes the numbers of half
+///   waves along the motion and across it.
 /// - `planar`, `circular`: squared overlap integrals of the shape chi of this mode with squares of
 ///   the first mode psi in planar and in circular motion, divided by int chi^2 and int psi^2. X and
 ///   Y are the shapes of the first mode's elevation at two instants a quarter of a period apart.
