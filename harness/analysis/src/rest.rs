@@ -279,8 +279,8 @@ mod tests {
         assert!(off.fold(0.0, f64::max) < 0.03);
     }
 
-    /// The readings are those of the gyro of Rubaga's thesis: normal noise of 0.4 mrad/s, rounded
-    /// to steps of 0.15 mrad/s.
+    /// The samples imitate the gyro of Rubaga's thesis: normal noise of 0.4 mrad/s, rounded to
+    /// steps of 0.15 mrad/s.
     #[test]
     fn quantised_normal_noise_is_normal_between_its_levels() {
         let mut random = Random::new(3, 0);

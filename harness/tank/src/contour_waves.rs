@@ -622,9 +622,10 @@ mod tests {
         }
     }
 
-    /// Shallow liquid in a paraboloid oscillates as a whole with a frequency that does not depend
-    /// on its amplitude (Thacker, J. Fluid Mech. 107 (1981) 499), to leading order in 1/depth. In a
-    /// cylinder of this depth the shifts are 1e6.
+    /// The bottom of a sphere is nearly a paraboloid, in which shallow liquid oscillates as a
+    /// whole. To leading order in 1/depth its frequency does not depend on its amplitude (Thacker,
+    /// J. Fluid Mech. 107 (1981) 499), whereas in a cylinder of this depth the shifts of the
+    /// squared frequency are 1e6.
     #[test]
     fn shallow_liquid_in_a_bowl_keeps_its_frequency() {
         for fill in [1e-3, 1e-2] {

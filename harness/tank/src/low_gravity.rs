@@ -52,8 +52,9 @@ pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
 /// Computes the effect of surface tension on a mode for a flat surface (contact angle 90 degrees)
 /// whose contact line slides freely along a vertical wall. The squared frequency is omega_n^2 = g
 /// lambda_n [1 + (sigma/(rho g)) K_n] with the surface gradient K_n = int_F (phi_r^2 + phi^2/r^2) r
-/// dr/N_n of the mode's shape phi. This is exact in cylinders, annuli (K = k^2) and boxes, because
-/// capillarity does not change the shape there. In other tanks it is of first order.
+/// dr/int_F phi^2 r dr of the mode's shape phi on the free surface F. This is exact in cylinders,
+/// annuli (K = k^2) and boxes, because capillarity does not change the shape there. In other tanks
+/// it is of first order.
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;

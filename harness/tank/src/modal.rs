@@ -40,8 +40,8 @@ const MASSLESS: f64 = 1e-9;
 /// - `shape`: points (r, m/rad) of the surface from the axis or inner wall outwards.
 /// - `beta`: int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, from which the damping by the
 ///   laminar layer at the wall follows.
-/// - `surface_gradient`: int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m², from which the stiffness by
-///   capillarity follows.
+/// - `surface_gradient`: int_F (phi_r^2 + phi^2/r^2) r dr/int_F phi^2 r dr over the free surface F,
+///   1/m², from which the stiffness by capillarity follows.
 /// - `vertical_wall`: true if the walls are vertical at the free surface.
 /// - `upright`: true if the bottom is flat, too, so that capillarity does not change the shape of
 ///   the mode.

@@ -501,9 +501,9 @@ impl DesignArgs {
     }
 }
 
-/// Returns the expected bench as a linear model. Its viscous friction dissipates the same power as
-/// the dry friction, at the rate that a torque with the peak `peak`, N·m (crest factor 3), causes
-/// far from resonance.
+/// Returns the expected bench as a linear model. The dry friction is replaced by a viscous friction
+/// that dissipates the same power at one rate of the hub: the rate that a torque with the peak
+/// `peak`, N·m (crest factor 3), causes far from resonance.
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
     let arm = real(tank::R)?;
     let mode = Mode {
