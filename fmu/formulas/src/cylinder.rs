@@ -58,7 +58,7 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
 /// Returns the diameter and the fill height, m, of the upright cylinder whose first slosh mode has a pendulum of this
 /// `length`, m, and `mass`, kg, if the liquid has the `density`, kg/m3.
 ///
-/// The equations at the head of this file, solved for the diameter d and the height h, give d^4 = 8 xi^2 (xi^2 - 1) length
+/// With xi = 1.841, the first zero of J1', the diameter d and the height h follow from d^4 = 8 xi^2 (xi^2 - 1) length
 /// mass/(density pi) and tanh(2 xi h/d) = d/(2 xi length). In a deep tank the length hardly depends on the fill, so that the
 /// height cannot be found from it; tanh is therefore limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
@@ -97,11 +97,11 @@ fn mcmahon(n: usize) -> f64 {
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// Returns the liquid that does not slosh as a rigid body: its mass, kg, the height of its centre of mass above the bottom,
-/// m, and its transverse moment of inertia about this centre, kg m2. The arguments are the tank's diameter `d` and fill
-/// height `h`, m, the mass `m_liq` of the whole liquid, kg, and the pendulums `kept` that the model uses. The rigid body is
-/// chosen so that mass, centre of mass and inertia of the whole liquid are exact while all pendulums hang along the tank's
-/// axis.
+/// Returns the rigid liquid, that is, the part that moves with the tank like a solid body: its mass, kg, the height of its
+/// centre of mass above the bottom, m, and its transverse moment of inertia about this centre, kg m2. The arguments are the
+/// tank's diameter `d` and fill height `h`, m, the mass `m_liq` of the whole liquid, kg, and the pendulums `kept` that the
+/// model uses; the modes without a pendulum belong to the rigid liquid. The rigid liquid is chosen so that mass, centre of
+/// mass and inertia of the whole liquid are exact while all pendulums hang along the tank's axis.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();
@@ -137,8 +137,9 @@ mod tests {
         }
     }
 
-    /// The diameter is a fourth root, which is wrong by some units in the last place. The height follows from atanh near 1,
-    /// which amplifies this error by 1/(1 - tanh^2) = 20, so that the tolerance for the height is larger.
+    /// The tested function computes the diameter as a fourth root, which has a rounding error of some units in the last
+    /// place. It computes the height from atanh of a number near 1, which amplifies this error by 1/(1 - tanh^2) = 20. The
+    /// tolerance for the height is therefore larger.
     #[test]
     fn tank_dimensions_are_recovered_from_the_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
@@ -206,8 +207,8 @@ mod tests {
     }
 
     /// A film of liquid that is much thinner than wide has the inertia per mass of a disk, R^2/4, and a long column tends to
-    /// h^2/12 - 3 R^2/4. For the film the result is too small by 8/(12 pi end^3), end = 400 pi + 1.6, because an integral
-    /// replaces the terms of the sum after the first 400.
+    /// h^2/12 - 3 R^2/4. For the film the result is too small by 2/(3 pi x^3) with x = 400 pi + 0.8 and R = 1, because the function
+    /// sums 400 terms and uses the value of tanh at x in all later terms.
     #[test]
     fn the_inertia_of_a_capped_cylinder_has_the_limits_of_a_disk_and_of_a_long_column() {
         let film = capped_inertia(2.0, 1e-12);

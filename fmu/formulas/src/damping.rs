@@ -152,8 +152,9 @@ pub struct Part {
     pub weight: f64,
 }
 
-/// Fraction of the wetted wall that a measured shape needs in order to have its full effect on the interval of an estimate.
-/// If other shapes have at least this fraction, the wall counts as a wall of several shapes.
+/// Smallest fraction of the wetted wall at which a measured shape has its full effect on the interval of [`estimate`]; a
+/// smaller part has an effect in proportion to its fraction. A wall counts as a wall of several shapes if at least this
+/// fraction does not have the main shape.
 const COUNTS: f64 = 0.05;
 
 /// Smallest ratio of a correlation's damping to the damping of the laminar layer at which the correlation still has some
@@ -161,9 +162,10 @@ const COUNTS: f64 = 0.05;
 const BELOW: f64 = 0.8;
 
 impl Part {
-    /// Returns the factor that this part of the wall contributes to the mean. It is the factor of the correlation while this
-    /// is at least 1. As the factor falls from 1 to [`BELOW`], the result changes smoothly to [`UNMEASURED`], because no wall
-    /// can have less damping than its laminar layer.
+    /// Returns the ratio of damping to laminar damping with which this part of the wall enters the mean over the wall. This
+    /// is `factor`, the ratio by the correlation of the part's shape, if `factor` is at least 1 and the correlation has its
+    /// full weight. As the weight falls to 0, or as `factor` falls from 1 to [`BELOW`], the result moves smoothly to
+    /// [`UNMEASURED`]: no wall can have less damping than its laminar layer.
     fn shape_factor(&self) -> f64 {
         let trusted = self.weight * smooth_step((self.factor - BELOW) / (1.0 - BELOW));
         UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
@@ -296,9 +298,9 @@ pub fn sphere_number(radius: f64, nu: f64, g: f64) -> f64 {
 }
 
 /// Returns the damping ratio of the first slosh mode of a sphere by Mikishev and Dorozhkin, with the exponent of Sumner and
-/// Stofan (NASA TN D-1991). With the fill x = h/R and the viscosity number B = 1e4 nu/sqrt(g D^3) it is (0.131/2 pi)
-/// B^0.359/x up to half full, and this value times x (1 + 0.46 (2 - x))/(1.46 (2 - x)) above. The formula has no bound for an
-/// empty and for a full sphere, so that x is limited to 0.1 to 1.9.
+/// Stofan (NASA TN D-1991). With the fill x = h/R and the viscosity number B = 1e4 nu/sqrt(g D^3) it is (0.131/2 pi) B^0.359
+/// f, where f = 1/x in a sphere that is at most half full (x <= 1), and f = (1 + 0.46 (2 - x))/(1.46 (2 - x)) in a fuller
+/// sphere. Because f grows without bound for an empty and for a full sphere, x is limited to 0.1 to 1.9.
 pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = (depth / radius).clamp(0.1, 1.9);
     let by_fill = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
@@ -315,8 +317,8 @@ pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Returns how the viscosity number Re = nu/sqrt(g a^3) of a torus compares with that of the only torus whose damping was
-/// measured: the ratio of both numbers. `tube_radius` is the radius a of the torus's cross-section, m.
+/// Returns the viscosity number Re = nu/sqrt(g a^3) of a torus, divided by the viscosity number of the only torus whose
+/// damping was measured. `tube_radius` is the radius a of the torus's cross-section, m.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
@@ -573,9 +575,10 @@ mod tests {
         [factor, low, high]
     }
 
-    /// The rows contain the damping of a tank's first mode divided by the damping of its laminar wall layer, and the limits
-    /// of this ratio. If the correlation agrees with the estimate for unmeasured shapes, 1.45, the limits are ±30 % of the
-    /// correlation. Otherwise they include both estimates.
+    /// Each row contains the damping ratio of a tank's first mode and the limits of its interval, all divided by the damping
+    /// ratio of the laminar layer at the wall. If the correlation and the estimate for unmeasured shapes, 1.45, agree within
+    /// 30 %, the limits are ±30 % of the correlation. Otherwise the interval extends from the laminar layer, 1, to 1.3 times
+    /// the larger of the two values.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [

@@ -21,10 +21,12 @@ use crate::third_order;
 
 pub const DEPTHS: [f64; 2] = [0.25, third_order::BRIDGED[0]];
 
-/// Coefficients from fully nonlinear potential flow. Each row contains h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest
-/// slosh angle, degrees, at which the slosh mass was compared with potential flow. In this table t and t_2 are defined by the
-/// frequency of circular motion, omega^2 (1 + t A^2 + t_2 A^4) = (dz/dA)/A, so that they are two and three times the t and
-/// t_2 of the equations at the head of the file.
+/// Coefficients of the first mode from fully nonlinear potential flow, for the equations at the head of the file. Each row
+/// contains h/R; kappa, s and t, the coefficients of stiffness, planar inertia and rotary inertia to third order in the
+/// slosh angle; kappa_2, s_2 and t_2, their counterparts of fifth order; and the largest slosh angle, degrees, at which the
+/// slosh mass was compared with potential flow. Only in this table, t and t_2 are defined by the frequency of circular
+/// motion, omega^2 (1 + t A^2 + t_2 A^4) = (dz/dA)/A. They are therefore two and three times the values of t and t_2 in the
+/// equations.
 const ROWS: [[f64; 8]; 7] = [
     [0.25, 111.6366, 67.2399, 48.6774, -3776.617, -2326.024, -1494.947, 8.0],
     [0.3, 38.3052, 21.5892, 15.4987, -429.434, -236.528, -188.836, 12.5],
@@ -35,9 +37,11 @@ const ROWS: [[f64; 8]; 7] = [
     [0.65, 2.1267, 2.1867, 0.6731, -4.250, -0.965, -2.221, 18.0],
 ];
 
-/// Large-wave coefficients of the first slosh mode at one depth, with the symbols of the equations at the head of the file:
-/// `pair` is (s, kappa), `next` is (s_2, kappa_2), and `rotary` is (t, t_2). `compared` is the largest slosh angle, rad, at
-/// which a slosh mass with these coefficients was compared with potential flow.
+/// Large-wave coefficients of the first slosh mode at one depth, for the equations at the head of the file: `pair` contains
+/// s and kappa, the coefficients of inertia and stiffness to third order in the slosh angle; `next` contains s_2 and
+/// kappa_2, their counterparts of fifth order; and `rotary` contains t and t_2, the coefficients of the inertia in rotary
+/// motion. `compared` is the largest slosh angle, rad, at which a slosh mass with these coefficients was compared with
+/// potential flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyTerms {
     pub pair: [f64; 2],
@@ -49,10 +53,10 @@ pub struct EnergyTerms {
 /// Returns the coefficients with which the slosh mass has the energy of a large wave in an upright cylinder filled to h/R =
 /// `fill`; `None` if the fill is outside [`DEPTHS`].
 ///
-/// Between the depths of the table, kappa, kappa_2 and the changes of the frequency with the amplitude are interpolated, and
-/// the other coefficients follow from them. An error of the interpolation therefore appears in the energy and not in the
-/// frequency. The frequency is interpolated as a difference from third-order theory, which is known at every depth. Above the
-/// last depth of the table s_2 and t_2 are extrapolated.
+/// Between the depths of the table, the stiffness coefficients kappa and kappa_2 and the changes of the frequency with the
+/// amplitude are interpolated, and the inertia coefficients follow from them. An error of the interpolation therefore
+/// appears in the energy and not in the frequency. The frequency is interpolated as a difference from third-order theory,
+/// which is known at every depth. Above the last depth of the table, h/R = 0.65, all these quantities are extrapolated.
 pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     if !(DEPTHS[0]..=DEPTHS[1]).contains(&fill) {
         return None;
@@ -107,10 +111,11 @@ fn shifts_of_third_order(fill: f64) -> [f64; 2] {
     third_order::shifts(s, kappa)
 }
 
-/// Converts a row of the table to the six quantities that are interpolated over the depth: the logarithms of kappa - 1
-/// and -kappa_2, the differences between table and third-order theory for the frequency of planar and of circular motion, and the
-/// logarithms of the frequency changes with the fourth power of the angle. Logarithms are possible because these quantities
-/// never change their sign.
+/// Converts a row of the table to the six quantities that are interpolated over the depth. The first two are the logarithms
+/// of kappa - 1 and -kappa_2. The next two are the changes of the squared frequency per squared slosh angle in planar and in
+/// circular motion, each minus its value by third-order theory. The last two are the logarithms of the magnitudes of the
+/// changes with the fourth power of the angle, in planar and in circular motion. Logarithms are possible because these
+/// quantities never change their sign.
 fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     let [planar, circular] = shifts_of_third_order(fill);
     [

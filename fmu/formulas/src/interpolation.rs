@@ -191,8 +191,9 @@ mod tests {
         .map(|step| sign * step)
     }
 
-    /// Tests data that jump by factors of up to 1e4, that rise and fall smoothly, and that turn. The tolerance of 1e-11 is
-    /// the last digit of the largest value divided by the smallest distance between points.
+    /// The test uses random data: some jump by factors of up to 1e4, some rise or fall smoothly, and some have maxima and
+    /// minima. The tolerance of 1e-11 allows for the rounding error of a slope, which is the last digit of the largest value
+    /// divided by the smallest distance between points.
     #[test]
     fn the_interpolating_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;

@@ -88,9 +88,9 @@ pub const FREQUENCY: f64 = 3e-3;
 /// %. It applies if the response is wrong only because frequency and amplitude are related differently in model and liquid.
 pub const FORCED: f64 = 8.5e-4;
 
-/// Relative error of the third-order model's frequency at the slosh angle at which the error of a forced response reaches 3
-/// %. It is used for tanks in which only free motion was compared with potential flow. The value is the smallest that was
-/// found in upright cylinders with h/R of 0.4 and more.
+/// Relative error of the third-order model's frequency at which its response to forcing counts as wrong by 3 %, in tanks in
+/// which only free motion was compared with potential flow. The value is the smallest frequency error at which the forced
+/// response of an upright cylinder with h/R of 0.4 or more was wrong by 3 %.
 pub const FORCED_UNCOMPARED: f64 = 1.7e-4;
 /// Ratio by which a model with [`energy_terms`] may have larger slosh angles than the third-order model before the error of a
 /// forced response reaches 3 %. It is used for tanks in which only free motion was compared with potential flow. The value is
@@ -160,7 +160,8 @@ const FORCED_ENERGY: [[f64; 2]; 7] =
 const ROTARY: [[f64; 2]; 6] =
     [[0.65, 9.3], [0.8, 7.7], [1.0, 4.8], [1.227, 5.9], [2.0, 7.2], [2.5, 7.2]];
 
-/// Limits of the model with [`energy_terms`] in rotary motion, in rows as in [`ROTARY`].
+/// Limits of the model with [`energy_terms`] in rotary motion. Each row contains h/R and the slosh angle, degrees, at which
+/// the error of a forced response is 3 %.
 const ROTARY_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.8], [0.35, 4.0], [0.4, 5.0], [0.5, 7.5], [0.6, 9.6], [0.7, 10.2]];
 
@@ -183,10 +184,11 @@ pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
     Some(AngleLimit { frequency: compared, forced: interpolate(fill, FORCED_ENERGY).to_radians() })
 }
 
-/// Returns the slosh angle, rad, up to which the frequency of a model has at most the relative `error`. `limit` is this angle
-/// for the third-order model. `shifts` and `exact` are the changes of the squared frequency per squared slosh angle, in
-/// planar and circular motion, of the model and of third-order theory. If they differ, the result is at most the angle at
-/// which this difference alone causes the error.
+/// Returns the slosh angle, rad, up to which the frequency of a model has at most the relative `error`. `limit` is this
+/// angle for the third-order model. `shifts` are the relative changes of the model's squared frequency per squared slosh
+/// angle in planar and in circular motion, where `None` stands for a motion that the model cannot make; `exact` are these
+/// changes by third-order theory. If `shifts` and `exact` differ, the result is at most the angle at which this difference
+/// alone causes the error.
 pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]) -> f64 {
     let off = shifts.iter().zip(exact);
     let off = off.filter_map(|(shift, exact)| Some((shift.as_ref()? - exact).abs()));
@@ -194,9 +196,9 @@ pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 
-/// Returns an angle of the table [`THIRD_ORDER`], rad, interpolated at h/R = `fill`; `column` is 1 or 2. In liquid shallower
-/// than the first row, the power law through the first two rows is continued; in liquid deeper than the last row, the last
-/// value is used.
+/// Returns a slosh angle of the table [`THIRD_ORDER`], rad, interpolated at h/R = `fill`: the limit of the natural frequency
+/// if `column` is 1, and the limit of forced responses if it is 2. In liquid shallower than the first row, the power law
+/// through the first two rows is continued; in liquid deeper than the last row, the last value is used.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {
@@ -224,9 +226,10 @@ fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
 /// the spin rate, and R the radius of the free surface.
 pub const SPIN_NUMBER: f64 = 0.3;
 
-/// Limits of the spin rate Omega of a tank, for a first mode with the natural frequency omega_0. `factor` is 4 (1 + C_0) with
-/// the gyroscopic coefficient C_0 of the mode: if it exceeds omega_0^2/Omega^2, the slower of two waves has become an
-/// inertial wave. `ratio` is the radius of the free surface divided by the pendulum length.
+/// Limits of the spin rate Omega of a tank, up to which a pendulum represents its liquid. `factor` is 4 (1 + C_0) with the
+/// gyroscopic coefficient C_0 of the first mode. If it exceeds omega_0^2/Omega^2, where omega_0 is the natural frequency
+/// without spin, one of the mode's two waves has become an inertial wave, which no pendulum represents. `ratio` is the
+/// radius of the free surface divided by the pendulum length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinLimit {
     factor: f64,
@@ -334,9 +337,9 @@ mod tests {
         assert!((compared.to_radians() / LARGEST_FORCED_ENERGY - 1.0).abs() < 1e-12);
     }
 
-    /// Compares with the slosh angles at which the frequency of planar motion in fully nonlinear potential flow differs by
-    /// 0.3 % from a pendulum's frequency. Terms beyond third order, which the limit leaves out, change these angles by at
-    /// most 0.3 degrees.
+    /// The test compares the computed limit with the slosh angle at which the frequency of planar motion in fully nonlinear
+    /// potential flow differs by 0.3 % from a pendulum's frequency. Terms beyond third order, which the computed limit
+    /// leaves out, change this angle by at most 0.3 degrees.
     #[test]
     fn the_range_of_a_pendulum_ends_where_the_third_order_differs_from_it() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {

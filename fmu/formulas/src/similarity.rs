@@ -36,8 +36,8 @@ impl Liquid {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// Returns the time sqrt(rho L^3/sigma), s, in which surface tension moves liquid over the `length` L, m (equation 2.29).
-    /// It is not the period of an oscillation.
+    /// Returns the time sqrt(rho L^3/sigma), s, in which surface tension moves liquid over the `length` L, m (equation 2.29
+    /// of Rubaga's thesis). It is not the period of an oscillation.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
@@ -59,14 +59,15 @@ pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// Returns the time sqrt(L/a), s, in which an `acceleration` a, m/s2, moves liquid over the `length` L, m (equation 2.28).
+/// Returns the time sqrt(L/a), s, in which an `acceleration` a, m/s2, moves liquid over the `length` L, m (equation 2.28 of
+/// Rubaga's thesis).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }
 
-/// Returns a sentence that names the dominant force: gravity, surface tension or inertia, whichever belongs to the largest of
-/// Bond number, 1 and Weber number (Rubaga's thesis, section 2.5). If inertia dominates, the liquid crosses the tank, and no
-/// pendulum represents it.
+/// Returns a sentence that names the dominant force (Rubaga's thesis, section 2.5). Surface tension dominates if neither the
+/// Bond number nor the Weber number exceeds 1. Otherwise gravity dominates if the Bond number is the larger one, and inertia
+/// if the Weber number is the larger one. If inertia dominates, the liquid crosses the tank, and no pendulum represents it.
 pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     match (bond > 1.0, weber > 1.0) {
         (_, true) if weber > bond => {

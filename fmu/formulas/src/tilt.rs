@@ -29,8 +29,9 @@
 
 use crate::cylinder::XI;
 
-/// Number of modes of each azimuthal number in the perturbation sums. With all modes the coefficient c would change by less
-/// than 1e-6 of its value for mode 1, and by 0.003 for mode 10 (h/R of 0.2 and more).
+/// Number of modes of each azimuthal number in the perturbation sums. With all modes the coefficient c in the frequency
+/// change 1 + c slope^2 would differ by less than 1e-6 of its value for mode 1, and by 0.003 for mode 10 (h/R of 0.2 and
+/// more).
 const ZEROS: usize = 16;
 
 /// Zeros of J0', the derivative of the Bessel function J0, without the zero at 0. `XI_2` contains the zeros of J2'.
@@ -127,9 +128,9 @@ mod tests {
 
     /// Reference values. Each row contains h/R, the slope, and the relative change of the first mode's squared frequency by
     /// the tilt, along the slope and across it. They were computed by finite elements in three dimensions with
-    /// `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for a radius of 1 and the fill h cos + sin of
-    /// the tilt. Results of two meshes differ by up to 4e-4; for the upright tank they agree with the exact value within
-    /// 1.4e-4.
+    /// `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for a tank of radius 1 in which the surface
+    /// is h cos(tilt) + sin(tilt) above the tank's lowest point. Results of two meshes differ by up to 4e-4; for the upright
+    /// tank they agree with the exact value within 1.4e-4.
     const FINITE_ELEMENTS: [(f64, f64, [f64; 2]); 12] = [
         (0.35, 0.0525, [-0.00382, -0.00129]),
         (0.35, 0.1225, [-0.02139, -0.00764]),
@@ -177,8 +178,9 @@ mod tests {
         }
     }
 
-    /// The coefficients in closed form equal sums that are computed numerically from the expansion of the matrices K and M,
-    /// with integrals by Simpson's rule. The error of the rule is (b/2000)^4/180 for the zero b of J0' or J2'.
+    /// The coefficients in closed form equal the sums of perturbation theory whose integrals over the cross-section of the
+    /// tank are computed numerically by Simpson's rule. The error of this rule is (b/2000)^4/180, where b is the zero of J0'
+    /// or J2' that belongs to the term of the sum.
     #[test]
     fn coefficients_of_a_tilted_cylinder_equal_the_perturbation_integrals_by_quadrature() {
         const N: usize = 2000;
@@ -223,9 +225,11 @@ mod tests {
         }
     }
 
-    /// Short waves do not reach the bottom. Along the slope the surface is longer by the factor sqrt(1 + s^2), and gravity
-    /// normal to it is larger by the same factor. If the directions of the waves are distributed as cos^2 of the angle, the
-    /// coefficient is 1/8 for motion along the slope and 3/8 across it. Mode 10 differs from this limit by 0.003.
+    /// High modes are short waves, which do not reach the bottom. On a slope with the tangent s, gravity normal to the
+    /// surface is larger by the factor sqrt(1 + s^2), and the surface is longer along the slope by this factor, too. A wave
+    /// along the slope therefore keeps its frequency, and a wave across it has the coefficient 1/2. If the directions of the
+    /// waves are distributed as cos^2 of the angle, the mean coefficient is 1/8 for motion along the slope and 3/8 across
+    /// it. Mode 10 differs from this limit by 0.003.
     #[test]
     fn tilt_changes_high_modes_as_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);
