@@ -34,8 +34,8 @@ use taylor::series::{Series, ZERO, mul_ramp, sqrt, square, time_within, values};
 
 const FLOOR: f64 = 1e-4;
 
-/// Specific force, m/s2, that is added in the squared natural frequency W = g/l of a pendulum, because the power series of the
-/// drag need a W above 0 also without restoring force.
+/// Specific force, m/s2, that is added to g in the squared natural frequency W = g/l of a pendulum, because the power series
+/// of the drag do not converge at W = 0, that is, in weightlessness.
 const WEIGHTLESS: f64 = 1e-6;
 
 const ROUNDED: f64 = 0.02;
@@ -53,12 +53,12 @@ impl Breaking {
     const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
 }
 
-/// The part of one mode's drag that grows with the amplitude of the wave, as power series in time. The equations are at the
-/// head of the file.
-/// - `zeta`: damping ratio per slosh angle, zeta_A, 1/rad.
-/// - `w`: squared natural frequency W and its rate; `w_floor`, 1/s2, is added to it.
-/// - `share`, `gain`, `gain_breaking`: the drag that does not grow, and the factors of the two parts that grow, each divided
-///   by the whole drag at the start of the series.
+/// The drag on one mode, of which parts grow with the amplitude of its wave, as power series in time. The equations are at
+/// the head of the file.
+/// - `zeta`: increase of the damping ratio per slosh angle, zeta_A, 1/rad.
+/// - `w`: squared natural frequency W, 1/s2, and its rate; `w_floor`, 1/s2, is added to it.
+/// - `share`, `gain`, `gain_breaking`: the coefficients of three parts of the drag: independent of the amplitude, in
+///   proportion to it, and by breaking waves. Each is divided by the whole drag at the start of the series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
     pub acts: bool,
@@ -139,8 +139,9 @@ impl Growth {
         drag
     }
 
-    /// Estimates the time, s, over which the series of the drag converge, from their first three coefficients. In the symbols
-    /// at the head of the file, the drag is singular at u = 0, W = 0 and y = +-i delta W^(1/2).
+    /// Estimates the time, s, over which the series of the drag converge, from their first three coefficients. The drag is
+    /// singular where the amplitude is 0 (u = 0), where there is no restoring force (W = 0), and near the onset of breaking
+    /// (y = +-i delta W^(1/2)). These symbols are defined at the head of the file.
     pub fn convergence_radius(&self) -> f64 {
         let time_near = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
         let time = time_near(self.u[0], &self.u);
@@ -152,10 +153,10 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns the drag `h` seconds after the start of the series, divided by its value at the start, and the quantity u of
-    /// the equations at the head of the file. u is computed from its own series up to order n, and the drag from u and from
-    /// the drag `other` that does not depend on the amplitude. The difference between this drag and the series of the drag is
-    /// therefore the error of the series.
+    /// Returns the drag `h` seconds after the start of the series, divided by its value at the start, and the quantity u = W
+    /// (|q|^2 + A_0^2) + |q'|^2, where W is the squared natural frequency, q the slosh angle, and A_0 a small constant. u is
+    /// computed from its own series up to order n, and the drag from u and from `other`, the drag that does not depend on
+    /// the amplitude. The difference between this drag and the series of the drag is therefore the error of the series.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);

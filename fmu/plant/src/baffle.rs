@@ -34,21 +34,22 @@ use crate::parameters::{Parameters, Ring, SloshSource};
 /// the ring.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// Wave amplitude A_0 that is added to the amplitude, divided by the smallest amplitude for which the baffle's law holds. At
-/// this smallest amplitude, A_0 increases the damping by 2e-4 of its value.
+/// Amplitude A_0 whose square is added to the squared amplitude of the wave, so that the drag has a power series also at
+/// rest. The value is a fraction of the smallest amplitude for which the baffle's law holds. At this smallest amplitude, A_0
+/// increases the damping by 2e-4 of its value.
 const FLOOR: f64 = 0.03;
 
-/// Specific force, m/s2, that is added in the squared natural frequency W = g/l of a pendulum, because the power series of the
-/// drag need a W above 0 also without restoring force.
+/// Specific force, m/s2, that is added to g in the squared natural frequency W = g/l of a pendulum, because the power series
+/// of the drag do not converge at W = 0, that is, in weightlessness.
 const WEIGHTLESS: f64 = 1e-6;
 
 /// A ring baffle and its drag on one mode, as power series in time. The equations are at the head of the file.
 /// - `zeta`: damping ratio Z at a slosh angle of 1 rad; 0 without a baffle.
-/// - `floor2`: square of the angle A_0.
-/// - `w`: squared natural frequency W and its rate; `w_floor`, 1/s2, is added to it.
+/// - `floor2`: square of the slosh angle A_0, rad2, which is added to the squared amplitude (see `FLOOR`).
+/// - `w`: squared natural frequency W, 1/s2, and its rate; `w_floor`, 1/s2, is added to it.
 /// - `viscous`: viscous drag divided by its value at the start of the series.
-/// - `share`, `gain`: the viscous drag, and the factor of the baffle's drag, each divided by the whole drag at the start of
-///   the series.
+/// - `share`, `gain`: the coefficients of the viscous drag and of the baffle's drag, each divided by the whole drag at the
+///   start of the series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baffle {
     pub zeta: f64,
@@ -168,7 +169,8 @@ impl Baffle {
     }
 
     /// Returns the amplitude of the slosh angle, rad, and the damping ratio that the baffle adds at this amplitude. `w` is
-    /// the squared natural frequency W, 1/s2; the array contains the squares of the slosh angle and of its rate.
+    /// the squared natural frequency W, 1/s2; `q2` and `v2` are the squares of the slosh angle, rad2, and of its rate,
+    /// rad2/s2.
     pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
         let w = w + T::constant(self.w_floor);
         let amplitude = (q2 + v2 / w).sqrt();
@@ -206,16 +208,17 @@ impl Baffle {
     }
 
     /// Returns the time, s, over which the series of the baffle's drag converge, from their first three coefficients. The
-    /// drag is singular at W = 0, and where the bracket W (|q|^2 + A_0^2) + |q'|^2 of the equations at the head of the file
-    /// is 0.
+    /// drag is singular where the squared natural frequency W is 0, and where W (|q|^2 + A_0^2) + |q'|^2 is 0, with the
+    /// slosh angle q and the small constant A_0 (`FLOOR`).
     pub fn convergence_radius(&self) -> f64 {
         let sum = time_within(self.sum[0], self.sum[1].abs(), self.sum[2].abs());
         sum.min(time_within(self.w[0], self.w[1].abs(), 0.0))
     }
 
-    /// Returns the drag `h` seconds after the start of the series, divided by its value at the start, and the bracket W
-    /// (|q|^2 + A_0^2) + |q'|^2. Both are computed from the series of the bracket and of the viscous drag up to order n. The
-    /// difference between this drag and its own series is therefore the error of the series.
+    /// Returns the drag `h` seconds after the start of the series, divided by its value at the start, and the sum W (|q|^2 +
+    /// A_0^2) + |q'|^2, where W is the squared natural frequency, q the slosh angle, and A_0 a small constant (`FLOOR`).
+    /// Both results are computed from the series of this sum and of the viscous drag up to order n. The difference between
+    /// the returned drag and the series of the drag is therefore the error of the series.
     pub fn drag_at(&self, n: usize, h: f64) -> [f64; 2] {
         let [sum, viscous] = values([&self.sum, &self.viscous], n, h);
         let (sum, w) = (sum.max(0.0), f64::max(self.w[0] + self.w[1] * h, 0.0));

@@ -17,9 +17,9 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Specific force below which the drag factor is replaced by its mean, as a fraction of the largest specific force g on a
-/// ramp. The power series of the factor converge only as far as g = 0. Since g stays below this value only for a short time,
-/// the error, which is of second order in this time, is below rounding.
+/// Specific force below which the drag coefficient is replaced by its mean, as a fraction of the largest specific force g on
+/// a ramp. The power series of the coefficient converges only as far as g = 0. Since g stays below this value only for a
+/// short time, the error, which is of second order in this time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
 /// Largest step as a fraction of the time until g = 0, which is the radius of convergence of the series.
@@ -27,9 +27,9 @@ const SHARE_OF_RADIUS: f64 = 0.5;
 
 pub const RAMP_ORDER: usize = 10;
 
-/// The drag coefficient of every mode as a function of the specific force g, with the equation at the head of the file:
-/// `reference` is g_0, m/s2, `exponent` is p, `zeta` are the damping ratios at g_0, and `centring` are the increases a_n of g
-/// by surface tension, m/s2.
+/// The drag coefficient of every mode as a function of the specific force g. It is proportional to [(g + a_n)/(g_0 +
+/// a_n)]^p, where `reference` is g_0, m/s2, and `exponent` is p. `zeta` contains the damping ratios at g_0, and `centring`
+/// the increases a_n of g, m/s2, that are equivalent to the stiffness by surface tension.
 #[derive(Clone, Debug)]
 pub struct Damping {
     reference: f64,
@@ -76,9 +76,10 @@ impl Damping {
         if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
-    /// Sets the restoring force of mode `n`, and the power series of its drag, in its `pendulum`, for the specific force `g`
-    /// with its slope. If the restoring specific force is below `floor`, the drag is replaced by its mean until the ramp ends
-    /// or the restoring specific force has reached twice `floor`. Returns the time, s, over which the series are valid.
+    /// Sets the restoring force of mode `n` and the power series of its drag in its `pendulum`, for a specific force `g`
+    /// that is linear in time. Surface tension acts like an increase of g; the sum is the restoring specific force. If this
+    /// sum is below `floor`, the drag is replaced by its mean until the ramp of g ends or the sum has reached twice `floor`.
+    /// Returns the time, s, over which the series are valid.
     pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
         let a = self.centring[n];
         let x = g.value + a;

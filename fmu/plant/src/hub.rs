@@ -3,9 +3,10 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp, number};
 
-/// The motion of the hub as power series, as far as liquid and bearing depend on it: its angle theta, its rate w with w^2,
-/// and its acceleration w' (rad, s). `g` is the specific force along the tank's axis, m/s2, with its rate. `damping_reach` is
-/// the time, s, over which the series of the liquid's damping are valid.
+/// The motion of the hub as power series, as far as liquid and bearing depend on it: its angle `theta`, rad; its rate
+/// `omega`, rad/s, and the square of its rate, `omega2`; and its angular acceleration `omega_dot`, rad/s2. `g` is the
+/// specific force along the tank's axis, m/s2, with its rate. `damping_reach` is the time, s, over which the series of the
+/// liquid's damping are valid.
 #[derive(Clone, Debug)]
 pub struct HubMotion {
     pub theta: Series,
@@ -60,8 +61,9 @@ impl Tilt {
         }
     }
 
-    /// Returns Taylor coefficient n of the height, m, of a point of the hub above the plane through the origin. `x` returns
-    /// coefficients of the position of the point in the hub's frame, m.
+    /// Returns Taylor coefficient n of the height, m, of a point of the hub above the horizontal plane through the origin,
+    /// measured along the axis of the tilted bench. `x(j)` returns Taylor coefficient j of the position of the point in the
+    /// hub's frame, m.
     pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
         if self.tangent == 0.0 {
             return 0.0;
@@ -78,8 +80,9 @@ impl Tilt {
         [number(&self.e[0]), number(&self.e[1])]
     }
 
-    /// Returns the height, m, of a point above the plane through the origin, and the rate of this height, m/s. The point has
-    /// the position (`x`, `y`), m, and the rate (`x_d`, `y_d`), m/s, in the frame of a hub that turns at the rate `w`, rad/s.
+    /// Returns the height, m, of a point above the horizontal plane through the origin, measured along the axis of the
+    /// tilted bench, and the rate of this height, m/s. The point has the position (`x`, `y`), m, and the rate (`x_d`,
+    /// `y_d`), m/s, in the frame of a hub that turns at the rate `w`, rad/s.
     pub fn height_now<T: Number>(&self, [x, y]: [T; 2], [x_d, y_d]: [T; 2], w: T) -> [T; 2] {
         let [d_x, d_y]: [T; 2] = [number(&self.direction[0]), number(&self.direction[1])];
         [-(x * d_x + y * d_y), -(x_d * d_x + y_d * d_y + w * (x * d_y - y * d_x))]

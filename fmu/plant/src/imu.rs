@@ -104,8 +104,9 @@ impl Imu {
         gyro.next += 1;
     }
 
-    /// Advances the processes of the flicker noise by one sample, the sample number `k`. For the correlation time of a
-    /// process, s, `keep` returns the fraction of the process that remains after one sample.
+    /// Advances the processes `all` of the flicker noise by one sample, which has the number `k`. `keep` returns the
+    /// fraction of a process that remains after one sampling period, from the correlation time of this process, s; random
+    /// numbers add the rest.
     fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;

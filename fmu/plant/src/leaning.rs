@@ -47,8 +47,8 @@ pub(crate) struct Leaning {
     tangential: f64,
 }
 
-/// A slosh mode on a tilted bench: `mass` and `length` of the oblique pendulum that the plant uses, and the length `upright`
-/// of an upright pendulum with the same frequency.
+/// A slosh mode on a tilted bench. `mass` and `length` belong to the pendulum that the plant uses, which hangs obliquely;
+/// `upright` is the length of an upright pendulum with this oblique pendulum's frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mode {
     pub mass: f64,
@@ -84,8 +84,8 @@ impl Leaning {
         Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
     }
 
-    /// Returns the ratio of two frequencies of mode 1 in the radial direction: the frequency of its pendulum divided by the
-    /// frequency of the liquid. In the tangential direction both are equal.
+    /// Returns the frequency of mode 1's pendulum in the radial direction, divided by the frequency of the liquid in the
+    /// radial direction. In the tangential direction the two frequencies are equal.
     fn radial_frequency(self, p: &Parameters) -> f64 {
         let fill = 2.0 * p.tank.h / p.tank.d;
         let [tangential, radial] = self.factors(0, fill);

@@ -67,8 +67,9 @@ impl Stop {
 /// The hub's equation J w' = tau + tau_f + T as power series in time, where J is the inertia of hub and liquid, w the rate of
 /// the hub, tau the torque of wheel and environment, tau_f the friction of the bearing, and T the torque of the liquid.
 /// - `i0`: inertia of hub and rigid liquid, kg m2.
-/// - `imbalance`: static moment of the dry hub, radial and tangential, kg m; `rigid_moment` is that of the rigid liquid.
-/// - `tau`: tau and its slope, N m; `net`: tau + T, which the bearing must hold at rest.
+/// - `imbalance`: radial and tangential component of the static moment of the dry hub, kg m. `rigid_moment`: static moment
+///   of the rigid liquid, kg m.
+/// - `tau`: tau, N m, and its slope. `net`: the sum tau + T, which the bearing must hold at rest.
 /// - `power`: power of the external torques, W; `dissipation`: power dissipated in bearing, suspension line and liquid, W.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {

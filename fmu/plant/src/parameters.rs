@@ -349,8 +349,8 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// Returns a limit with which the computation of a communication step takes less than a second with one mode, and about
-    /// six seconds with ten spherical modes.
+    /// Returns a limit on internal steps that corresponds to less than a second of computing time for one communication step
+    /// with one mode, and to about six seconds with ten spherical modes.
     fn default() -> Self {
         Solver { max_steps: 200_000 }
     }

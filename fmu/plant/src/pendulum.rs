@@ -8,8 +8,8 @@ use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 use crate::parameters::Init;
 
-/// Largest angle, rad, between the initial displacement of mode 1 and its direction of motion that counts as a rounding error
-/// of decimal parameters.
+/// Angle, rad, by which the start values of mode 1 may deviate from the direction in which this mode moves. Smaller
+/// deviations count as rounding errors of decimal parameters.
 const ALONG: f64 = 1e-6;
 
 /// Largest step as a fraction of the time to the nearest singularity of the drag's power series.

@@ -407,8 +407,10 @@ impl Plant {
         self.work_axial_at(change, self.height())
     }
 
-    /// Returns the work of all changes of the specific force, J, as [`Plant::work_axial`] does. `change` is the change since
-    /// the last accepted step. The array contains the liquid's mass times height, kg m, and the rate of this product.
+    /// Returns the work, J, that all changes of the specific force g_axial have done since the start, or the directional
+    /// derivative of this work; [`Plant::work_axial`] explains it. `change` is the change of g_axial since the last accepted
+    /// step. `mass_height` is the present product of the liquid's mass and height, kg m, and `rate` the rate of this
+    /// product.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
         let c = T::constant;

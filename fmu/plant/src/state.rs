@@ -79,9 +79,9 @@ pub struct State {
     pub(crate) gyro: Gyro,
 }
 
-/// The `work`, J, that a changing specific force has done since the start, and the specific force `g`, m/s2, up to which this
-/// work is known. `accepted` is the last accepted step in Model Exchange. It is `None` after a step of Co-Simulation, because
-/// g then changes only at an instant.
+/// The `work`, J, that a changing specific force has done since the start, and the specific force `g`, m/s2, up to which
+/// this work is known. `accepted` is the last accepted step in Model Exchange. It is `None` after a step of Co-Simulation,
+/// because g can then only jump, and the work of a jump depends only on the present height of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
     pub work: f64,

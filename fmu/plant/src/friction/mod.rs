@@ -82,9 +82,9 @@ pub trait FrictionLaw {
         (0.0, 0.0)
     }
 
-    /// Returns the contact of a hub at rest whose previous contact is `before`. `net` is the torque on the hub without
-    /// friction and, if the law does not stick, the rate of this torque while the hub is held; `theta` is the angle of the
-    /// hub.
+    /// Returns the contact (stick or slip) of a hub at rest whose previous contact is `before`. `net` contains the torque on
+    /// the hub without friction, N m, and, for laws that do not stick, the rate at which this torque changes while the hub
+    /// is held; `theta` is the angle of the hub, rad.
     fn contact_at_rest(&self, _net: [f64; 2], _theta: f64, _before: Contact) -> Contact {
         Contact::Forward
     }

@@ -206,7 +206,8 @@ pub trait SloshMode {
     /// divided by the specific force.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
     /// Returns the coordinates `t` seconds after the start of the series, when the hub has the rate `omega`, rad/s. They are
-    /// computed from their series up to order n. If `varies` is false, the mode moves along the tangent.
+    /// computed from their series up to order n. If `varies` is false, the mode moves along the tangent, because `varies` is
+    /// always true for modes with another direction.
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
     /// Returns the slosh mass times its height above rest, kg m, and the rate of this product. The potential energy is the
     /// specific force times the product.

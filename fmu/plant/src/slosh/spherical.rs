@@ -59,8 +59,10 @@ pub struct Spherical {
     dir: Vector2,
     dir_z: Series,
     dir_d: Vector2,
-    /// Drag coefficient, divided by its value at the start of the series, times the horizontal rate of the slosh mass's
-    /// direction. The two components are exchanged, tangential first; `drag_z` is the upward component.
+    /// Horizontal components of the drag's power series: the drag coefficient, divided by its value at the start of the
+    /// series, times the rate of the unit vector from the hinge to the slosh mass. The tangential component comes first and
+    /// the radial one second, so that products with a direction, component by component, give the terms of a cross product.
+    /// `drag_z` is the upward component.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,
@@ -75,8 +77,9 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// Computes Taylor coefficient n of the direction p and the velocity v of the slosh mass from coefficient n of the
-    /// coordinates xi, by p' = k xi' - v_z xi and v_z = k^2 xi.xi' (symbols at the head of the file).
+    /// Computes Taylor coefficient n of the slosh mass's direction p, a unit vector from the hinge, and of its velocity v
+    /// from coefficient n of the stereographic coordinates xi and their rates. With k = 2/(1 + |xi|^2) the relations are p'
+    /// = k xi' - v_z xi and v_z = k^2 xi.xi'.
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
         let one = constant(n, 1.0);
@@ -93,8 +96,9 @@ impl Spherical {
         self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Returns Taylor coefficient n of k times the acceleration of the coordinates xi. In the symbols at the head of the file
-    /// it is p'' + 2 v_z xi' + v_z' xi with p'' = v' - w' R p - w R p'.
+    /// Returns Taylor coefficient n of k xi'', where xi are the stereographic coordinates and k = 2/(1 + |xi|^2). It is
+    /// computed as p'' + 2 v_z xi' + v_z' xi with p'' = v' - w' R p - w R p', from the direction p and the velocity v of the
+    /// slosh mass and the rate w of the hub; R rotates a vector by a quarter turn.
     fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale(n, &hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
@@ -319,9 +323,9 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the coordinates xi and their rates from the direction p and the velocity v of the slosh mass, by xi = p/k and
-    /// k xi' = p' + v_z xi (symbols at the head of the file). If the slosh mass is above its hinge, k = 1 - p_z is computed
-    /// from |p| = 1, because the difference would lose digits.
+    /// Computes the stereographic coordinates xi and their rates from the direction p, a unit vector, and the velocity v of
+    /// the slosh mass, by xi = p/k and k xi' = p' + v_z xi with k = 1 - p_z. If the slosh mass is above its hinge, k is
+    /// computed from |p| = 1 instead, because the difference 1 - p_z would lose digits.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
@@ -421,8 +425,9 @@ mod tests {
         }
     }
 
-    /// Compares the two descriptions of the motion: direction and velocity of the slosh mass, which the model integrates, and
-    /// the coordinates xi by Lagrange's equations. The random angles lie between hanging and 20 degrees from straight up.
+    /// The test compares two descriptions of the motion: the direction and velocity of the slosh mass, which the model
+    /// integrates, and the coordinates xi, whose acceleration follows from Lagrange's equations. The random angles lie
+    /// between hanging straight down and 20 degrees from straight up.
     #[test]
     fn direction_and_velocity_follow_lagranges_equations() {
         let mut rng = fastrand::Rng::with_seed(3);

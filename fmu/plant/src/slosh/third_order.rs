@@ -222,7 +222,9 @@ impl SloshMode for ThirdOrder {
     }
 
     /// Returns the radial and the tangential force of the slosh mass on the tank, N, which is minus its mass times its
-    /// acceleration. In the symbols at the head of the file it is -m (q'' - a - w' (y, -(r + x))).
+    /// acceleration. It is -m (q'' - a - w' (y, -(r + x))), where q = (x, y) is the position of the slosh mass m relative to
+    /// its hinge, r the distance of the hinge from the bearing axis, w the rate of the hub, and a the Coriolis and
+    /// centrifugal acceleration.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let (wd, y, arm) =
             (number::<T>(&hub.omega_dot), number::<T>(&self.q[1]), number::<T>(&self.arm));
