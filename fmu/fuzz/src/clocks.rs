@@ -194,8 +194,8 @@ fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
 
-/// Iterates over outputs and local variables without derivatives of states. These follow from the states and are slow to read
-/// one by one.
+/// Iterates over all outputs and local variables except the derivatives of states. The derivatives follow from the states,
+/// so that the fuzzer need not compare them, and reading them one by one would be slow.
 fn outputs<M: Model>() -> impl Iterator<Item = &'static Scalar<M>> {
     let is_shown = |s: &&Scalar<M>| {
         matches!(s.variable.causality, Causality::Output | Causality::Local)
@@ -251,8 +251,8 @@ fn begin<M: Model, V: Values>(
     Some(instance)
 }
 
-/// Makes a call that exists in both interfaces. Returns the instance with which the simulation continues, because a call may
-/// replace it by a deserialised one.
+/// Makes a call that exists in both Co-Simulation and Model Exchange. Returns the instance with which the simulation
+/// continues, because a call may replace it by a deserialised one.
 fn common<M: Model, V: Values>(mut instance: Instance<M, V>, call: Call) -> Instance<M, V> {
     let table = M::table();
     match call {

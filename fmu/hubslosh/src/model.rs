@@ -11,8 +11,8 @@ use runtime::model::{StepEnd, StepFailure};
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// True between [`Dynamics::apply_present_inputs`] and its reversal. The outputs then belong to the present inputs;
-    /// otherwise to the contact at the last event.
+    /// True between [`Dynamics::apply_present_inputs`] and [`Dynamics::revert`]. In this time the outputs show the contact
+    /// (stick or slip) that the present inputs cause; otherwise they show the contact at the last event.
     present: bool,
 }
 
