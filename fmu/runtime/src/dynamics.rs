@@ -125,8 +125,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         false
     }
 
-    /// Sets the slopes, over a step of `h` seconds, of the inputs that other inputs determine during a step. For example, a
-    /// rate follows from its derivative, which is another input.
+    /// Sets the slopes of those inputs whose change during a step of `h` seconds follows from other inputs. For example, the
+    /// slope of a rate is the derivative of the rate, which is another input.
     /// [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs) declares these inputs. Returns true if there
     /// are any.
     fn set_dependent_slopes(inputs: &mut Self::Inputs, h: f64) -> bool {

@@ -39,8 +39,8 @@ pub struct Extent {
 
 impl Extent {
     /// Returns the extent of a reduced model description, with the start values of the table. `token` is the GUID or
-    /// instantiationToken that the host passes, and `whole` is that of the full description. Returns `None` if `token` does
-    /// not belong to a reduced description of this table.
+    /// instantiationToken that the host passes, and `whole` the GUID or instantiationToken of the full description. Returns
+    /// `None` if `token` does not belong to a reduced description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -81,8 +81,8 @@ impl Extent {
         Some(Extent { token: token.into(), sizes, places, indicators, starts, inputs: Vec::new() })
     }
 
-    /// Reads the start values of the reduced description from the file [`START_VALUES`] in the folder `resources`. A
-    /// description whose token has no checksum of such a file has the start values of the table.
+    /// Reads the start values of the reduced description from the file [`START_VALUES`] in the folder `resources`. If the
+    /// token contains no checksum of this file, the description has the start values of the table, and nothing is read.
     ///
     /// # Errors
     /// If the file is missing, belongs to another description, or does not match the table.
@@ -158,8 +158,8 @@ impl Extent {
         &self.inputs
     }
 
-    /// Returns an error message if `value` is a number of tanks or modes for which the reduced description lacks the
-    /// variables of some of them; otherwise `None`.
+    /// Returns an error message if `value` is a number of tanks or modes that is larger than the number for which the
+    /// reduced description has variables; otherwise `None`.
     pub fn problem<M: Model>(&self, scalar: &Scalar<M>, value: Value) -> Option<String> {
         let (_, most) = self.sizes.iter().find(|(name, _)| *name == scalar.variable.name)?;
         match value {
@@ -172,8 +172,9 @@ impl Extent {
     }
 }
 
-/// Returns how many event indicators of the table belong to elements within `sizes`. `of` is the name of the parameter that
-/// counts the elements with indicators ([`Dynamics::INDICATORS_OF`](crate::model::Dynamics::INDICATORS_OF)).
+/// Returns the number of event indicators in a model description that is reduced to `sizes`, the names and largest values of
+/// the parameters that count elements. `of` is the name of the parameter that counts the elements with event indicators
+/// ([`Dynamics::INDICATORS_OF`](crate::model::Dynamics::INDICATORS_OF)).
 fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
     let all = table.about.event_indicators;
     let size = sizes.iter().find(|(name, _)| Some(*name) == of);

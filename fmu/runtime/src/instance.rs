@@ -52,9 +52,9 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) model: Option<M>,
     pub(crate) outputs: Option<M::Outputs>,
     pub(crate) known: Known,
-    /// Values of the discrete outputs that the host saw when it was last in event mode, by slot. They are needed if events
-    /// are handled as [`Events::Reported`]. The list is empty until initialization has ended; until then, discrete outputs
-    /// are computed like all other outputs.
+    /// Values of the discrete outputs that the host saw when it was last in event mode, in the order of their
+    /// [`Scalar::slot`]. They are needed if events are handled as [`Events::Reported`]. The list is empty until
+    /// initialization has ended; until then, discrete outputs are computed like all other outputs.
     pub(crate) shown: Vec<i32>,
     scratch: [Vec<f64>; 2],
 }
@@ -62,7 +62,7 @@ pub struct Instance<M: Model, V: Version> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     Nothing,
-    /// Integers, enumerations and Booleans are valid, but real outputs are not.
+    /// The stored outputs are valid if they are integers, enumerations or Booleans, but not if they are real.
     Discrete,
     All,
 }
@@ -476,8 +476,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Sets the variables for which `meant` returns true to their start values. Returns those of them that had another value,
-    /// in the order of the table.
+    /// Sets the variables for which `meant` returns true to their start values. Returns the variables that had another value
+    /// before, in the order of the table.
     pub(crate) fn restart(
         &mut self,
         meant: impl Fn(&Variable<M>) -> bool,
@@ -778,10 +778,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         done
     }
 
-    /// Returns the value references of the variables on which a variable depends. Before the simulation starts, these are the
-    /// dependencies of its initial value. Afterwards they are those of the declared inputs and states that have an effect at
-    /// present, which can depend for example on the selected models, or on whether the hub sticks. A dependency whose
-    /// derivative vanishes only at the present point counts as well.
+    /// Returns the value references of the variables on which a variable depends. Before the simulation starts, these are
+    /// the dependencies of its initial value. Afterwards they are the declared inputs and states that have an effect at
+    /// present; for example, a variable may depend on fewer of them while the hub sticks. An input or state also counts if
+    /// the derivative with respect to it vanishes only at the present point.
     pub(crate) fn dependencies(
         &mut self,
         call: &Call,
@@ -1111,8 +1111,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
-    /// Handles events that steps have already handled within the model. Applies the discrete changes that the present inputs
-    /// cause, and lets the host see the new values of all discrete outputs.
+    /// Reports to the host the events that the model has already handled within its steps: applies the discrete changes that
+    /// the present inputs cause, and lets the host see the new values of all discrete outputs.
     fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
         let inputs = self.inputs;
         let now = self.clock.now();
@@ -1657,9 +1657,9 @@ mod tests {
     use crate::tests::trays::Trays;
     use crate::v3::Fmi3;
 
-    /// The function moves states with the nominal value 5 m and inputs with the nominal value 4 m/s by up to a hundredth of
-    /// these values, so that dependencies can be tested at nearby points. Inputs are only increased, and stay within their
-    /// ranges.
+    /// The function `move_aside` moves states with the nominal value 5 m and inputs with the nominal value 4 m/s by up to a
+    /// hundredth of these values, so that dependencies can be tested at nearby points. Inputs are only increased, and stay
+    /// within their ranges.
     #[test]
     fn nearby_points_for_differences_move_every_state_and_input_by_a_share_of_its_size() {
         let moved = |share: f64, point: u64, q: f64| {

@@ -112,8 +112,7 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
     pub variable: &'static Variable<M>,
-    /// Access functions of the table's entry. Like C type and state, they are copied to each of its scalars because every
-    /// call needs them.
+    /// Copy of [`Variable::access`]. Like `c_type` and `state`, it is stored in each scalar because every call needs it.
     pub access: Access<M>,
     pub c_type: CType,
     pub state: Option<Place>,
@@ -252,8 +251,8 @@ impl<M: Dynamics> Table<M> {
         self.scalars.iter().position(|s| s.name() == name).map(|n| n as u32)
     }
 
-    /// Returns the GUID: a hash of the version and of all properties of variables on which a host depends, but not of their
-    /// descriptions. A host that passes another GUID has read another model description.
+    /// Returns the GUID: a hash of the FMU's version and of all properties of variables on which a host depends, but not of
+    /// their descriptions. A host that passes another GUID has read another model description.
     pub fn guid(&self) -> &str {
         let bytes = self.guid.get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];

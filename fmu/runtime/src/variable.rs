@@ -113,12 +113,12 @@ pub type Place = fn(usize) -> usize;
 #[allow(missing_docs)]
 pub enum Dimension {
     Fixed(usize),
-    /// The length is the value of the integer parameter with this name, and the number is the largest length. In a
+    /// The length of the array is the value of the integer parameter with this name, and at most the given number. In a
     /// description with array variables the parameter is structural (see [`Layout`](crate::table::Layout)). In a description
     /// with scalars the array always has the largest length.
     Sized(&'static str, usize),
-    /// The array always has the largest length, which is the number; only as many elements are used as the integer parameter
-    /// with this name says. A reduced model description does not contain the unused elements.
+    /// The length of the array is always the given number. The value of the integer parameter with this name is the number
+    /// of elements that are used. A reduced model description does not contain the unused elements.
     Used(&'static str, usize),
 }
 
@@ -235,8 +235,8 @@ const fn quantity(unit: &'static str) -> Kind {
     Kind::Real(Quantity { unit, display_unit: None, min: None, max: None, nominal: None })
 }
 
-/// Defines functions that declare a variable. Each row contains the arguments between name and description, then causality,
-/// type and access of the variable.
+/// Defines functions that declare a variable, one function per row. A row contains the arguments of the function between the
+/// variable's name and its description, and then causality, type and access of the variable.
 macro_rules! declarations {
     ($($(#[$doc:meta])* $function:ident($($argument:ident: $type:ty),*) =
         $causality:ident, $kind:expr, $access:expr;)*) => {
@@ -480,8 +480,8 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Returns the largest allowed rate of an input, in its unit per second: the bound of its range with the larger magnitude
-    /// divided by [`CROSSING`], or infinity if the range has no bounds.
+    /// Returns the largest allowed rate of an input, in its unit per second. It is the larger magnitude of the two bounds of
+    /// the input's range, divided by [`CROSSING`], or infinity if a bound is missing.
     pub fn fastest(&self) -> f64 {
         match self.kind {
             Kind::Real(Quantity { min: Some(min), max: Some(max), .. }) => {

@@ -82,8 +82,8 @@ fn instance_goes_through_the_states_of_its_interface() {
     }
 }
 
-/// Two start levels are both too high. The error at the end of initialisation contains both problems, and the host can then
-/// correct the levels.
+/// Both vessels of the test model start with a level that is too high. The error at the end of initialisation contains both
+/// problems, and the host can then correct the levels.
 #[test]
 fn contradicting_parameters_end_initialization_with_all_faults_named() {
     let mut instance = fresh(CS);

@@ -155,7 +155,8 @@ fn time_may_go_back_to_the_last_event_at_most() {
     }
 }
 
-/// In FMI 3.0 these calls return the status Discard, after which the host may continue.
+/// In FMI 3.0, setting an input or a state to a value outside its range returns the status Discard, after which the host may
+/// continue.
 #[test]
 fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     let mut host = stepping(Events::Reported, 0.0, &[]);

@@ -117,8 +117,8 @@ fn no_step_is_allowed_after_a_step_that_ends_at_the_stop_time() {
     );
 }
 
-/// The inflow q must not fall below 1. A ramp that starts at 4 and ends below 1 by at most 1e-9 of its height ends at
-/// exactly 1.
+/// The inflow q must not fall below 1. Because of rounding, a ramp that falls from 4 may end below 1 by up to 1e-9 of its
+/// fall; it then ends at exactly 1.
 #[test]
 fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     let after = |end: f64| {
@@ -254,8 +254,8 @@ fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
     assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
 }
 
-/// Between steps the outputs show the valve in the position that the present inputs cause, but the valve in the model moves
-/// only in the next step.
+/// A valve of the test model opens if a platform, whose height is an input, is high enough. Between steps the outputs show
+/// the valve in the position that the present inputs cause, but the valve in the model moves only in the next step.
 #[test]
 fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     let mut instance = started(CS, &[]);

@@ -30,7 +30,7 @@ struct TestHost {
     lines: Vec<(fmi3Status, String, String)>,
     /// The intermediate updates that the host has received: the time of each, and true if the host could set inputs then.
     updates: Vec<(f64, bool)>,
-    /// The force that the host sets in an intermediate update. It applies to the end of the part of the step that follows.
+    /// The force that the host sets in an intermediate update, for the end of the step.
     force: Option<f64>,
     wish: Option<f64>,
     statuses: Vec<fmi3Status>,

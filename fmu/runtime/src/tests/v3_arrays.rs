@@ -188,8 +188,8 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// An element of `square` depends on all levels and inflows of the present trays, even where all of them are 0, so that the
-/// derivatives vanish. A rate depends on its own inflow.
+/// Each element of the output `square` depends on all levels and inflows of the present trays, even where all of them are 0,
+/// so that the derivatives vanish. The rate of a level depends only on the inflow of its own tray.
 #[test]
 fn array_elements_depend_on_others_even_where_the_derivative_vanishes() {
     let lines = Lines::default();

@@ -67,8 +67,8 @@ pub struct Outputs {
     valve: i32,
 }
 
-/// Vessels with a leak, and a valve that a rising platform opens. The model stores the levels in the opposite order of that
-/// in which the host reads them.
+/// Vessels with a leak, and a valve that a rising platform opens. The model stores the levels in reverse order, so that the
+/// host reads the last one first.
 #[derive(Clone, Debug)]
 pub struct Vessels {
     k: f64,

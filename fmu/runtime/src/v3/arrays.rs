@@ -13,7 +13,8 @@ use crate::variable::{Access, Dimension, Value, Variable};
 
 #[derive(Clone, Debug, Default)]
 pub struct Arrays {
-    /// Value references that the scalars have in the layout of scalars, for one array variable after the other.
+    /// Value references of the scalars of all array variables, array by array. They are the value references in the layout
+    /// of scalars, in which each element of an array is a variable.
     scalars: Vec<u32>,
     ends: Vec<usize>,
     types: Vec<CType>,
@@ -92,8 +93,8 @@ impl Arrays {
         (place.1 > 0).then_some(place)
     }
 
-    /// Returns the positions of the continuous states that exist with the present array sizes, in the order in which the host
-    /// reads them. They are positions in the list of all states that exist with the largest sizes.
+    /// Returns the continuous states that exist with the present array sizes, in the order in which the host reads them.
+    /// Each is given by its position in the list of all states that exist with the largest sizes.
     pub fn states(&self) -> &[usize] {
         &self.states
     }

@@ -116,9 +116,9 @@ pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     }
 }
 
-/// Sets each array whose size `call` has changed to its start values. `scalars` are the structural parameters that the call
-/// has set, and `before` are the values that all parameters had before the call. If the host had set other values in these
-/// arrays, a warning in its log says that they are lost.
+/// If `call` has changed the sizes of arrays, sets all elements of these arrays to their start values. `scalars` are the
+/// structural parameters that the call has set, and `before` are the values that all parameters had before the call. If the
+/// host had set other values in these arrays, a warning in its log says that they are lost.
 pub(super) fn start_resized<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

@@ -11,8 +11,8 @@ pub struct Host<M: Model> {
     pub(super) early_return_allowed: bool,
     pub(super) required: Vec<fmi3ValueReference>,
     pub(super) phase: Phase,
-    /// Values of inputs that the host has set in an intermediate update. The inputs reach them at the end of the part of the
-    /// step that follows.
+    /// Values that the host has given to inputs in the intermediate update at the start of a step. The inputs change
+    /// linearly towards these values, and reach them at the end of the step.
     pub(super) ends: M::Inputs,
     pub(super) set: Vec<fmi3ValueReference>,
     pub(super) indicators: Vec<f64>,

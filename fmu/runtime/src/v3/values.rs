@@ -166,8 +166,8 @@ fn set_arrays<M: Model>(
     Ok(())
 }
 
-/// Sets inputs during an intermediate update. Element n of `references` gets `value(n)`, which applies to the end of the part
-/// of the step that follows.
+/// Sets inputs during the intermediate update at the start of a step. Input number n of `references` then changes linearly,
+/// and reaches `value(n)` at the end of the step.
 #[cold]
 fn set_ends<M: Model>(
     component: &mut Component<M, Fmi3>,
