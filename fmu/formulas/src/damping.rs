@@ -90,9 +90,9 @@ fn weight(number: f64, [low, high]: [f64; 2]) -> f64 {
 }
 
 impl Shape {
-    /// Returns the damping ratio of the first slosh mode by the published correlation for this shape; `None` if the shape was
-    /// not measured. `nu` is the kinematic viscosity, m2/s, and `g` the specific force, m/s2, to which the equivalent of a
-    /// stiffness by surface tension was added.
+    /// Returns the damping ratio of the first slosh mode by the published correlation for this shape; `None` if the shape
+    /// was not measured. `nu` is the kinematic viscosity, m2/s, and `g` is the specific force plus the increase of it that
+    /// has the effect of surface tension, m/s2.
     ///
     /// In a cylinder the formula of Mikishev and Dorozhkin is used from h/R = 0.5 on. For smaller fills this formula gives
     /// less damping than wall friction alone, so that the formula of Stephens, Leonard and Perry is used. The two formulas

@@ -29,8 +29,8 @@ use crate::cylinder::XI;
 /// r dr, where J1(xi_1 r) is the shape of the first mode.
 const M: f64 = 0.278_821_981_660_245_8;
 
-/// Squared amplitude of the wave divided by the squared slosh angle, (2/((xi_1^2 - 1) J1(xi_1)))^2, in a cylinder of
-/// radius 1.
+/// Squared amplitude a^2 of the wave a J1(xi_1 r), divided by the squared slosh angle, (2/((xi_1^2 - 1) J1(xi_1)))^2, in a
+/// cylinder of radius 1.
 const B: f64 = 2.068_401_064_148_324;
 
 /// Slosh modes that the square of the first mode excites, for the azimuthal numbers 0 and 2. Each pair contains the zero xi
