@@ -30,8 +30,8 @@ use taylor::series::{Series, ZERO, mul_ramp, time_within, values};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
-/// Range in which the law of Keulegan and Carpenter holds for the stroke of the liquid at the ring, divided by the width of
-/// the ring.
+/// Range of the liquid's stroke at the ring, divided by the width of the ring, in which the law of Keulegan and Carpenter
+/// holds.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
 /// Amplitude A_0 whose square is added to the squared amplitude of the wave, so that the drag has a power series also at

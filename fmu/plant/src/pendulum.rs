@@ -152,7 +152,7 @@ impl Pendulum {
     }
 
     /// Returns the reason why mode 1 cannot start with the displacement and rate in `init`, if any: the mode moves along one
-    /// direction only, and they have another direction.
+    /// direction only, and the displacement or the rate has another direction.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;
         let starts = [

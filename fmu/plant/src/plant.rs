@@ -196,8 +196,8 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Returns a warning, one sentence each, for every parameter that is outside the known range of the models, and for the
-    /// specific force in `inputs` if it is.
+    /// Returns a warning, one sentence each, for every parameter that is outside the known range of the models. The specific
+    /// force in `inputs` is checked in the same way.
     pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
         tank::warnings(p, inputs.g_axial.value)
     }

@@ -154,10 +154,11 @@ impl ModeTable {
         sum / 2.0 + libm::hypot(half, cross)
     }
 
-    /// Returns the smallest inertia, kg m2, that the liquid of the slosh model `planar` can have about the bearing axis while
-    /// its modes move. `r` is the distance of the tank from the axis, m. The inertia is m_0 r^2 plus, for each mode, the
-    /// smallest value of m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2], where s is the sine of the slosh angle and r_x, r_t are r
-    /// along the mode's direction and across it.
+    /// Returns the smallest inertia, kg m2, that the liquid of the slosh model `planar` can have about the bearing axis
+    /// while its modes move. `r` is the distance of the tank from the axis, m. The inertia is m_0 r^2 of the rigid liquid
+    /// plus, for each mode with the slosh mass m and the pendulum length l, the smallest value of m [r_x^2 + 2 r_x l s +
+    /// (r_t^2 + l^2) s^2], where s is the sine of the slosh angle and r_x and r_t are the components of r along the mode's
+    /// direction and across it.
     fn least_inertia(&self, modes: usize, r: f64) -> f64 {
         let of_mode = |n: usize| {
             let ([n_x, n_t], l) = (self.direction_components(n), self.pendulum_length(n));
@@ -323,9 +324,10 @@ const LOW_BOND: f64 = 100.0;
 impl Calculated {
     /// Calculates the modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation gives the damping ratio of the first mode. Each higher mode has the same ratio of its damping to that
-    /// of its own laminar layer (`formulas::damping`). Without restoring force, that is, without g and surface tension, there
-    /// is no frequency, and the damping ratio, which then has no meaning, is 0.
+    /// The correlation gives the damping ratio of the first mode. In the higher modes the ratio of this damping to the
+    /// damping of the laminar layer at the wall is the same as in the first mode (`formulas::damping`). Without restoring
+    /// force, that is, without g and surface tension, there is no frequency, and the damping ratio, which then has no
+    /// meaning, is 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;

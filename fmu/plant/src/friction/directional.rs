@@ -78,8 +78,8 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Returns a message for each direction of rotation in which the factor is not positive at every angle. Dry friction
-    /// would drive the hub where the factor is negative.
+    /// Returns a message for each direction of rotation in which the directional factor of dry friction is not positive at
+    /// every angle of the hub. Dry friction would drive the hub where this factor is negative.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
@@ -96,7 +96,8 @@ impl DirectionalFactor {
             .collect()
     }
 
-    /// Returns the smallest and the largest value of the factor over both directions of rotation and all angles of the hub.
+    /// Returns the smallest and the largest value of the directional factor of dry friction, over both directions of
+    /// rotation and all angles of the hub.
     pub fn bounds(&self) -> (f64, f64) {
         let both = [self.forward, self.backward];
         let mirrored = both.map(|b| OneWay { mean: -b.mean, harmonics: b.harmonics.map(|h| -h) });
@@ -112,7 +113,8 @@ impl DirectionalFactor {
         self.trig.is_some()
     }
 
-    /// Returns the mean of the factor over all angles of the hub, for the direction of rotation that `contact` states.
+    /// Returns the mean of the directional factor of dry friction over all angles of the hub, for the direction of rotation
+    /// that `contact` states.
     pub fn mean(&self, contact: Contact) -> f64 {
         self.one_way(contact).mean
     }

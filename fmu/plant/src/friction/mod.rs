@@ -27,8 +27,8 @@ pub trait FrictionLaw {
 
     const STICKS: bool = false;
 
-    /// Number of successive negligible terms of a power series that end the search for its order. A law whose terms vanish by
-    /// symmetry needs more than the usual two.
+    /// Number of successive negligible terms after which the integrator truncates a power series. A law needs more than the
+    /// usual two if some of its terms vanish by symmetry.
     const NEGLIGIBLE_TERMS: usize = 2;
 
     fn new(p: &Friction) -> Self;

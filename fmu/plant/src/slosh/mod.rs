@@ -44,8 +44,9 @@ macro_rules! own_pendulum {
 }
 use own_pendulum;
 
-/// Defines the functions of [`SloshMode`] for a model with one angle `al` along the direction of its pendulum `p`. `al_d` and
-/// `al_dd` are its derivatives, and `drag` is the rate on which the damping acts.
+/// Defines the functions of [`SloshMode`] for a model with one angle `al` along the direction of its pendulum `p`. `al_d`
+/// and `al_dd` are its derivatives, and `drag` is `al_d` times the drag coefficient, which is divided by its value at the
+/// start of the series.
 macro_rules! one_angle {
     () => {
         own_pendulum!();
@@ -142,7 +143,7 @@ impl Liquid {
     }
 }
 
-/// What one mode contributes to the hub's equation: an inertia, kg m2, and a torque, N m.
+/// Contribution of one mode to the hub's equation of motion: an inertia, kg m2, and a torque, N m.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct HubReaction {
     pub j: f64,
