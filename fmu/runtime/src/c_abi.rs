@@ -372,8 +372,8 @@ pub unsafe fn fill<M: Model, V: Version>(
     }
 }
 
-/// Handles the host's message that its integrator has completed a step, and writes whether an event must be handled now to
-/// the host's variable `enter_event_mode`. `B` is the Boolean type of the FMI version.
+/// Handles the host's message that its integrator has completed a step. Sets the host's variable `enter_event_mode` to true
+/// if an event must be handled now, and otherwise to false. `B` is the Boolean type of the FMI version.
 pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     handle: *mut c_void,
     enter_event_mode: *mut B,
@@ -392,9 +392,10 @@ pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     }
 }
 
-/// Defines the C functions of one version of FMI. Each becomes a function that is generic in the model, and a macro `$export`
-/// exports all of them for one model under their C names. This macro is necessary because each FMU must define these symbols
-/// itself. The first token of the input must be `$`.
+/// Defines the C functions of one version of FMI. Each becomes a function that is generic in the model, and a macro
+/// `$export` exports all of them for one model under their C names. This macro is necessary because each FMU must define
+/// these symbols itself. The first token of the input must be `$`, because a macro cannot itself contain the `$` of the
+/// macro that it defines.
 macro_rules! c_functions {
     ($d:tt $export:ident, $version:ident; $(
         $(#[$doc:meta])*

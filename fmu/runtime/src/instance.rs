@@ -737,8 +737,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.derivatives_along(call, unknowns, &along, answers)
     }
 
-    /// Computes the directional derivatives of the unknowns and writes them to `answers`. The states change by the first
-    /// scratch vector, and the inputs by the slopes in `along`.
+    /// Computes the directional derivatives of the unknowns and writes them to `answers`. The states change by the vector
+    /// `scratch[0]`, and the inputs by the slopes in `along`.
     fn derivatives_along(
         &mut self,
         call: &Call,
