@@ -179,10 +179,11 @@ fn compare<M: Model, V: Values>(
     Ok(())
 }
 
-/// Returns the difference that two hosts may have in output number `n` of the `rows`: 1e-9 of its magnitude. If the host's
-/// clock determines the ends of steps (`is_placed`: Model Exchange, gyro samples), its rounding errors are allowed, too,
-/// because they shift the motion in time: a unit in the last place is 1.2e-7 s at 1e9 s. The allowed difference then includes
-/// the rounding error times the fastest change of the output.
+/// Returns the difference that two hosts may have in output number `n`: 1e-9 of its magnitude. `rows` contains the values of
+/// all outputs after each step, and `tick` is the shortest step, s. If the host's clock determines the ends of steps
+/// (`is_placed`: Model Exchange, gyro samples), its rounding errors shift the motion in time: a unit in the last place is
+/// 1.2e-7 s at 1e9 s. The allowed difference then includes the rounding error at the time `start` times the fastest change
+/// of the output.
 fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64 {
     let size = rows.iter().fold(1.0f64, |most, row| most.max(row[n].abs()));
     let pairs = rows.windows(2).map(|pair| (pair[1][n] - pair[0][n]).abs());

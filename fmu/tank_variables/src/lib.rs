@@ -8,7 +8,8 @@ pub use runtime::variable::Dimension::{self, Fixed};
 use runtime::variable::Item;
 pub use runtime::variable::{Enumeration, Variable};
 
-/// A model with tanks, whose indices count from 0. Integer parameters are stored with the values that the host has set.
+/// Access to the tanks of a model, whose indices count from 0. Counts of modes and points, and the integer twin of an
+/// enumeration, are stored as the integers that the host has set.
 #[allow(missing_docs)]
 pub trait Tanks: runtime::Dynamics {
     fn tank(p: &Self::Parameters, i: usize) -> &Tank;
