@@ -26,9 +26,10 @@ pub const UNMEASURED: f64 = 1.45;
 
 pub const SCATTER: f64 = 0.3;
 
-/// The quantities of a slosh mode on which its damping depends: the wall factor `beta`, 1/m, which is the ratio of wall shear
-/// to liquid volume; the wave number `lambda`, 1/m, from which the natural frequency without surface tension follows as
-/// sqrt(g lambda); and the natural frequency `omega` with surface tension, rad/s.
+/// The quantities of a slosh mode on which its damping depends: the wall factor `beta`, 1/m, which is the integral of the
+/// squared velocity over the wetted wall, divided by the integral over the volume of the liquid; the wave number `lambda`,
+/// 1/m, from which the natural frequency without surface tension follows as sqrt(g lambda); and the natural frequency
+/// `omega` with surface tension, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     pub beta: f64,
