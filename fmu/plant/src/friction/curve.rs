@@ -35,10 +35,10 @@ impl StribeckCurve {
     /// Estimates the time, s, over which the power series of the dry friction torque converges reliably. `omega` is the
     /// series of the hub's rate.
     ///
-    /// At a high rate, v times the Stribeck speed, the excess over Coulomb friction, exp(-v^2), is below any tolerance, but
-    /// the terms of its series grow before they decay. Over a change dv the term of order n is (2 v dv)^n/n!, which is
-    /// largest at n = 2 v dv. The limit is chosen so that either the curve is still flat at the end, or the terms decay from
-    /// order 5 on.
+    /// Let v be the hub's rate divided by the Stribeck speed. At a high rate the excess over Coulomb friction, exp(-v^2), is
+    /// below any tolerance, but the terms of its series grow before they decay: if v changes by dv, the term of order n is
+    /// (2 v dv)^n/n!, which is largest at n = 2 v dv. The limit is chosen so that either the curve is still flat at the end,
+    /// or the terms decay from order 5 on.
     pub fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] =
             [omega[0], omega[1], omega[2]].map(|w| w.abs() * libm::sqrt(self.inv_omega_s2));
