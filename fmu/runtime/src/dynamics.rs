@@ -52,9 +52,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// True if outputs also depend on the inputs' slopes, for example because an output is a time derivative.
     const OUTPUTS_USE_SLOPES: bool = false;
 
-    /// Name of the integer parameter that counts the elements with event indicators, for example the number of tanks. Each
-    /// element has the same number of indicators, and they are in the order of the elements. `None` if the number of
-    /// indicators is always the same.
+    /// Name of the integer parameter that counts the elements of the model that have event indicators, for example the
+    /// number of tanks; `None` if the number of indicators is always the same. All elements have equally many indicators,
+    /// which are listed element by element.
     const INDICATORS_OF: Option<&'static str> = None;
 
     /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is the relative tolerance

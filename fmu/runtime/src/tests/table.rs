@@ -69,8 +69,9 @@ fn start_values_equal_those_of_the_model() {
     assert_eq!(scalar("sum").start(), None);
 }
 
-/// A table states dependencies by the name of an array or of an element of the same index. For example, `net[2]` depends on
-/// `level[2]` and `q[2]`.
+/// The dependency list of an array may contain the name of another array with empty brackets, which stands for the element
+/// with the same index. For example, `net[2]` depends on `level[2]` and `q[2]`. The name of an array without brackets stands
+/// for all its elements.
 #[test]
 fn names_of_arrays_in_dependency_lists_stand_for_their_elements() {
     let depends = |name: &str| names(scalar(name).depends_on());
