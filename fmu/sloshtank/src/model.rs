@@ -25,8 +25,8 @@ const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True while the present inputs are applied. The outputs on the ranges of validity then belong to the present inputs;
-    /// otherwise they keep the values of the last event.
+    /// True between [`Dynamics::apply_present_inputs`] and [`Dynamics::revert`]. In this time the outputs that describe the
+    /// ranges of validity belong to the present inputs; otherwise they keep the values of the last event.
     present: bool,
     has_left_range: bool,
     has_had_lump: bool,

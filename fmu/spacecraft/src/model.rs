@@ -8,8 +8,9 @@ use runtime::model::StepFailure;
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// True while the present inputs are applied, so that outputs belong to the present inputs. In Co-Simulation a jump of
-    /// the wheels' momentum or of a mass flow acts when it is applied, and not only in the next step.
+    /// True between [`Dynamics::apply_present_inputs`] and [`Dynamics::revert`]. In this time the outputs include a jump of
+    /// the wheels' momentum or of a mass flow since the last step; otherwise they leave it out and keep the ranges of
+    /// validity of the last event.
     present: bool,
     wheels: Wheels,
     has_left_range: bool,
