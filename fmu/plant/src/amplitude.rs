@@ -53,11 +53,11 @@ impl Breaking {
     const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
 }
 
-/// The drag on one mode, of which parts grow with the amplitude of its wave, as power series in time. The equations are at
-/// the head of the file.
+/// The drag on one mode as power series in time. Two of its three parts grow with the amplitude of the wave. The equations
+/// are at the head of the file.
 /// - `zeta`: increase of the damping ratio per slosh angle, zeta_A, 1/rad.
 /// - `w`: squared natural frequency W, 1/s2, and its rate; `w_floor`, 1/s2, is added to it.
-/// - `share`, `gain`, `gain_breaking`: the coefficients of three parts of the drag: independent of the amplitude, in
+/// - `share`, `gain`, `gain_breaking`: the coefficients of the three parts of the drag: independent of the amplitude, in
 ///   proportion to it, and by breaking waves. Each is divided by the whole drag at the start of the series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {

@@ -27,8 +27,8 @@ const SHARE_OF_RADIUS: f64 = 0.5;
 
 pub const RAMP_ORDER: usize = 10;
 
-/// The drag coefficient of every mode as a function of the specific force g. It is proportional to [(g + a_n)/(g_0 +
-/// a_n)]^p, where `reference` is g_0, m/s2, and `exponent` is p. `zeta` contains the damping ratios at g_0, and `centring`
+/// The drag coefficient of every mode as a function of the specific force g. It is proportional to `[(g + a_n)/(g_0 +
+/// a_n)]^p`, where `reference` is g_0, m/s2, and `exponent` is p. `zeta` contains the damping ratios at g_0, and `centring`
 /// the increases a_n of g, m/s2, that are equivalent to the stiffness by surface tension.
 #[derive(Clone, Debug)]
 pub struct Damping {

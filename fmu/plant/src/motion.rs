@@ -83,8 +83,8 @@ pub(crate) struct Motion {
     with_amplitude: bool,
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// Specific force g, m/s2, and its rate, with which the series of drag and weight were last computed. They are computed
-    /// again only if one of these values changes, which NaN enforces.
+    /// Specific force g, m/s2, and its rate, with which the series of drag and weight were last computed. The series are
+    /// computed again if one of these values changes. NaN enforces this, because it differs from every value.
     g: [f64; 2],
     near_weightless: f64,
     tolerance: f64,
