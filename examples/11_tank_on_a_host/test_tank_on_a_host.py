@@ -19,20 +19,20 @@ def both(spacecraft: str) -> Path | None:
     return Path(spacecraft).parent if spacecraft.endswith(".fmu") else None
 
 
-def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
+def test_the_error_of_lumped_coupling_is_proportional_to_the_step(both: Path | None) -> None:
     """The error is proportional to the step, for a tumbling craft that is lighter than its tank."""
     reference = simulate_whole(both)
     errors = [error(coupled(both, step), reference) for step in STEPS[:3]]
     assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
 
 
-def test_coupling_by_the_total_wrench_diverges(both: Path | None) -> None:
+def test_coupling_a_light_craft_by_total_force_and_torque_diverges(both: Path | None) -> None:
     """With steps of 20 ms the run diverges within a second, until a pendulum is upside down."""
     with pytest.warns(FmuWarning, match="leaves its range"):
         assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
 
 
-def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:
+def test_the_ssp_file_is_valid_and_contains_both_fmus(both: Path | None, tmp_path: Path) -> None:
     """Fmpy validates the file. Nine signals go from craft to tank, and six from tank to craft."""
     archive = tmp_path / "TankOnHost.ssp"
     pack_ssp(both, archive, 0.02)

@@ -16,7 +16,7 @@ def test_the_script_is_as_short_as_its_readme_says() -> None:
     assert len(script.splitlines()) <= 45
 
 
-def test_margins_name_the_slosh_that_simulation_shows(spacecraft: str) -> None:
+def test_margins_and_simulation_agree_that_a_long_delay_excites_slosh(spacecraft: str) -> None:
     """With a delay of 0.15 s the loop is stable; with 2 s it is unstable near slosh.
 
     Poles and simulation agree.
@@ -42,7 +42,7 @@ def test_margins_name_the_slosh_that_simulation_shows(spacecraft: str) -> None:
     assert np.argmax(spectrum) / (len(swing) * 0.1) == pytest.approx(0.113, abs=0.006)
 
 
-def test_random_runs_have_the_numbers_of_the_readme(spacecraft: str) -> None:
+def test_monte_carlo_runs_have_the_results_that_the_readme_states(spacecraft: str) -> None:
     """The test repeats the nominal slew and six of the 200 random runs."""
     mine = replace(loop, model=spacecraft)
     nominal = after_slew({}, mine)
@@ -54,7 +54,7 @@ def test_random_runs_have_the_numbers_of_the_readme(spacecraft: str) -> None:
     assert table["error (deg)"].between(0.1, 0.45).all() and table["error (deg)"].nunique() == 6
 
 
-def test_the_tank_is_a_half_open_sphere_by_its_closed_form() -> None:
+def test_modes_of_the_spherical_tank_equal_published_values() -> None:
     """In a sphere, all hinges are at the centre.
 
     For half a fill the first eigenvalue is 1.5602 (NASA SP-106, 2.15).

@@ -4,7 +4,7 @@ import numpy as np
 from real_time import ANGLE, PERIOD, lines, run
 
 
-def test_every_cycle_runs_once_and_late_cycles_are_counted(fmu: str) -> None:
+def test_every_control_cycle_runs_once_and_late_cycles_are_counted(fmu: str) -> None:
     """The run has 300 cycles in a third of a second."""
     table = run(fmu, 300)
     assert np.allclose(table["time"], PERIOD * np.arange(1, 301), rtol=0, atol=1e-12)

@@ -93,7 +93,9 @@ def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
     assert off == pytest.approx(1, abs=0.01)
 
 
-def test_the_worst_case_at_97_percent_is_found_where_two_frequencies_meet(spacecraft: str) -> None:
+def test_in_the_worst_case_at_97_percent_fill_both_tanks_have_equal_slosh_frequencies(
+    spacecraft: str,
+) -> None:
     """The loop is unstable in only a thousandth of the box, where NTO is undamped."""
     craft = replace(telecom.craft, model=spacecraft)
     loop = telecom.loop("97%", craft)
@@ -104,7 +106,7 @@ def test_the_worst_case_at_97_percent_is_found_where_two_frequencies_meet(spacec
     assert values["tank[1].frequency[1]"] == pytest.approx(values["tank[2].frequency[1]"], rel=0.02)
 
 
-def test_a_certificate_is_checked_by_numpy_and_a_changed_one_is_refused(
+def test_a_stability_certificate_is_verified_with_numpy_and_a_changed_one_is_refused(
     spacecraft: str, tmp_path: Path
 ) -> None:
     """The test changes the certified size, the list of intervals, the loop, or the scalings."""

@@ -8,7 +8,7 @@ from first_torque import run
     ("model", "rate", "angle", "stopped"),
     [("frozen", 0.2139, 0.0, 13.24), ("spherical", 0.2142, 0.0105, 17.89)],
 )
-def test_the_pulse_gives_the_numbers_of_readme(
+def test_a_torque_pulse_gives_the_results_that_the_readme_states(
     fmu: str, model: str, rate: float, angle: float, stopped: float
 ) -> None:
     """The simulation agrees in every digit that the README gives."""

@@ -32,7 +32,7 @@ def runs(fmu: str) -> dict[tuple[str, str], pd.DataFrame]:
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_a_profile_is_the_integral_of_its_acceleration(name: str) -> None:
+def test_angle_and_rate_of_a_slew_profile_are_integrals_of_its_acceleration(name: str) -> None:
     """Sums over steps of 0.1 ms agree with rate and angle to 1e-7, or to 5e-5 if it has jumps."""
     time = np.linspace(0, 6, 60001)
     angle, rate, acceleration = np.array([PROFILES[name](t) for t in time]).T
@@ -54,7 +54,7 @@ def test_settling_times_and_errors_have_the_numbers_of_the_readme(runs: dict) ->
     assert errors == ERRORS
 
 
-def test_a_swing_keeps_its_direction_in_space(runs: dict) -> None:
+def test_liquid_keeps_its_direction_of_oscillation_in_space_while_the_hub_turns(runs: dict) -> None:
     """After the turn the liquid swings radially, which a planar model cannot reproduce."""
     end = runs["bang-stop-bang", "spherical"].query("time > 5")
     radial, tangential = (end[f"slosh_angle{s}"].abs().max() for s in ("_radial", ""))

@@ -40,7 +40,9 @@ def test_the_simulation_turns_unstable_where_the_sampled_linear_model_does(
 
 
 @pytest.mark.parametrize("name", DESIGNS)
-def test_a_simulated_design_grows_or_decays_as_its_margin_predicts(full: Bench, name: str) -> None:
+def test_simulated_oscillations_grow_or_decay_as_the_gain_margin_predicts(
+    full: Bench, name: str
+) -> None:
     """Some designs have filters.
 
     A rate counts as growth or decay above 0.002/s, a tenth of the slowest design's rate.

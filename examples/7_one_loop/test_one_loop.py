@@ -48,7 +48,7 @@ def test_the_error_of_fixed_steps_grows_as_their_square(fmu: str, folder: Path) 
     assert errors == pytest.approx([6.6e-4, 1.9e-4], rel=0.02)
 
 
-def test_a_master_that_repeats_steps_makes_half_the_steps(fmu: str, folder: Path) -> None:
+def test_a_master_with_step_size_control_makes_half_as_many_steps(fmu: str, folder: Path) -> None:
     """The master makes 4,416 steps with the error of 8,000 fixed steps.
 
     Two thirds of its steps are rolled back or are half steps.

@@ -21,19 +21,23 @@ def test_poles_from_the_fmus_derivatives_equal_those_of_the_closed_form(
     assert craft.predicted_growth == pytest.approx(expected, rel=2.5e-3)
 
 
-def test_the_danger_zone_ends_at_the_closed_form(spacecraft: str) -> None:
+def test_the_danger_zone_of_tank_positions_ends_where_the_closed_form_predicts(
+    spacecraft: str,
+) -> None:
     """Both ends agree to 1 mm; they move by terms of second order in the gains."""
     assert zone(spacecraft) == pytest.approx(predicted_zone(), abs=1e-3)
 
 
 @pytest.mark.parametrize("z", [-0.45, 0.5])
-def test_the_simulated_growth_equals_that_of_the_poles(spacecraft: str, z: float) -> None:
+def test_the_simulated_growth_rate_of_slosh_equals_that_of_the_poles(
+    spacecraft: str, z: float
+) -> None:
     """The 10 ms cycle delays the torque by 5 ms, which changes the growth by 0.3 %."""
     found = simulated_growth(spacecraft, Craft(z))
     assert found == pytest.approx(growth(spacecraft, Craft(z)), rel=0.01)
 
 
-def test_the_required_damping_equals_the_prediction(spacecraft: str) -> None:
+def test_the_slosh_damping_required_for_stability_equals_the_prediction(spacecraft: str) -> None:
     """With 5 % more damping the loop is stable, with 5 % less it is unstable."""
     needed = Craft(0.5).damping_needed
     assert growth(spacecraft, Craft(0.5, zeta=0.95 * needed)) > 0
