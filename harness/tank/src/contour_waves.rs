@@ -611,7 +611,7 @@ mod tests {
     }
 
     #[test]
-    fn results_do_not_depend_on_the_grid_of_the_surface_elevation() {
+    fn large_wave_results_do_not_depend_on_the_grid_of_the_surface_elevation() {
         let cone = wall(vec![Segment::line([0.0, 0.0], [1.0, 2.0])], 1.3);
         for wall in [cone, sphere(0.4), sphere(1.4)] {
             let [a, b] = [1, 3].map(|lines| waves(&wall, 20, lines, 0.0).unwrap());
@@ -627,7 +627,7 @@ mod tests {
     /// J. Fluid Mech. 107 (1981) 499), whereas in a cylinder of this depth the shifts of the
     /// squared frequency are 1e6.
     #[test]
-    fn shallow_liquid_in_a_bowl_keeps_its_frequency() {
+    fn the_frequency_of_shallow_liquid_in_a_bowl_hardly_depends_on_the_amplitude() {
         for fill in [1e-3, 1e-2] {
             let shifts = waves(&sphere(fill), 16, 1, 0.0).unwrap().shifts;
             assert!(shifts.iter().all(|shift| shift.abs() < 0.6), "{fill} {shifts:?}");
@@ -639,7 +639,7 @@ mod tests {
     /// surface, with the true wall of a sphere. The coefficient of the fourth power of the
     /// amplitude gives the frequency shift, which is compared with the shift that `waves` returns.
     #[test]
-    fn fourth_order_terms_equal_those_of_the_functional() {
+    fn fourth_order_terms_equal_those_of_lukes_functional() {
         let (fill, degree, count) = (0.7, 14, 7);
         let shape = sphere(fill);
         let liquid = Liquid::new(&shape, degree).unwrap();

@@ -1058,7 +1058,7 @@ mod tests {
     /// is at rest, so that its height gives the whole energy. The expansion in this test has no
     /// resonance at these slosh angles.
     #[test]
-    fn energy_and_action_of_planar_waves_belong_to_their_frequency() {
+    fn the_frequency_of_planar_waves_is_the_derivative_of_energy_by_action() {
         for (contour, fill) in [(cylinder(), 0.6), (sphere(), 0.6), (sphere(), 0.35)] {
             let wall = contour.cut(fill).unwrap();
             let side = Side::new(&contour, &wall).unwrap();
@@ -1092,7 +1092,7 @@ mod tests {
     /// whose largest multiple of the frequency is 5 instead of [`ORDER`].
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
-    fn waves_in_a_sphere_do_not_depend_on_the_resolution() {
+    fn large_waves_in_a_sphere_do_not_depend_on_the_resolution() {
         let contour = sphere();
         let wall = contour.cut(0.5).unwrap();
         let side = Side::new(&contour, &wall).unwrap();

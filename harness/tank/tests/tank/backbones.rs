@@ -40,7 +40,8 @@ fn pair(s: f64, kappa: f64) -> EnergyTerms {
 
 /// Returns the frequency of the slosh mass of `fmu/craft/src/surface.rs` at the slosh angle
 /// `angle`, in planar and in circular motion, divided by the frequency of small motion. The period
-/// of planar motion is an integral over q = a sin t, for which the integrand is periodic.
+/// of planar motion is integrated over the phase t of the displacement a sin t, because this
+/// integrand is periodic and the midpoint rule converges fast.
 fn frequency_ratios(of: &EnergyTerms, angle: f64) -> [f64; 2] {
     let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (of.pair, of.next, of.rotary);
     let a = angle.sin();
@@ -103,10 +104,11 @@ fn at_the_angle_limit_the_model_s_frequency_departs_from_nonlinear_potential_flo
     }
 }
 
-/// Up to the stated limit the frequencies agree within 0.06 % (planar) and 0.11 % (rotary). The
-/// third-order model reaches an error of 0.3 % at smaller angles.
+/// The model with six large-wave coefficients (`EnergyTerms`) agrees with potential flow within
+/// 0.06 % (planar) and 0.11 % (rotary) up to its angle limit. The third-order model reaches an
+/// error of 0.3 % at smaller angles.
 #[test]
-fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
+fn models_with_all_large_wave_coefficients_have_the_frequencies_of_nonlinear_potential_flow() {
     let mut compared = 0;
     for (fill, rows) in backbones() {
         let Some(known) = energy_terms(fill) else { continue };
@@ -129,10 +131,12 @@ fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
     assert!(compared > 150, "{compared}");
 }
 
-/// At h/R = 0.8 and 1 the interpolated s and kappa give frequencies within 0.3 % of nonlinear
-/// potential flow up to 16 degrees. At h/R = 1 the planar branch splits near 2 to 3.5 degrees.
+/// Near poles of the third-order theory the large-wave coefficients s and kappa are interpolated
+/// over the depth. At h/R = 0.8 and 1 the interpolated coefficients give frequencies within 0.3 %
+/// of nonlinear potential flow up to 16 degrees. At h/R = 1 the planar branch splits near 2 to 3.5
+/// degrees.
 #[test]
-fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
+fn large_wave_coefficients_interpolated_across_a_pole_are_close_to_nonlinear_potential_flow() {
     let is_bridged = |fill: f64| fill > BRIDGED[0] && fill < BRIDGED[1];
     let all: Vec<_> = backbones().into_iter().filter(|(fill, _)| is_bridged(*fill)).collect();
     assert_eq!(all.len(), 2);
@@ -160,7 +164,7 @@ fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
 /// series breaks down. In cylinders, whose true limits are known, the estimate must be smaller than
 /// the true limit.
 #[test]
-fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
+fn the_angle_limit_estimated_for_other_tanks_is_conservative_in_cylinders() {
     let mut smallest = f64::INFINITY;
     for (fill, _) in backbones().into_iter().filter(|(fill, _)| !(0.7..=1.2).contains(fill)) {
         let limit_of = |bottom: f64| {

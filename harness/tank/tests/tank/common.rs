@@ -5,8 +5,9 @@ use serde_json::Value;
 
 /// Reads `tanks.json`, 23 tanks that an independent program has solved (linear potential flow, five
 /// modes; the box in closed form). `error` of a tank is the largest difference between two
-/// discretisations of that program, 1e-12 to 1e-10; `error_beta` is the largest difference of beta.
-/// Values have twelve digits, wave_peak nine.
+/// discretisations of that program, 1e-12 to 1e-10; `error_beta` is this difference for `beta`, the
+/// quotient of integrals that determines the damping by the laminar layer. Values have twelve
+/// digits, wave_peak nine.
 pub fn reference() -> Vec<Value> {
     let all: Value = serde_json::from_str(include_str!("../tanks.json")).unwrap();
     all["cases"].as_array().unwrap().clone()

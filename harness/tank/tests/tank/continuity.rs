@@ -92,7 +92,7 @@ fn the_damping_ratio_has_no_step_at_500_fills() {
 /// falls below the damping of the laminar layer.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn damping_has_no_step_where_a_wall_leaves_a_shape() {
+fn damping_has_no_step_where_a_wall_stops_being_a_measured_shape() {
     for (name, levels) in [
         ("sphere", &[0.03][..]),
         ("capsule", &[0.3, 0.7]),
@@ -138,9 +138,11 @@ fn a_capsule_has_the_damping_factor_of_its_dome_on_the_area_of_the_dome() {
     }
 }
 
-/// Both estimates are the correlation of the shape, and 1.45 times the laminar layer.
+/// A wall that has a measured shape only in part has two estimates of its damping: the correlation
+/// of that shape, and 1.45 times the damping of the laminar layer, which is used for unmeasured
+/// shapes.
 #[test]
-fn damping_of_a_mixed_wall_lies_between_both_estimates_and_its_interval_contains_them() {
+fn damping_of_a_partly_measured_wall_lies_between_the_measured_and_the_general_estimate() {
     let walls = [
         ("capsule", [0.32, 0.5, 0.9]),
         ("dish", [0.07, 0.2, 0.4]),

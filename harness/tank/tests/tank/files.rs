@@ -321,7 +321,7 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
 /// Heights of a shape count from its lowest point, heights of a contour from the zero of its
 /// drawing.
 #[test]
-fn table_and_parameter_file_state_from_where_heights_count() {
+fn table_and_parameter_file_state_the_zero_of_their_heights() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
     let drawn = tank("density = 1.0\nprofile = [{ arc = [0, -0.5, 1, -90, 90] }]");
     for (tank, lowest, words) in [

@@ -34,7 +34,7 @@ fn assert_unknown(text: &str, fill: f64, why: &str) {
 /// of small waves, from potential flow without expansion in the steepness. At 8 degrees terms of
 /// the fifth order contribute 3e-4.
 #[test]
-fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
+fn backbone_curves_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     for (fill, planar, circular) in [
         (0.1, [(4.0, 0.998962), (8.0, 0.995954)], [(4.0, 1.00091), (6.0, 1.00208)]),
         (0.05, [(4.0, 0.999368), (8.0, 0.997373)], [(4.0, 1.00104), (6.0, 1.00238)]),
@@ -98,10 +98,10 @@ fn third_order_coefficients_depend_only_on_the_shape_of_the_liquid() {
     assert!(capsule.angle_limit < sphere.angle_limit, "{capsule:?}");
 }
 
-/// Coefficients are left out for a ring with inclined walls, for a nearly full sphere, and at
-/// depths with secondary resonances.
+/// Large-wave coefficients are left out for a ring with inclined walls, for a nearly full sphere,
+/// and at depths with secondary resonances.
 #[test]
-fn coefficients_that_are_not_known_are_left_out_with_a_reason() {
+fn unknown_large_wave_coefficients_are_left_out_with_a_reason() {
     assert_unknown(
         "shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }",
         0.3,
@@ -119,7 +119,7 @@ fn coefficients_that_are_not_known_are_left_out_with_a_reason() {
 
 /// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa.
 #[test]
-fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
+fn a_cylinder_has_large_wave_coefficients_and_angle_limits_at_every_depth() {
     let at =
         |fill: f64| coefficients_at("shape = { cylinder = { radius = 1.0, height = 4.0 } }", fill);
     for i in 0..=60 {
@@ -151,7 +151,7 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
 /// forced waves of potential flow. At fills outside the table the limit is an estimate; at h/R =
 /// 1.5 it must be smaller than the 2.6 degrees of the forced waves.
 #[test]
-fn limits_of_a_sphere_follow_from_its_forced_waves() {
+fn angle_limits_of_a_sphere_follow_from_its_forced_waves() {
     let at = |fill: f64| coefficients_at("shape = { sphere = { radius = 1.0 } }", fill);
     for i in 0..=19 {
         let fill = 0.1 + 0.05 * f64::from(i);
@@ -173,7 +173,7 @@ fn limits_of_a_sphere_follow_from_its_forced_waves() {
 /// The FMU's test with forced waves reads its coefficients and limits from a file, and they must be
 /// those that `hubslosh tank` writes.
 #[test]
-fn the_forced_waves_test_uses_the_coefficients_and_limits_of_parameter_files() {
+fn the_test_of_forced_waves_uses_the_coefficients_and_limits_of_parameter_files() {
     let rows = include_str!("../../../../fmu/craft/tests/craft/forced_waves.csv").lines().skip(1);
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     let mut compared = Vec::new();
@@ -289,7 +289,7 @@ fn parameter_files_have_an_angle_limit_for_every_shape_and_fill() {
 /// Between h/R 1.1 and 1.25 the third-order theory has poles, so that the frequency of the liquid
 /// changes more strongly with the amplitude.
 #[test]
-fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
+fn near_poles_of_third_order_theory_a_pendulum_has_a_small_angle_limit() {
     let at = |fill: f64| amplitude_dependence_at("shape = { sphere = { radius = 1.0 } }", fill);
     let neighbours = [1.07, 1.3].map(|fill| at(fill).pendulum_limit.unwrap().to_degrees());
     let mut refused = 0;
@@ -310,7 +310,7 @@ fn a_pendulum_has_a_small_range_near_the_poles_of_a_sphere() {
 /// Coefficients of the wave's energy are known for h/R from 0.25 to 0.7. Files for HubSlosh and for
 /// draining tanks contain the third-order coefficients.
 #[test]
-fn parameter_files_have_the_energy_terms_where_they_are_known() {
+fn parameter_files_have_all_large_wave_coefficients_where_they_are_known() {
     let cylinder = tank("density = 1000.0\nshape = { cylinder = { radius = 0.1, height = 2.0 } }");
     let coefficients = |set: &ParameterSet| -> Vec<(String, f64)> {
         let number = |(name, value): &(String, Value)| match value {
@@ -363,7 +363,7 @@ fn parameter_files_have_the_energy_terms_where_they_are_known() {
 /// For small waves the coefficients of the table must give the frequency of third-order theory,
 /// which another method computes.
 #[test]
-fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
+fn spheres_have_all_large_wave_coefficients_at_the_fills_of_their_table() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.4 } }");
     let at = |fill: f64| {
         amplitude_dependence(&sphere, &sphere.solve(fill * 0.4, 1).unwrap()).mode.unwrap()
@@ -511,7 +511,7 @@ const WATER: Liquid =
 /// Only mode 1 has coefficients (in a box: the first mode along each length). Files for HubSlosh
 /// contain none for a box.
 #[test]
-fn parameter_files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
+fn parameter_files_for_the_fmus_have_large_wave_coefficients_of_the_first_mode() {
     let cylinder =
         tank("density = 1000.0\nshape = { cylinder = { radius = 0.0815, height = 0.2 } }");
     let data = cylinder.solve(0.1, 3).unwrap();
@@ -543,7 +543,7 @@ fn parameter_files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
 }
 
 #[test]
-fn parameter_files_without_coefficients_state_the_reason() {
+fn parameter_files_without_large_wave_coefficients_state_the_reason() {
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
     let low = Liquid { gravity: 0.01, sigma: Some(0.07), ..WATER };
     for (text, fill, liquid, why) in [
@@ -574,7 +574,7 @@ fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
 }
 
 #[test]
-fn a_draining_tank_has_the_coefficients_of_every_fill() {
+fn a_draining_tank_has_large_wave_coefficients_at_every_fill() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let table = sweep(&sphere, &[0.1, 0.2, 0.4], 1).unwrap();
     let set = fill_table::parameters(&sphere, &table, None, Target::SloshTank, WATER).unwrap();
@@ -595,7 +595,7 @@ fn a_draining_tank_has_the_coefficients_of_every_fill() {
 /// In the sphere the third order has poles from 0.556 to 0.63 m, and the coefficients are not known
 /// above 0.85 m.
 #[test]
-fn a_fill_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
+fn a_fill_table_bounds_unknown_large_wave_coefficients_by_neighbours_and_names_the_fills() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let fills = [0.5, 0.56, 0.6, 0.7, 0.8, 0.88, 0.9];
     let table = sweep(&sphere, &fills, 1).unwrap();
@@ -626,9 +626,10 @@ fn a_fill_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fi
     assert_eq!(set.notes.iter().filter(unknown).count(), 4);
 }
 
-/// A torus has no coefficients at any fill, and the sphere has them at only one of the two fills.
+/// A torus has no large-wave coefficients at any fill, and the sphere has them at only one of the
+/// two tested fills.
 #[test]
-fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
+fn a_fill_table_with_fewer_than_two_known_large_wave_coefficients_uses_pendulums() {
     for (shape, fills, why) in [
         ("torus = { ring_radius = 1.0, tube_radius = 0.3 }", [0.2, 0.3], "ring of liquid"),
         ("sphere = { radius = 0.1 }", [0.112, 0.14], "mode (2,2)"),

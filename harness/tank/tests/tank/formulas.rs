@@ -11,8 +11,9 @@ fn laminar(mode: &Mode, nu: f64, g: f64) -> f64 {
     damping::laminar(mode.beta, nu, (g * mode.lambda).sqrt())
 }
 
-/// The factor tanh(1.84 x)^(-1/4) of Stephens's formula comes from the frequency in the layer's
-/// damping. Its rounded 1.84 instead of 1.8412 makes a difference of 0.2 %.
+/// Stephens's formula for the depth x = h/R contains the factor tanh(1.84 x)^(-1/4), because the
+/// damping of a laminar layer depends on the frequency in this way. The rounded 1.84 instead of
+/// 1.8412 makes a difference of 0.2 %.
 #[test]
 fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     for fill in [0.02, 0.05, 0.0815, 0.15, 0.25] {
@@ -22,8 +23,8 @@ fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     }
 }
 
-/// The ratio of the two damping ratios is 1.39 to 1.54 from h/R = 0.5 on, but only 0.90 at h/R =
-/// 0.2.
+/// The damping ratio by the formula divided by the damping ratio of the laminar layer is 1.39 to
+/// 1.54 from h/R = 0.5 on, but only 0.90 at h/R = 0.2.
 #[test]
 fn mikishev_and_dorozhkin_s_formula_is_below_the_laminar_layer_in_shallow_liquid() {
     for (x, least, most) in
@@ -155,10 +156,13 @@ fn real(set: &ParameterSet, name: &str) -> f64 {
     }
 }
 
-/// The file for the FMU gives omega_1^2 = g/l + k/m. Every value of the table must agree to its
-/// last digit. The liquid is so deep that tanh(20 xi) is 1.
+/// The program has a table of frequencies of a deep cylinder with a curved meniscus, as omega_1^2
+/// rho R^3/sigma for each Bond number and contact angle. A parameter file for the FMU gives
+/// omega_1^2 = g/l + k/m, with the stiffness k, the mass m and the length l of the first mode; all
+/// digits of the table must agree. The liquid is 20 radii deep, so that it counts as infinitely
+/// deep.
 #[test]
-fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
+fn parameters_of_a_deep_cylinder_give_every_frequency_of_the_meniscus_table() {
     let sigma = 0.072;
     for (bond, row) in MENISCUS {
         for (angle, expected) in ANGLES.into_iter().zip(row) {
@@ -175,11 +179,12 @@ fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
     }
 }
 
-/// At 90 degrees the result is bit-identical to the flat surface. For large Bond numbers the
-/// contribution to rho R^3 omega^2/sigma is xi^3 - 2 xi^2 cos(angle). Below about 23 degrees it is
-/// negative, and the file has 0 instead and a warning.
+/// At a contact angle of 90 degrees the stiffness is bit-identical to the stiffness of a flat
+/// surface. For large Bond numbers its contribution to rho R^3 omega^2/sigma is xi^3 - 2 xi^2
+/// cos(angle), with xi = 1.841. Below a contact angle of about 23 degrees this is negative, so that
+/// the file contains 0 and a warning.
 #[test]
-fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
+fn capillary_stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     let (xi, sigma) = (1.841_183_781_340_659_3f64, 0.072);
     let k = |set: &ParameterSet| real(set, "slosh.table.k[1]");
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 3 } }";
@@ -208,8 +213,9 @@ fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     assert!(!none.warnings.iter().any(told), "0 is allowed: {:?}", none.warnings);
 }
 
-/// The frequency rises steadily with the Bond number and with the angle, and the shift approaches
-/// its known limit for large Bond numbers.
+/// The frequency must increase monotonically with the Bond number and with the contact angle. For
+/// large Bond numbers and the contact angle 0, rho R^3 omega^2/sigma must be 6.76 lower than with a
+/// flat surface.
 #[test]
 fn the_frequency_with_a_curved_meniscus_is_smooth_between_the_values_of_the_table() {
     let xi = 1.841_183_781_340_659_3f64;
@@ -422,7 +428,8 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
     assert!(outside.modes[0].zeta < correlation && correlation < outside.modes[0].interval[1]);
 }
 
-/// At a Bond number of 45 the interval ends at the result of drop-tower tests.
+/// At a Bond number of 45 the interval of the damping ratio extends to the higher damping that
+/// drop-tower tests found.
 #[test]
 fn damping_follows_from_capillarity_without_gravity() {
     let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
@@ -496,7 +503,8 @@ fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
 }
 
 /// The table holds for deep liquid. The warning appears if the surface is noticeably curved (low
-/// Bond number) and the liquid is less than a radius deep. In this test Bo = 100 g.
+/// Bond number) and the liquid is less than a radius deep. In this test the Bond number is 100
+/// times the specific force in m/s².
 #[test]
 fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
     let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", 0.2, 1).modes[0];
@@ -533,7 +541,8 @@ fn a_curved_meniscus_gives_a_warning_outside_the_ranges_of_its_table() {
     assert!((added(-0.1) / added(0.0) - 1.0).abs() < 1e-12);
 }
 
-/// The tank is a half-full sphere with Bo = 1e4 g, for which only a first-order formula exists.
+/// The tank is a half-full sphere, for which only a first-order formula exists. Its Bond number is
+/// 1e4 times the specific force in m/s².
 #[test]
 fn a_frequency_is_unknown_if_capillarity_adds_more_than_a_tenth_of_gravity() {
     let half = &solve("shape = { sphere = { radius = 1.0 } }", 1.0, 1).modes[0];
@@ -610,8 +619,8 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     }
 }
 
-/// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere
-/// through bottom and contact line is up to a fifth of the difference between height and width.
+/// The drawn tank is a spheroid that differs from a sphere by a relative 0.8e-6 or 2e-5 in its
+/// width. Only the first is recognised as a sphere.
 #[test]
 fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

@@ -3,8 +3,9 @@
 use crate::common::{reference, solve, tank, toml};
 use hubslosh_tank::closed_form;
 
-/// The wall does no work on the liquid if the sphere rotates about its centre. The height of a mode
-/// is m h divided by m, so that its error is 1e-10 divided by the mass ratio.
+/// The wall does no work on the liquid if the sphere rotates about its centre. Heights are computed
+/// as first moment divided by mass, so that their error is 1e-10 divided by the ratio of modal mass
+/// to liquid mass.
 #[test]
 fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     for i in 1..20 {
@@ -65,8 +66,9 @@ fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     assert!((data.modes[0].m / (1000.0 * a.powi(3)) - 1.933).abs() < 0.01);
 }
 
-/// A shallow dish leaves almost no inertia after five modes, so that the computed I_0 consists of
-/// its error. The fixed mass is at the sphere's centre, 7 to 220 R above the liquid.
+/// A shallow dish leaves almost no inertia for the fixed mass after five modes, so that the
+/// computed inertia consists of its numerical error. The fixed mass is at the sphere's centre, 7 to
+/// 220 surface radii above the liquid.
 #[test]
 fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     for fill in [1e-2, 1e-3, 1e-4, 1e-5] {
@@ -80,9 +82,9 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     }
 }
 
-/// The sums run over 20,000 modes, whose remainder is 50^-3 of the remainder after 400 modes. In
-/// shallow liquid a sum of 400 modes is wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for the
-/// annulus.
+/// The expected inertias are sums over 20,000 modes, whose remainder is 50^3 times as small as the
+/// remainder after 400 modes. In shallow liquid a sum of 400 modes has an error of 3e-10 m R^2 for
+/// the cylinder and of 7e-9 m R^2 for the annulus, with the mass m and the radius R.
 #[test]
 fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     let xi = closed_form::zeros_of_j1_slope(20_000);
@@ -109,8 +111,10 @@ fn closed_forms_have_their_stated_error_in_shallow_liquid() {
     assert!(off.abs() < 1e-11, "annulus: {off}");
 }
 
-/// I_0 = I_eff - m_0 h_0^2 - sum m h^2 is a difference, so that its error is at least the error of
-/// I_eff and grows with the distance of the fixed mass from the centre of mass.
+/// The inertia of the fixed mass is the effective inertia of all liquid minus the parts m h^2 of
+/// the fixed mass and of every mode at its height h. The error of this difference is at least the
+/// error of the effective inertia, and grows with the distance of the fixed mass from the centre of
+/// mass.
 #[test]
 fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     for (shape, fill) in [
@@ -126,8 +130,8 @@ fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     }
 }
 
-/// The exact solution is phi_1 = r z with lambda_1 = 1/h, 3/4 of the liquid's mass at 0.6 h, the
-/// hinge at 1.6 h, and the wave h.
+/// The exact solution is the velocity potential r z with the eigenvalue 1/h. Its mode has 3/4 of
+/// the liquid's mass at the height 0.6 h, the hinge at 1.6 h, and the wave height h.
 #[test]
 fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     for h in [0.3, 1.2] {
@@ -204,8 +208,10 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
     }
 }
 
-/// The sums are all modal masses and the limits of the inertia. The sum of 1/(xi^2 - 1) is 1/2;
-/// after the first 400 zeros xi the remainder is 1/(400 pi^2).
+/// The modal masses of shallow liquid in a cylinder are proportional to 1/(xi^2 - 1), where the
+/// numbers xi are the zeros of J_1'. The sum of these terms is 1/2; after the first 400 zeros the
+/// remainder is 1/(400 pi^2). The inertia of all modes has known limits for a thin disc and for a
+/// long rod of liquid.
 #[test]
 fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     let xi = closed_form::zeros_of_j1_slope(400);
@@ -237,7 +243,7 @@ fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
 /// The FMU's formulas are m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2 xi
 /// h/d)) and a wave of 2 R/(xi^2 - 1) per angle.
 #[test]
-fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
+fn modes_of_an_upright_cylinder_equal_the_formulas_of_the_fmu() {
     let (d, h) = (0.163, 0.1);
     let data = solve("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", h, 3);
     for (mode, xi) in data.modes.iter().zip([
@@ -414,7 +420,8 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     }
 }
 
-/// Lambda times the length along the waves is k L tanh(k h) with k L = pi, 3 pi, ….
+/// With the wave number k of a mode and the length L of the box along its waves, the expected
+/// eigenvalue times L is k L tanh(k h), with k L = pi, 3 pi, ….
 #[test]
 fn each_axis_of_a_box_has_the_frequencies_of_its_length() {
     let data = closed_form::rectangular(0.8, 0.5, 0.2, 1000.0, 2);

@@ -41,7 +41,8 @@ fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }
 
-/// Only the numbers at the axes differ.
+/// Two drawings of a tank and of the same tank scaled by a factor differ only in the numbers at the
+/// axes.
 #[test]
 fn the_picture_of_a_scaled_tank_has_identical_lines() {
     let drawn = |factor: f64| {
@@ -118,8 +119,9 @@ fn points(path: &str) -> Vec<[f64; 2]> {
     path.split(['M', 'L']).skip(1).map(place).collect()
 }
 
-/// The exact area is relative to the squared distance from the axis to the tank's wall; for a
-/// cylinder it is fill over radius. The tolerance is a hundredth of a pixel of some hundred pixels.
+/// Areas are divided by the squared distance from the axis to the tank's wall, so that they do not
+/// depend on the scale of the drawing; for example, a cylinder must have the area fill/radius. The
+/// tolerance is a hundredth of a pixel of some hundred pixels.
 #[test]
 fn the_drawn_liquid_has_the_area_of_the_wetted_section() {
     for (text, fill, area) in [

@@ -5,8 +5,9 @@ use hubslosh_tank::{Mode, Rest};
 use serde_json::Value;
 
 /// Returns the largest deviations of the modes, from number `first` on, and of the fixed mass from
-/// the reference `case`: of lambda and l (relative), of masses (relative to `m_liq`), of moments m
-/// H (to m_liq r), of inertias (to m_liq r^2), and of waves (to `r`).
+/// the reference `case`, in five kinds: eigenvalues and pendulum lengths (relative), masses
+/// (divided by `m_liq`), first moments (by m_liq r), inertias (by m_liq r^2), and wave heights (by
+/// `r`).
 fn deviation(
     case: &Value,
     modes: &[Mode],

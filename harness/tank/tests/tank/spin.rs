@@ -195,7 +195,8 @@ fn spin_is_refused_for_boxes_full_tanks_and_invalid_rates() {
     assert!(spin(&sphere, &full, 1.0, 5.0, None).unwrap_err().to_string().contains("full"));
 }
 
-/// The spin decay is sqrt(nu Omega)/h from the floor; the gyroscopic coefficient of an upright
+/// Friction at the floor gives the decay rate of the spin sqrt(nu Omega)/h, with the kinematic
+/// viscosity nu, the spin rate Omega and the depth h. The gyroscopic coefficient of an upright
 /// cylinder at h/R = 1 is 0.496.
 #[test]
 fn parameter_sets_contain_the_spin_of_the_liquid() {

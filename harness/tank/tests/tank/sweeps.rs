@@ -114,7 +114,8 @@ fn every_impossible_fill_of_a_sweep_is_reported() {
     assert!(sweep(&tank, &[], 2).is_err());
 }
 
-/// Compares the FMUs' interpolation between the placed points with solutions at eight other fills.
+/// The FMUs interpolate between the twelve fills of a table. At eight other fills the interpolated
+/// values are compared with solutions for these fills.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_fill_table_of_twelve_points_is_accurate_enough_for_tanks_of_many_shapes() {

@@ -99,7 +99,8 @@ fn boxes_have_the_third_order_waves_of_tadjbakhsh_and_keller() {
 
 /// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel:
 /// its planar wave equals the wave in a box of length pi R, and its circular wave is Stokes's wave
-/// with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
+/// with the wave number k, the amplitude a and omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8
+/// T^4)], where T = tanh(k h).
 #[test]
 fn annular_tanks_have_the_limits_of_a_circle_and_of_a_channel() {
     let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
