@@ -28,7 +28,7 @@ def kept(name: str) -> dict[str, dict[str, str]]:
     return {row["case"]: row for row in compare.read_scores() if row["implementation"] == name}
 
 
-def test_hubslosh_has_the_scores_of_the_table(
+def test_hubslosh_has_the_scores_in_the_table_of_the_benchmark(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The results of all ten cases have the scores of the table, to one digit."""
@@ -53,7 +53,9 @@ def test_the_table_in_the_readme_equals_the_stored_scores() -> None:
 
 
 @pytest.mark.parametrize("case", ["linearisation", "backbones"])
-def test_a_plain_script_has_the_scores_of_the_table(case: str, tmp_path: Path) -> None:
+def test_a_plain_script_has_the_scores_in_the_table_of_the_benchmark(
+    case: str, tmp_path: Path
+) -> None:
     """The script uses SciPy; cases that take long are left out."""
     cases.write(tmp_path, case, plain.CASES[case]())
     found = score.score(case, tmp_path / case / "results.csv")
@@ -64,7 +66,7 @@ def test_a_plain_script_has_the_scores_of_the_table(case: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("case", list(score.specification()))
-def test_a_page_has_every_number_of_its_parameters_and_inputs(case: str) -> None:
+def test_the_page_of_a_benchmark_case_contains_all_its_parameters_and_inputs(case: str) -> None:
     """The page repeats the numbers of the files, and names every column with its unit."""
     page = BENCHMARK.joinpath(case, "page.md").read_text(encoding="utf-8")
     parameters = BENCHMARK / case / "parameters.toml"

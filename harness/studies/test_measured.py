@@ -17,7 +17,7 @@ def built(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("built")
-def test_the_page_equals_the_stored_results() -> None:
+def test_the_page_of_measured_comparisons_equals_the_stored_results() -> None:
     """Page, README and verification state how many of the stored comparisons pass."""
     rows = measured.read_results()
     assert measured.PAGE.read_text(encoding="utf-8") == measured.page(rows)
@@ -28,7 +28,7 @@ def test_the_page_equals_the_stored_results() -> None:
 
 @pytest.mark.usefixtures("built")
 @pytest.mark.parametrize("name", measured.QUICK)
-def test_the_comparisons_reproduce_the_stored_values_and_pictures(name: str) -> None:
+def test_comparisons_with_measurements_reproduce_the_stored_values_and_pictures(name: str) -> None:
     """The stored values are reproduced to 1e-4, and the pictures to 0.2 px."""
     rows, drawing = measured.EXPERIMENTS[name]()
     kept = {(row.experiment, row.quantity): row for row in measured.read_results()}

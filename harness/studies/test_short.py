@@ -138,7 +138,7 @@ def test_the_tilt_of_deeper_tanks_lowers_the_frequency_as_the_book_says() -> Non
 @pytest.mark.parametrize(
     "case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "noise")]
 )
-def test_the_rows_on_damping_of_the_bench_are_reproduced(
+def test_two_rows_on_the_damping_of_the_bench_in_the_book_are_reproduced(
     case, fmu: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two simulated rows equal the rows of book/damping.md in all printed digits."""
@@ -242,7 +242,7 @@ def test_at_least_17_of_20_intervals_of_a_sticking_hub_contain_the_true_value(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a plant for Linux")
 @pytest.mark.parametrize("liquid", foreign_plants.LIQUIDS)
-def test_the_foreign_plant_without_effects_equals_hubslosh(
+def test_an_independent_simulator_without_additional_effects_moves_like_hubslosh(
     liquid: str, fmu: Path, tmp_path: Path
 ) -> None:
     """The second simulator and HubSlosh agree to 1e-7 of the largest rate, also with stops.

@@ -202,7 +202,9 @@ def test_the_simulated_loop_becomes_unstable_at_the_delay_margin(fmu: Path) -> N
     assert last[0] < 0.9 and last[1] > 1.1, last
 
 
-def test_margins_of_the_spacecraft_name_slosh(spacecraft: Path) -> None:
+def test_margins_of_a_spacecraft_name_the_tanks_whose_slosh_is_near_a_crossing(
+    spacecraft: Path,
+) -> None:
     """The crossings near slosh frequencies name both tanks and belong to the torque about z.
 
     About z the liquid moves because the tanks are off the axis.
@@ -268,7 +270,9 @@ def test_errors_of_a_loop_are_reported_in_words(fmu: Path, spacecraft: Path) -> 
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.06, 0.1])
-def test_the_closed_loop_gain_is_the_simulated_loop(fmu: Path, delay: float) -> None:
+def test_the_closed_loop_of_the_loop_gain_predicts_the_simulated_motion(
+    fmu: Path, delay: float
+) -> None:
     """The closed loop of `Loop.gain` predicts angle and rate of the simulation over 100 cycles.
 
     One measurement, the acceleration, depends directly on the torque and is read before the new

@@ -96,7 +96,9 @@ def test_the_mat_file_contains_the_linear_model(craft: Craft, tmp_path: Path) ->
 
 
 @pytest.mark.octave
-def test_octave_runs_the_script_up_to_simulink(craft: Craft, tmp_path: Path) -> None:
+def test_octave_runs_the_exported_script_up_to_the_simulink_commands(
+    craft: Craft, tmp_path: Path
+) -> None:
     """Octave reads the matrices and finds each port of the script among the FMU's variables.
 
     The rest of the script needs Simulink.

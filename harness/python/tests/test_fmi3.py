@@ -154,7 +154,7 @@ def test_a_linear_model_is_bit_identical_to_fmi_2(fmu: Path, model: str) -> None
 
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", INPUTS)
-def test_one_compiled_call_is_bit_identical_to_single_calls(
+def test_a_run_in_one_compiled_call_is_bit_identical_to_single_calls(
     fmu: Path, model: str, hold: bool
 ) -> None:
     """A run in one compiled call equals a run that calls each function of the FMU from Python.

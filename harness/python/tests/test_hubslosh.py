@@ -36,7 +36,7 @@ def test_the_module_runs_the_commands_of_the_program(
     assert np.array_equal(pd.read_csv(tmp_path / "answer.csv")["omega"], ours["omega"])
 
 
-def test_removed_names_say_what_to_use() -> None:
+def test_the_error_about_a_removed_name_names_its_replacement() -> None:
     """The error of a removed name contains its replacement."""
     with pytest.raises(AttributeError, match=r"'drive'; use hubslosh\.simulate instead"):
         _ = hubslosh.drive

@@ -89,7 +89,9 @@ def sweep(fmu: Path) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("hold", [False, True])
-def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bool) -> None:
+def test_the_frequency_response_estimated_from_a_sweep_equals_the_linear_model(
+    fmu: Path, sweep: pd.DataFrame, hold: bool
+) -> None:
     """Antiresonance and resonance agree to one line of the spectrum, 1/900 Hz.
 
     Between them, the estimate has an error of some thousandths, because the time history ends
@@ -130,7 +132,9 @@ def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bo
         (lambda d: d, {"band": (20, 21)}, "no power between 20 and 21 Hz"),
     ],
 )
-def test_impossible_estimates_raise_errors(sweep, change, arguments: dict, sentence: str) -> None:
+def test_frequency_responses_that_cannot_be_estimated_raise_errors(
+    sweep, change, arguments: dict, sentence: str
+) -> None:
     """Each error is one sentence that names the reason."""
     with pytest.raises(FmuError) as told:
         frequency_response(change(sweep), **arguments)

@@ -136,7 +136,9 @@ def test_the_name_of_a_vector_stands_for_all_its_components(fmu: Path) -> None:
 
 
 @pytest.mark.parametrize("is_linear", [True, False])
-def test_a_command_is_added_to_the_constant_of_its_input(fmu: Path, *, is_linear: bool) -> None:
+def test_a_command_of_the_controller_is_added_to_the_constant_value_of_its_input(
+    fmu: Path, *, is_linear: bool
+) -> None:
     """A run with the recorded inputs as histories is bit-identical, also before the first command.
 
     The case is a gimballed engine: force[1], force[2] and torque[3] are commands, and the
@@ -159,7 +161,7 @@ def test_a_command_is_added_to_the_constant_of_its_input(fmu: Path, *, is_linear
     assert run["omega[2]"].abs().max() > 0.005
 
 
-def test_a_history_replaces_the_constant_of_a_loop(fmu: Path) -> None:
+def test_an_input_history_replaces_the_constant_value_of_the_input_in_a_loop(fmu: Path) -> None:
     """A throttled thrust replaces the constant thrust, unless both are given in one call."""
     craft = fmu.with_name("Spacecraft.fmu")
     start = {"force[3]": 400.0, "init.omega[2]": 0.01}

@@ -227,7 +227,7 @@ def by_pencils(gain: LinearModel) -> list[tuple[str, float]]:
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
+def test_crossings_of_random_loops_equal_those_from_matrix_pencils(seed: int) -> None:
     """A slower method, eigenvalues of matrix pencils, finds the same crossings to 1e-9.
 
     Random cases have one to three loops, lightly and heavily damped modes, integrators and delays.

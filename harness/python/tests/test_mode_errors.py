@@ -44,7 +44,7 @@ def test_mode_responses_equal_the_linearised_fmu(fmu: Path) -> None:
     np.testing.assert_allclose(force / (arm * acceleration), mine, rtol=1e-9)
 
 
-def test_four_modes_have_an_error_of_one_per_cent_and_one_mode_suffices_in_the_band(
+def test_with_four_slosh_modes_the_impulse_response_has_an_error_of_one_per_cent(
     fmu: Path,
 ) -> None:
     """As in figure 4.4 of the thesis, four undamped modes deviate by less than 1 %.

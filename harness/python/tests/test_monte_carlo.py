@@ -167,7 +167,7 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
         assert part in str(error.value), part
 
 
-def test_a_share_is_a_range_about_the_nominal_value(tmp_path: Path) -> None:
+def test_a_range_in_per_cent_is_relative_to_the_nominal_value(tmp_path: Path) -> None:
     """A share gives the same draws and the same stored study as (low, high).
 
     A share needs a nominal value.

@@ -268,7 +268,9 @@ def test_the_cost_of_a_worst_case_search_is_limited(craft: Craft, largest: objec
         model.worst_case(craft.loop(GAINS, PERIOD, "50%"), largest=largest)
 
 
-def test_a_quantity_that_cannot_be_given_names_the_parameter_to_leave_out(craft: Craft) -> None:
+def test_the_error_about_a_computed_frequency_names_the_parameter_to_leave_out(
+    craft: Craft,
+) -> None:
     """The frequency follows from the fill table for ``mass_flow``, or from the diameter."""
     frequency, given = ModeQuantity(1, "frequency", 1), craft.parameters("50%")
     drains = Modes(craft.model, given | {"tank[1].fill.points": 3}).problem(frequency)

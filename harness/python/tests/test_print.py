@@ -109,7 +109,7 @@ def test_every_public_object_prints_in_20_lines(made: dict[str, Callable[[], Any
             assert max(len(line) for line in text.splitlines()) <= 300, f"{name}:\n{text}"
 
 
-def test_printed_margins_of_a_loop_are_the_smallest(made: dict[str, Callable]) -> None:
+def test_a_printed_loop_shows_its_smallest_margins(made: dict[str, Callable]) -> None:
     """The text has the verdict, the margins, the worst crossings, and the number left out."""
     found = made["Margins"]()
     text = str(found)

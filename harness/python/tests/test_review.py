@@ -131,7 +131,7 @@ def test_the_linear_models_of_all_fills_have_equal_states_and_the_responses_of_t
         assert (model.inputs, model.outputs) == (plant.inputs, plant.outputs)
 
 
-def test_bands_contain_all_points_and_points_include_the_ends_of_each_range(craft: Craft) -> None:
+def test_bands_of_a_review_contain_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
     """Points are nominal points, random draws, and both ends of each range at each fill.
 
     Four ranges at two fills give 16 ends.
@@ -194,7 +194,7 @@ def test_the_search_finds_the_worst_corner_of_the_ranges(craft: Craft) -> None:
 
 
 @pytest.mark.parametrize(("delay", "mass"), [(0.03, 2.0), (0.03, 0.2), (0.06, 0.2)])
-def test_the_simulation_confirms_a_limit_that_is_not_the_slowest_pole(
+def test_simulation_confirms_a_stability_limit_although_slosh_decays_more_slowly(
     craft: Craft, delay: float, mass: float
 ) -> None:
     """A lander with an array at 3 Hz, with the gain at which its array or the delay is critical.
@@ -256,7 +256,7 @@ def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
     assert compared.frequency == pytest.approx(closed_form(craft, "50%")[2], rel=0.02)
 
 
-def test_the_page_begins_with_the_result_and_needs_no_network(
+def test_the_page_of_a_review_begins_with_the_result_and_needs_no_network(
     craft: Craft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every figure has a question as its title, axes with units, and the colours of the page."""
@@ -676,7 +676,9 @@ def test_a_review_that_would_take_hours_is_refused(craft: Craft) -> None:
             craft.review(gains(), **given)
 
 
-def test_thrust_vector_control_is_confirmed_by_the_simulation(craft: Craft) -> None:
+def test_the_worst_case_under_thrust_vector_control_is_confirmed_by_simulation(
+    craft: Craft,
+) -> None:
     """The loop commands the lateral force of a gimballed engine, which is added to the thrust.
 
     A force F across the thrust, at the distance d below the centre of mass, causes the torque d F.

@@ -84,7 +84,7 @@ def shared(quick: set[tuple], *values: list) -> list:
         ["stribeck", "stribeck_smooth"],
     ),
 )
-def test_a_sweep_of_five_minutes_gives_the_same_rate(
+def test_python_and_the_command_give_the_same_rate_in_a_sweep_of_five_minutes(
     fmu: Path, harness: Harness, tmp_path: Path, model: str, friction: str
 ) -> None:
     """Every host sets the same inputs, so that any difference is an error of a host.
@@ -126,7 +126,7 @@ def test_fmpy_and_the_program_agree_over_a_whole_sweep_of_the_thesis(
         assert off[name] <= 1e-9, name
 
 
-def test_a_held_torque_and_a_tolerance_give_the_same_rate(
+def test_python_and_the_command_give_the_same_rate_under_a_held_torque(
     fmu: Path, harness: Harness, tmp_path: Path
 ) -> None:
     """The torque is held between samples; step, tolerance, tank and start are not the defaults."""
@@ -203,7 +203,7 @@ def test_an_input_history_acts_the_same_in_python_and_on_the_command_line(
     ["sine:frequency=50,duration=2", "pulse:start=0.005,width=0.01,duration=2",
      "lin-sweep:f0=1,f1=60,duration=2", "sine-noise:duration=2"],
 )  # fmt: skip
-def test_the_table_of_a_profile_acts_as_the_profile(
+def test_a_profile_written_as_a_table_gives_the_run_of_the_profile(
     fmu: Path, harness: Harness, request: pytest.FixtureRequest, tmp_path: Path,
     profile: str, step: str,
 ) -> None:  # fmt: skip

@@ -86,7 +86,7 @@ def test_a_held_torque_gives_results_that_are_bit_identical_to_fmpy(fmu: Path) -
 
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", ["linear", "spherical"])
-def test_one_compiled_call_is_bit_identical_to_single_calls(
+def test_a_run_in_one_compiled_call_is_bit_identical_to_single_calls(
     fmu: Path, model: str, hold: bool
 ) -> None:
     """Three inputs are held or linear; outputs of all types are listed in a mixed order."""

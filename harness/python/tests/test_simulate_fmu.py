@@ -81,7 +81,7 @@ def test_held_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
     assert difference(simulate(fmu, input=table(TIME, tau(TIME))), rate) <= 1e-9
 
 
-def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
+def test_an_input_that_is_held_half_a_step_early_has_no_delay(fmu: Path) -> None:
     """The method of harness/hosts/fmpy_example.py leaves only errors of second order.
 
     An input that FMPy holds over steps of length H acts half a step late, which at the frequency ω
@@ -98,7 +98,7 @@ def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
     assert difference(early, exact) < 0.03
 
 
-def test_fmpy_still_allocates_nine_derivatives(fmu: Path) -> None:
+def test_fmpy_still_accepts_input_derivatives_only_for_nine_inputs(fmu: Path) -> None:
     """In fmpy 0.3.32, the latest version, ``set_input_derivatives`` needs exactly nine inputs.
 
     If this test fails, fmpy has been repaired: remove the fixture `repaired`, and recommend

@@ -166,7 +166,7 @@ def test_the_worst_case_of_a_rigid_spinner_equals_a_closed_form_of_its_nutation(
     assert found.size <= worst.size < 1.05 * found.size
 
 
-def test_the_worst_case_of_a_spinner_with_slosh_is_the_limit_of_a_new_loop(spinner: Craft) -> None:
+def test_the_worst_case_of_a_spinner_with_slosh_is_at_the_stability_limit(spinner: Craft) -> None:
     """A new loop is stable at a Δ just below the worst case, and unstable just above it.
 
     The certificate proves stability up to a size that is at most 5 % smaller.

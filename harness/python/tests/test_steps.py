@@ -28,7 +28,7 @@ def communication_points(cut: str) -> np.ndarray:
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
 @pytest.mark.parametrize("friction", ["stribeck", "stribeck_smooth"])
 @pytest.mark.parametrize("model", ["linear", "planar", "spherical", "liquid"])
-def test_20_ms_5_ms_and_random_steps_agree_within_the_tolerance(
+def test_communication_steps_of_20_ms_5_ms_and_random_length_agree_within_the_tolerance(
     fmu: Path, model: str, friction: str, tolerance: float
 ) -> None:
     """A piecewise linear torque acts in three runs with different communication steps.

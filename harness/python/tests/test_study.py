@@ -237,7 +237,7 @@ def test_folders_of_campaigns_and_of_older_studies_are_refused(tmp_path: Path) -
         assert [path for path in folder.rglob("*") if path.is_file()] == [folder / name]
 
 
-def test_a_seed_draws_the_numbers_of_a_plan(
+def test_a_study_draws_the_random_numbers_of_a_campaign_plan_with_equal_seed(
     request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:
     """For each run, `draw` gives exactly the numbers that the program draws for ``[random]``."""

@@ -113,7 +113,7 @@ def test_surface_tension_without_gravity_gives_a_stable_mode(spacecraft: Path) -
         assert difference(model, np.array(delta), spacecraft) < 1e-11
 
 
-def test_a_covariance_gives_its_principal_axes(spacecraft: Path) -> None:
+def test_a_covariance_gives_one_uncertainty_for_each_principal_axis(spacecraft: Path) -> None:
     """Each principal axis ends at ±2 standard deviations, where the quadratic form is 4."""
     names = ["tank[1].frequency[1]", "craft.Jxx"]
     matrix = pd.DataFrame([[4e-6, 1.2e-2], [1.2e-2, 100.0]], names, names)
@@ -184,7 +184,7 @@ def test_parameters_of_an_identification_become_uncertain_parameters(spacecraft:
     assert np.abs(squares - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
+def test_an_identified_pendulum_length_gives_the_frequency_with_its_standard_deviation(
     spacecraft: Path, request: pytest.FixtureRequest
 ) -> None:
     """The frequency is within 4 σ of the true value.
@@ -264,7 +264,7 @@ def test_octave_reads_the_mat_file_of_an_uncertain_model(spacecraft: Path, tmp_p
     assert read["C"] * scale == pytest.approx(mine.C, rel=1e-9, abs=1e-15)
 
 
-def test_models_families_and_parameters_are_written_as_mat(
+def test_models_families_and_parameters_are_written_to_mat_files(
     spacecraft: Path, tmp_path: Path
 ) -> None:
     """Names are cell arrays, and a family of models has a third dimension."""
@@ -359,7 +359,7 @@ def test_bounds_of_mu_enclose_the_worst_case(danger: tuple[UncertainModel, Loop]
     assert upper < 1.05 * worst.mu
 
 
-def test_the_upper_bound_of_one_repeated_parameter_is_exact() -> None:
+def test_the_upper_bound_of_mu_for_one_repeated_parameter_is_exact() -> None:
     """I - δ N is singular if 1/δ is a real eigenvalue of N.
 
     The error of the bound is at most 2 %, because the scaling D must stay away from singular
@@ -383,7 +383,7 @@ def test_a_lower_bound_of_a_parameter_lowers_the_bound_of_mu() -> None:
         assert exact * (1 - 1e-9) <= bound <= 1.006 * exact
 
 
-def test_the_upper_bound_of_two_parameters_is_near_the_true_value() -> None:
+def test_the_upper_bound_of_mu_for_two_parameters_is_near_the_true_value() -> None:
     """The first parameter occurs three times in Δ, the second once.
 
     For each value of the first parameter, the value of the second parameter at which I - N Δ is
@@ -430,7 +430,9 @@ def test_the_error_about_missing_clarabel_says_how_to_install_it(
             call()
 
 
-def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, Loop]) -> None:
+def test_no_random_craft_within_a_stability_certificate_is_unstable(
+    danger: tuple[UncertainModel, Loop],
+) -> None:
     """Random draws and corners are stable; just beyond the worst case the loop is unstable.
 
     Damping ratios stay at 0 or above.
@@ -454,7 +456,7 @@ def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, 
         model.certify(loop, gap=1)
 
 
-def test_many_delta_at_once_have_the_poles_of_single_loops(
+def test_poles_for_many_deltas_at_once_equal_those_of_single_loops(
     danger: tuple[UncertainModel, Loop],
 ) -> None:
     """The search computes many Δ in stacked matrices; delays may have any length."""
@@ -471,7 +473,7 @@ def test_many_delta_at_once_have_the_poles_of_single_loops(
                 assert np.abs(poles - pole).min() < 1e-12
 
 
-def test_a_certificate_reuses_a_given_worst_case(
+def test_a_stability_certificate_reuses_a_given_worst_case(
     danger: tuple[UncertainModel, Loop],
 ) -> None:
     """A worst case of another loop is refused; progress shows sizes, shares and the time left."""
@@ -502,7 +504,7 @@ def test_margins_and_worst_cases_print_the_names_of_the_tanks(spacecraft: Path) 
     assert "NTO.frequency[1] = " in repr(worst)
 
 
-def test_a_failed_certificate_is_reported(
+def test_a_stability_certificate_that_fails_is_reported(
     danger: tuple[UncertainModel, Loop], tmp_path: Path
 ) -> None:
     """One convex problem, the limit in this test, is not enough to certify any size."""

@@ -91,7 +91,7 @@ def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path
         ("SloshTank", {"tank.modes": 3}, 6),
     ],
 )
-def test_default_runs_are_shown(
+def test_a_run_with_default_outputs_of_any_fmu_is_drawn(
     fmu: Path, request, name: str, parameters: dict, angles: int
 ) -> None:
     """The default outputs of every FMU contain what the page needs."""

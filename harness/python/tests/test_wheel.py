@@ -41,7 +41,7 @@ def installed(wheel: Path, tmp_path_factory) -> Path:
 
 
 @pytest.mark.long
-def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
+def test_the_record_of_the_wheel_lists_every_file_with_its_hash(wheel: Path) -> None:
     """The test checks the file RECORD as an installer does."""
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -186,7 +186,7 @@ def test_functions_name_the_optional_package_that_is_missing(
 
 @pytest.mark.long
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
-def test_a_notebook_runs(
+def test_each_notebook_runs_without_an_error(
     wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path
 ) -> None:
     """All cells run in order with the files of the wheel, including their figures."""
