@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damped_resonance_is_found_though_the_band_edge_is_higher() {
+    fn a_damped_resonance_is_found_though_the_response_at_the_band_edge_is_larger() {
         let plant = Linear::bench_10_cm(0.05);
         let response = plant.frequency_response(&logarithmic_grid(BAND, 2000));
         let features = Features::find(&response);

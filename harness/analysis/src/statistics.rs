@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_level_of_a_signal_is_found_without_the_motion_of_a_few_hertz() {
+    fn the_noise_level_of_a_signal_excludes_its_motion_at_a_few_hertz() {
         let mut random = crate::random::Random::new(1, 0);
         let noisy: Vec<f64> = (0..15_000)
             .map(|k| 0.02 * (0.3 * f64::from(k)).sin() + 4e-4 * random.normal())

@@ -319,7 +319,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn a_fit_recovers_the_exact_linear_model() {
+    fn a_transfer_function_fit_recovers_the_exact_linear_model() {
         // Poles and zeros of the 10 cm bench to 15 digits by an independent calculation.
         let plant = Linear::bench_10_cm(0.002_975_693_092_229);
         let measured = plant.frequency_response(&logarithmic_grid(BAND, 2000));
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_simulated_sine_has_the_gain_of_the_response() {
+    fn a_simulated_sine_has_the_gain_of_the_transfer_function() {
         let tf = TransferFunction {
             numerator: [2.0, 0.5, 300.0],
             real_pole: 0.5,
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_recovers_a_free_response_from_the_whole_signal() {
+    fn a_transfer_function_fit_recovers_a_free_response_from_the_whole_signal() {
         // records of 2700 s: a slowly rotating pole pair with a slow real pole, and a pair of equal real poles
         for (pole_damping, real_pole) in [(2e-5, 1e-4), (1.0, 0.1)] {
             let tf = TransferFunction {
@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fit_is_100_percent_for_the_signal_itself_and_0_for_its_mean() {
+    fn the_fit_percentage_is_100_for_the_signal_itself_and_0_for_its_mean() {
         let y = [1.0, 2.0, 4.0, 5.0];
         assert_eq!(fit_time(&y, &y), 100.0);
         assert_eq!(fit_time(&y, &[3.0; 4]), 0.0);

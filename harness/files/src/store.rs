@@ -572,7 +572,7 @@ mod tests {
     }
 
     #[test]
-    fn the_folder_of_another_kind_or_of_another_definition_is_refused_and_left_alone() {
+    fn a_folder_with_another_kind_of_runs_or_another_definition_is_refused_and_unchanged() {
         let cases = [
             (CAMPAIGN, "study.json", "holds a study of monte_carlo; put this campaign elsewhere"),
             (CAMPAIGN, "runs/000000.json", "holds a study of monte_carlo"),
@@ -654,7 +654,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_is_in_the_manifest_and_not_in_the_directory_is_missing() {
+    fn a_run_in_the_manifest_without_a_file_in_the_directory_counts_as_missing() {
         let directory = tempfile::tempdir().unwrap();
         let take = || take(directory.path(), CAMPAIGN).unwrap();
         take().add_text("a", "1");

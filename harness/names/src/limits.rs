@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_reason_for_leaving_the_range_has_its_share_of_the_time_and_its_first_time() {
+    fn each_reason_for_leaving_the_model_s_range_has_its_share_of_time_and_first_time() {
         let time = [0.0, 1.0, 3.0, 4.0, 10.0];
         let found = reasons(&time, &[1.0, 2.0, 5.0, 2.0, 5.0]);
         assert_eq!(found, [(LimitedBy::ThirdOrder, 0.8, 1.0), (LimitedBy::Spin, 0.1, 3.0)]);

@@ -58,7 +58,7 @@ fn hubslosh(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn check_reports_by_text_exit_code_and_junit() {
+fn hubslosh_check_reports_as_text_as_exit_code_and_as_junit() {
     let directory = tempfile::tempdir().unwrap();
     let good = packed_for_tests().to_str().unwrap();
     let (bad, junit) = (directory.path().join("bad.fmu"), directory.path().join("junit.xml"));

@@ -559,7 +559,7 @@ fn messages_are_coloured_on_request_and_not_by_default_in_files() {
 }
 
 #[test]
-fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
+fn the_option_quiet_keeps_results_and_warnings_and_strict_makes_warnings_fail() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

@@ -185,7 +185,8 @@ fn the_option_sample_only_changes_the_interval_between_commands() {
     assert!(said.contains("reaches 30 Hz") && said.contains("below 1.667e-2 s"), "{said}");
 }
 
-/// For steps that do not meet the edges, the table must have the impulse of the profile.
+/// Output steps that do not meet the edges of a pulse must not change the impulse of the torque:
+/// the table gets additional rows at the edges.
 #[test]
 fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     let folder = tempfile::tempdir().unwrap();
@@ -215,8 +216,8 @@ fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     assert!(said.contains("commands until 2700 s") && said.contains("is possible"), "{said}");
 }
 
-/// The rows of a campaign must be close enough to show the torque. Between the rows the FMU follows
-/// the torque as in `run`.
+/// The rows of a campaign must be close enough to show the torque; otherwise the error names the
+/// longest possible step. Between the rows the FMU follows the torque as in `hubslosh run`.
 #[test]
 fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     let folder = tempfile::tempdir().unwrap();
@@ -258,8 +259,8 @@ fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     }
 }
 
-/// `hubslosh design` predicts from rows at the output step, so that it refuses a sine of 50 Hz and
-/// pulses shorter than a row.
+/// `hubslosh design` predicts the identification from one row per output step, so that it refuses a
+/// sine of 50 Hz and pulses that are shorter than a step.
 #[test]
 fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     let folder = tempfile::tempdir().unwrap();

@@ -31,8 +31,9 @@ fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     pack::archive::write(&files, path).unwrap();
 }
 
-/// The callback intermediateUpdate sets an input that follows straight lines. Mutant 35 of the
-/// model passes its instance to the callbacks instead of the environment.
+/// The callback intermediateUpdate sets an input that follows straight lines. The FMU is also built
+/// with a fault (mutant 35): it passes its instance to the callbacks instead of the host's
+/// environment, which must not change the result.
 #[test]
 fn a_run_of_an_fmu_3_with_linear_inputs_equals_the_exact_solution() {
     for mutant in [0, 35] {

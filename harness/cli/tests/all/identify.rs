@@ -264,7 +264,7 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
 }
 
 #[test]
-fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
+fn a_torque_designed_for_a_signal_to_noise_ratio_achieves_it_in_the_gyro_samples() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let asked = ["design", "--snr", "20", "--band", "1.25,20"];

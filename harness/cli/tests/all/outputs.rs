@@ -68,7 +68,7 @@ fn no_output_option_replaces_an_input_under_any_of_its_names() {
 /// The file tank.toml names drawing.svg as its drawing, which `hubslosh tank --picture drawing.svg`
 /// must not overwrite.
 #[test]
-fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
+fn files_named_in_a_plan_or_tank_file_are_protected_like_inputs() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     std::fs::write(at("tank.toml"), "density = 1000\nsvg = \"drawing.svg\"\n").unwrap();
@@ -125,7 +125,7 @@ const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campai
 /// Each option with FILE or FOLDER in its help must be in one of two lists, so that no output can
 /// replace an input.
 #[test]
-fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
+fn every_option_that_names_a_file_is_listed_as_an_input_or_an_output() {
     let source = include_str!("../../src/outputs.rs");
     let mut texts = Vec::new();
     helps(&[], &mut texts);
@@ -166,8 +166,8 @@ fn examples(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Beginnings of those examples that take at most a second each, and run in a folder with the files
-/// that they name.
+/// Beginnings of the examples in help texts that take at most a second each, and run in a folder
+/// with the files that they name.
 const CHEAP: [&str; 7] = [
     "hubslosh scale",
     "hubslosh tank",

@@ -34,8 +34,9 @@ const SWEEPS: &str = "title = \"Sweeps & <models>\"\n\
     [set]\nimu.enabled = true\n\
     [count]\nimu.seed = 1\n";
 
-/// Results of ten sweeps of the thesis (10 cm of water, with gyro noise), computed once for all
-/// tests in this file.
+/// Results of ten of the sine sweeps of Rubaga's thesis (10 cm of water, with gyro noise), computed
+/// once for all tests in this file: the text of the report, and the tables of features by the two
+/// estimators.
 static TEN: LazyLock<(String, Rows, Rows)> = LazyLock::new(|| {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -100,7 +101,7 @@ fn a_spherical_liquid_softens_in_planar_slosh_and_becomes_rotary_from_0_15_newto
 
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn at_5_cm_rotary_slosh_begins_at_0_125_newton_metres() {
+fn in_5_cm_of_water_rotary_slosh_begins_at_0_125_newton_metres() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let vary = "[vary]\nslosh.model = [\"spherical\"]\ntank.h = [0.05]\nprofile.amplitude = [0.1, 0.125]\n";

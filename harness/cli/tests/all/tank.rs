@@ -44,7 +44,8 @@ fn an_invalid_tank_is_refused_in_a_sentence_without_a_file() {
 }
 
 /// The bench's cylinder gets its parameters from a drawing (through a TOML and an SSV file) or from
-/// its dimensions. Masses and lengths agree to 1e-11; 1e-9 rad/s is about 1e-8 of the rates.
+/// its dimensions. Masses and lengths agree to 1e-11. The tolerance of the rates, 1e-9 rad/s, is
+/// about 1e-8 of their size.
 #[test]
 fn parameters_of_a_drawn_tank_give_the_same_motion_as_its_dimensions() {
     let folder = tempfile::tempdir().unwrap();
@@ -136,9 +137,10 @@ fn parameter_files_for_spacecraft_and_sloshtank_have_the_names_of_their_variable
     }
 }
 
-/// The frequency belongs to omega_1^2 rho R^3/sigma = 21.4397 at Bo = 10 and 30 degrees, a value of
-/// the meniscus table. On the bench this wetting liquid has a negative stiffness, which the FMU
-/// does not accept.
+/// For a deep cylinder at the Bond number 10 and the contact angle 30 degrees, the table for curved
+/// menisci has omega_1^2 rho R^3/sigma = 21.4397, which determines the expected frequency. In the
+/// bench's tank, liquid with this contact angle has a negative stiffness, which the FMU does not
+/// accept.
 #[test]
 fn the_fmu_has_the_frequency_of_a_curved_meniscus_and_negative_stiffnesses_are_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,7 +195,8 @@ fn the_fmu_has_the_frequency_of_a_curved_meniscus_and_negative_stiffnesses_are_r
     }
 }
 
-/// Half a sphere of 1 m is 1 m of height, 50 % of the volume, and 2094.395 kg of water.
+/// A sphere with a radius of 1 m that is half full has a liquid height of 1 m, 50 % of its volume,
+/// and 2094.395 kg of water.
 #[test]
 fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     let folder = tempfile::tempdir().unwrap();
@@ -316,9 +319,10 @@ fn invalid_parameter_files_are_refused_in_a_sentence() {
     }
 }
 
-/// At Bo = 3.6 and 30 degrees omega_1^2 rho R^3/sigma is between 9.1 and 21.4 (rows Bo = 3 and 10
-/// of the meniscus table); gravity alone gives 6.6. For a sphere there is no formula: the frequency
-/// is stated as unknown, and is null in JSON.
+/// At the Bond number 3.6 and the contact angle 30 degrees, omega_1^2 rho R^3/sigma of a deep
+/// cylinder is between 9.1 and 21.4, the values of the table for curved menisci at the Bond numbers
+/// 3 and 10; gravity alone would give 6.6. For a sphere there is no formula: the frequency is
+/// reported as unknown, and is null in JSON.
 #[test]
 fn frequencies_include_the_surface_tension_if_it_is_given() {
     let folder = tempfile::tempdir().unwrap();

@@ -86,8 +86,8 @@ fn column(run: &serde_json::Value, name: &str) -> Vec<f64> {
     bytes.chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
 }
 
-/// With each slosh model, a sweep excites three modes over the first two frequencies. The page
-/// stores numbers with 32 bits.
+/// For each slosh model, a sweep over the first two frequencies excites a liquid with three modes.
+/// Page and FMU agree to 32 bits, with which the page stores its numbers.
 #[test]
 fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -155,9 +155,10 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 1);
 }
 
-/// Liquid that stands higher on one side has its centre of mass on this side: rho int eta r cos^2
-/// dA = m l per angle with the elevation eta. In linear theory this holds exactly for every mode
-/// and every tank. The surface of a cylinder, drawn in this sphere, would differ by a tenth.
+/// Liquid that stands higher on one side has its centre of mass on this side. In linear theory, the
+/// integral of density times elevation times horizontal coordinate over the surface, for a slosh
+/// angle of 1, equals the mass of a mode times its pendulum length, for every mode and every tank.
+/// If the surface of a cylinder were drawn in this sphere, the integral would differ by a tenth.
 #[test]
 fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum_does() {
     let directory = tempfile::tempdir().unwrap();

@@ -296,7 +296,7 @@ macro_rules! targets {
         /// them. HUBSLOSH_FUZZ_INPUTS is the number of inputs for each reader.
         #[test]
         #[ignore = "takes long: .ci/fuzz-readers"]
-        fn fuzz_campaign() {
+        fn no_random_change_of_a_file_makes_a_reader_crash_or_hang() {
             let count = std::env::var("HUBSLOSH_FUZZ_INPUTS").unwrap_or_default().parse().unwrap_or(100_000);
             let chosen = std::env::var("HUBSLOSH_FUZZ_TARGETS").unwrap_or_default();
             $(if chosen.is_empty() || chosen.split(' ').any(|name| name == stringify!($name)) {
