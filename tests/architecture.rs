@@ -32,7 +32,8 @@ fn the_physics_does_not_depend_on_fmi_or_the_runtime_on_physics() {
     assert_eq!(all["runtime"], BTreeSet::new());
 }
 
-/// The build itself is the check: a crate that needs the standard library does not compile without its prelude.
+/// The test looks for `#![no_std]` in each crate. The compiler does the rest: a crate with this attribute that uses the
+/// standard library does not compile.
 #[test]
 fn the_models_and_their_dependencies_need_no_standard_library() {
     for krate in ["formulas", "taylor", "plant", "craft"] {
@@ -136,7 +137,7 @@ fn tests_and_the_python_package_enable_no_further_features_of_the_program_s_depe
 }
 
 #[test]
-fn only_the_command_line_draws_progress() {
+fn only_the_command_line_package_prints_progress() {
     for (package, dependencies) in dependencies() {
         assert!(package == "hubslosh" || !dependencies.contains("indicatif"), "{package}");
     }
@@ -256,7 +257,7 @@ fn each_change_has_one_entry_in_the_changelog() {
 }
 
 #[test]
-fn tests_named_in_the_tuning_of_fits_exist() {
+fn tests_named_in_comments_on_tuning_constants_exist() {
     let mut files = Vec::new();
     collect(&pack::root(), &pack::root().join("harness/identify"), &mut files);
     let read = |name: &str| fs::read_to_string(pack::root().join(name)).expect("a source file");

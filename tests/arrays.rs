@@ -13,7 +13,7 @@ use host::part::Limit;
 use host::xml::Element;
 use pack::{Fmi, MODELS, Model, packed_version_for_tests};
 
-/// Identifies a number of the model: the name of the variable without brackets, and all indices.
+/// Identifies one scalar value of the model: the name of its variable without brackets, and all indices.
 type Key = (String, Vec<usize>);
 
 /// Splits the name of a scalar into name and indices, for example `tank[1].p[2,3]` into tank.p and 1, 2, 3.

@@ -78,7 +78,7 @@ fn the_python_tests_of_the_fmus_with_fmpy_pass() {
 /// with each of six slosh models.
 #[test]
 #[ignore = "minutes: .ci/long-tests"]
-fn long_tests_of_the_package_pass() {
+fn long_tests_of_the_python_package_pass() {
     pytest(
         package_tests()
             .args([Path::new("--wheel"), &pack::wheel::for_tests(&fmus())])
@@ -90,7 +90,7 @@ fn long_tests_of_the_package_pass() {
 
 /// Runs pytest on the six files of harness/python/tests that need only HubSlosh.
 #[test]
-fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
+fn the_python_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     let tests = pack::root().join("harness/python/tests");
     pytest(package_tests().args(BESIDE.map(|file| tests.join(file))), "the tests in Python failed");
 }

@@ -252,17 +252,17 @@ fn check_random_calls<M: runtime::Model>(inputs: u32) {
 }
 
 #[test]
-fn no_calls_break_the_packed_binary_of_hubslosh() {
+fn no_sequence_of_calls_breaks_the_packed_binary_of_hubslosh() {
     check_random_calls::<HubSlosh::HubSlosh>(3000);
 }
 
 #[test]
-fn no_calls_break_the_packed_binary_of_spacecraft() {
+fn no_sequence_of_calls_breaks_the_packed_binary_of_spacecraft() {
     check_random_calls::<Spacecraft::Model>(600);
 }
 
 #[test]
-fn no_calls_break_the_packed_binary_of_sloshtank() {
+fn no_sequence_of_calls_breaks_the_packed_binary_of_sloshtank() {
     check_random_calls::<SloshTank::Model>(600);
 }
 

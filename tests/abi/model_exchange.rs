@@ -391,8 +391,8 @@ fn misread(booleans: &[i32]) -> Vec<i32> {
 
 /// OpenModelica 1.21 to 1.27 ends the initialization first and sets all parameters except enumerations afterwards, and it
 /// enters event mode when the instance already is in event mode (issue 12893 of its tracker; the template
-/// importFMU2ModelExchange of its CodegenFMU.tpl). Its Booleans arrive as random numbers, so that their integer twins
-/// determine the values, as for enumerations.
+/// importFMU2ModelExchange of its CodegenFMU.tpl). It cannot set enumerations, and its Booleans arrive as random numbers.
+/// Therefore integer parameters whose names end in `kind` repeat these parameters and determine their values.
 #[test]
 fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     let settings = [

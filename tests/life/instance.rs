@@ -138,9 +138,10 @@ fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization
     assert_eq!(real(&mut instance, "tank.h"), 0.08);
 }
 
-/// The natural frequency, an output, depends on the specific force, an input.
+/// The natural frequency, an output, depends on the axial specific force, an input. If the host sets this input in
+/// initialization mode, the frequency must follow before the first step.
 #[test]
-fn inputs_set_in_initialization_mode_count_from_the_start() {
+fn inputs_set_in_initialization_mode_act_from_the_start_time() {
     let mut instance = new_instance();
     instance.enter_initialization_mode().unwrap();
     let on_earth = real(&mut instance, "slosh.frequency[1]");
@@ -417,7 +418,7 @@ fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
 }
 
 #[test]
-fn rollback_is_exact_in_a_thousand_random_sequences() {
+fn restoring_a_saved_state_is_exact_in_a_thousand_random_sequences() {
     let mut rng = fastrand::Rng::with_seed(11);
     let laws = || items("friction.model");
     let models = items("slosh.model").flat_map(|slosh| laws().map(move |law| (slosh, law)));
@@ -853,7 +854,7 @@ fn only_friction_parameters_can_be_changed_between_steps() {
 }
 
 #[test]
-fn a_state_of_the_other_interface_is_refused() {
+fn a_saved_state_of_the_other_fmi_interface_is_refused() {
     let mut exchange = HubSlosh::instance(Interface::ModelExchange);
     let mut instance = new_instance();
     assert!(instance.restore(&exchange).unwrap_err().text.contains("Model Exchange"));
@@ -1037,10 +1038,11 @@ fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
     }
 }
 
-/// OpenModelica's import, ecos and libcosim do not set enumerations; OMSimulator does not set enumerations with the name
+/// The integers `slosh.kind` and `friction.kind` repeat the enumerations `slosh.model` and `friction.model`, because
+/// OpenModelica's import, ecos and libcosim do not set enumerations, and OMSimulator does not set enumerations with the name
 /// `model`.
 #[test]
-fn integer_twins_have_the_same_effect_as_their_enumerations() {
+fn integer_kind_parameters_have_the_effect_of_their_enumerations() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
         for n in items(model) {
             let motion = |name: &str| {
@@ -1064,9 +1066,10 @@ fn integer_twins_have_the_same_effect_as_their_enumerations() {
     }
 }
 
-/// OpenModelica up to 1.27 sets Booleans to random numbers.
+/// Each Boolean has an integer twin, for example `wheel.enabled_kind` for `wheel.enabled`, because OpenModelica up to 1.27
+/// sets Booleans to random numbers. A twin of 1 or 2 replaces the Boolean by false or true; 0 has no effect.
 #[test]
-fn an_integer_twin_that_is_not_0_replaces_its_boolean() {
+fn an_integer_kind_parameter_that_is_not_0_replaces_its_boolean() {
     for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]
     {
         let kind = format!("{name}_kind");
@@ -1091,7 +1094,7 @@ fn an_integer_twin_that_is_not_0_replaces_its_boolean() {
 /// `slosh.kind` and `friction.kind` repeat `slosh.model` and `friction.model` as integers, for hosts that cannot set
 /// enumerations. Two different values are refused at the end of initialisation.
 #[test]
-fn integer_twins_that_contradict_their_enumerations_are_all_reported() {
+fn integer_kind_parameters_that_contradict_their_enumerations_are_all_reported() {
     let mut instance = new_instance();
     set(&mut instance, &[("slosh.model", number(3)), ("slosh.kind", number(4))]);
     set(&mut instance, &[("friction.model", number(1)), ("friction.kind", number(2))]);

@@ -7,11 +7,11 @@ use plant::SloshModel;
 
 use super::free_oscillation::shifts;
 
-/// The coefficients s and kappa of the plant include eight excited modes of each azimuthal number. Ten times as many modes
-/// would change them by less than 1e-4 of their values. Near a secondary resonance both coefficients, and therefore this
-/// difference, grow without bound.
+/// The large-wave coefficients s and kappa of the plant include eight excited modes of each azimuthal number. Ten times as
+/// many modes would change them by less than 1e-4 of their values. Near a secondary resonance both coefficients, and
+/// therefore this difference, grow without bound.
 #[test]
-fn coefficients_of_the_model_equal_those_of_potential_flow() {
+fn large_wave_coefficients_of_the_plant_equal_those_of_potential_flow() {
     let all = Overlaps::new(60);
     for i in 0..290 {
         let fill = 0.2 + 0.02 * f64::from(i);

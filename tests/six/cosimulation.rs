@@ -33,17 +33,18 @@ const THRUST: f64 = 2400.0;
 enum Exchange {
     Total,
     Split,
-    /// The constant lumped matrix is added to the matrix of the equations that the body solves.
+    /// The constant lumped matrix of the tank (rigid liquid, and each slosh mass at its hinge) is added to the matrix of the
+    /// equations that the body solves.
     Lumped,
-    /// The lumped mass is a part of the mass, centre of mass and inertia of the body.
+    /// The mass that the lumped matrix represents is a part of the mass, centre of mass and inertia of the body.
     RigidBody,
     /// The added mass at rest is used as a constant matrix, and the force that belongs to it is taken out of the total force
     /// and torque.
     Constant,
 }
 
-/// How the exchanged values change within a step (held or linear), and in which order the two FMUs are stepped: one after the
-/// other (Gauss–Seidel) or both with the values of the last step (Jacobi).
+/// How the exchanged values change within a step (constant, or linearly extrapolated), and in which order the two FMUs are
+/// stepped: one after the other (Gauss–Seidel) or both with the values of the last step (Jacobi).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     GaussSeidelHeld,
@@ -410,9 +411,10 @@ fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) ->
     worst / largest
 }
 
-/// Held values converge with first order, and linearly extrapolated values with second order. The total force converges only
-/// for the heavier body, and with first order. With the constant matrix a part of the force is still delayed, so that an
-/// error of first order becomes visible when the error of second order is small.
+/// Exchanged values that are constant within a step converge with first order, and linearly extrapolated values with second
+/// order. The exchange of the total force converges only for the heavier body, and with first order. With the constant
+/// matrix a part of the force is still delayed, so that an error of first order becomes visible when the error of second
+/// order is small.
 #[test]
 fn each_coupling_of_tank_and_craft_converges_with_its_order() {
     use Exchange::*;
@@ -442,8 +444,9 @@ fn each_coupling_of_tank_and_craft_converges_with_its_order() {
 }
 
 /// The liquid in the box moves along both horizontal axes, and its fixed mass is below 0. In lumped coupling the modes of a
-/// box count twice, so that a larger share of the force is one step late. Held values then remove more damping: with an added
-/// mass of 8 times the body's mass and steps of 20 ms the simulation diverges. Extrapolated values do not diverge.
+/// box count twice, so that a larger share of the force is one step late. Exchanged values that are constant within a step
+/// then remove more damping: with an added mass of 8 times the body's mass and steps of 20 ms the simulation diverges.
+/// Linearly extrapolated values do not diverge.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     let lambda = ratio(box_tank());
@@ -465,8 +468,8 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     }
 }
 
-/// The lumped matrix is added to the equations of the body, or it is a part of the body itself; the body also receives the
-/// bias of the tank. The tests cover added masses up to 6 times the mass of the body.
+/// The FMU's constant lumped matrix is added to the equations of the body, or it is a part of the body itself. The body also
+/// receives the rest of the tank's force, the bias. The tests cover added masses up to 6 times the mass of the body.
 #[test]
 fn lumped_coupling_is_stable_and_converges_up_to_six_times_the_mass_of_the_body() {
     let lambda = ratio(Tank::default());

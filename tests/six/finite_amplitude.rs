@@ -195,7 +195,7 @@ fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
 /// Each row has h/R, the frequency divided by the frequency of small waves, the stroke divided by R, and angle, phase and
 /// force of the flow. The third-order model is wrong by up to 14 %, 17 degrees and 21 %.
 #[test]
-fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
+fn forced_planar_waves_with_all_large_wave_coefficients_equal_those_of_potential_flow() {
     for (fill, ratio, stroke, angle, phase, force) in [
         (0.5, 0.99, 0.004606, 12.50, 130.3, 0.1360),
         (0.5, 1.0, 0.004630, 15.22, 69.7, 0.1568),
@@ -215,7 +215,7 @@ fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
 /// mode, with potential flow in three dimensions (about 30 modes). Angles and phases, in degrees, belong to the first
 /// harmonics along the stroke and across it. The third-order model is wrong by 8 % and 7 degrees.
 #[test]
-fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {
+fn forced_rotary_waves_with_all_large_wave_coefficients_equal_those_of_potential_flow() {
     let mut tank = bench_with_energy(0.5);
     tank.zeta[0] = 0.01;
     let w = 1.01 * linear_frequency(&tank);

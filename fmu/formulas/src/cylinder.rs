@@ -165,7 +165,7 @@ mod tests {
 
     /// The expected values were computed by hand for a tank of 1 m radius that is filled 1 m deep.
     #[test]
-    fn the_second_mode_has_its_mass_length_and_hinge() {
+    fn the_second_mode_of_a_cylinder_equals_values_computed_by_hand() {
         let second = pendulum(1, 2.0, 1.0, 3.0);
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
         near(second.mass, 3.0 * 2.0 * 0.999_953_13 / (5.331_442_77 * 27.424_282));
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn modes_and_rigid_liquid_together_have_the_liquids_mass_and_centre() {
+    fn modes_and_rigid_liquid_together_have_the_liquids_mass_and_centre_of_mass() {
         let (d, h, m_liq) = (0.9, 0.6, 380.0);
         let kept: [Pendulum; 3] = core::array::from_fn(|n| pendulum(n, d, h, m_liq));
         let [m_0, h_0, _] = rest(d, h, m_liq, &kept);

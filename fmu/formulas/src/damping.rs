@@ -415,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn damping_correlations_keep_the_value_at_the_end_of_their_range_beyond_it() {
+    fn beyond_its_range_a_damping_correlation_keeps_the_value_at_the_end() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
         assert_eq!((sphere(0.01), sphere(1.99)), (sphere(0.1), sphere(1.9)));
         assert!(sphere(0.11) < sphere(0.1) && sphere(1.89) != sphere(1.9));
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn the_laminar_layer_grows_with_the_root_of_viscosity() {
+    fn damping_of_the_laminar_layer_grows_with_the_root_of_viscosity() {
         assert!((laminar(10.0, 8e-6, 4.0) - 5e-3).abs() < 1e-17);
     }
 
@@ -581,7 +581,7 @@ mod tests {
     /// 30 %, the limits are ±30 % of the correlation. Otherwise the interval extends from the laminar layer, 1, to 1.3 times
     /// the larger of the two values.
     #[test]
-    fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
+    fn the_damping_interval_of_a_measured_shape_includes_both_estimates_if_they_disagree() {
         for (factor, low, high) in [
             (1.0, 1.0, 1.3 * 1.45),
             (1.11, 1.0, 1.3 * 1.45),

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn frequency_shifts_of_the_energy_terms_are_close_to_third_order_theory() {
+    fn tabulated_large_wave_coefficients_give_frequency_shifts_close_to_third_order_theory() {
         for i in 0..=30 {
             let fill = 0.4 + 0.01 * f64::from(i);
             let EnergyTerms { pair: [s, kappa], rotary, .. } = energy_terms(fill).unwrap();

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
+    fn derivatives_of_smooth_data_equal_those_of_a_polynomial_through_the_five_nearest_points() {
         let y = X.map(libm::exp);
         for sign in [1.0, -1.0] {
             let y = y.map(|y| sign * y);

@@ -288,7 +288,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limit_reasons_and_their_numbers_are_one_to_one() {
+    fn limits_of_slosh_models_and_their_numbers_are_one_to_one() {
         for (i, reason) in LimitedBy::ALL.into_iter().enumerate() {
             assert_eq!(reason as usize, i + 1);
             assert_eq!(LimitedBy::from_number(reason as u8), Some(reason));
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tank_without_a_forced_comparison_has_the_limits_of_the_most_unfavourable_cylinder() {
+    fn a_tank_without_forced_wave_data_has_the_angle_limits_of_the_worst_cylinder() {
         let rows = || THIRD_ORDER.into_iter();
         // The error of the frequency grows with the square of the angle.
         let least_of = |fill: f64, planar: f64, has_energy: bool| {
@@ -341,7 +341,7 @@ mod tests {
     /// potential flow differs by 0.3 % from a pendulum's frequency. Terms beyond third order, which the computed limit
     /// leaves out, change this angle by at most 0.3 degrees.
     #[test]
-    fn the_range_of_a_pendulum_ends_where_the_third_order_differs_from_it() {
+    fn the_angle_limit_of_a_pendulum_is_where_third_order_theory_differs() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {
             let limit = cylinder(fill, [Some(-0.125), Some(0.5)]).frequency.to_degrees();
             assert!((limit - exact).abs() < 0.3, "{fill}: {limit} {exact}");

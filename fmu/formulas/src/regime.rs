@@ -42,7 +42,7 @@ mod tests {
     }
 
     #[test]
-    fn regimes_and_their_numbers_are_one_to_one() {
+    fn slosh_regimes_and_their_numbers_are_one_to_one() {
         for regime in [Regime::Linear, Regime::Transitional, Regime::Nonlinear] {
             assert_eq!(Regime::from_number(regime as u8), Some(regime));
         }

@@ -149,7 +149,7 @@ fn fmi_3_without_event_mode_gives_bit_identical_results_to_fmi_2() {
 }
 
 #[test]
-fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
+fn a_host_that_handles_events_gets_the_motion_of_fmi_2_bit_for_bit() {
     let expected = trajectory();
     let mut three: Three = initialised(Events::Reported, LIVELY);
     handle(&mut three);
@@ -181,7 +181,7 @@ fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
 
 /// The events within a step are reported at its end, because the host does not allow an early return.
 #[test]
-fn a_host_that_forbids_early_return_gets_the_same_motion_and_learns_of_events_at_the_end() {
+fn without_early_return_the_motion_is_bit_identical_and_events_are_reported_after_the_step() {
     let expected = trajectory();
     let mut three: Three = initialised(Events::Reported, LIVELY);
     handle(&mut three);
@@ -222,7 +222,7 @@ fn a_host_that_does_not_enter_event_mode_after_events_gets_the_motion_of_fmi_2()
 /// Without gyro and wheel the stick and slip of the hub are the only events, so that the times of early returns can be
 /// compared with the event times that FMI 2.0 reports.
 #[test]
-fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
+fn fmi_3_steps_return_early_exactly_at_the_event_times_of_fmi_2() {
     let values = &LIVELY[..5];
     let mut two: Two = initialised(Events::InStep, values);
     let mut three: Three = initialised(Events::Reported, values);
@@ -315,7 +315,7 @@ fn a_state_saved_at_an_event_continues_the_same_motion() {
 
 /// With `solver.max_steps` = 10 a long step returns fmi3Discard, and a shorter step from the same time succeeds.
 #[test]
-fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
+fn a_step_with_too_many_internal_steps_is_discarded_and_a_shorter_step_succeeds() {
     let mut three: Three = initialised(Events::InStep, &[("solver.max_steps", Value::Integer(10))]);
     let before = to_bytes(&three);
     let fault = three.step_to_event(0.0, 1e4, false).unwrap_err();
@@ -325,7 +325,7 @@ fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
 }
 
 #[test]
-fn a_reset_instance_equals_a_new_one_whoever_handles_events() {
+fn a_reset_instance_equals_a_new_one_with_and_without_event_mode() {
     for events in [Events::InStep, Events::Reported] {
         let fresh: Three = Instance::with_events(Interface::CoSimulation, events);
         let mut three: Three = initialised(events, LIVELY);
@@ -350,8 +350,10 @@ fn continuous_states_cannot_be_set_in_co_simulation() {
     assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
 }
 
-/// Returns the outputs work_axial and omega_imu after 1 s in steps of 20 ms. g_axial jumps between steps and is constant
-/// within them; `at` returns the time that the host passes for a step, and `start` is the start time, s.
+/// Simulates 1 s in steps of 20 ms, while the axial specific force (input g_axial) is constant in each step and jumps
+/// between steps. Returns the output work_axial, the work of this force, J, and the gyro reading omega_imu, rad/s. The
+/// simulation begins at `start`, s. `at` receives the number of a step and the time of the FMU, and returns the time that
+/// the host passes for this step.
 fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     let mut instance = Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);
     set(&mut instance, "imu.enabled", Value::Boolean(true));
@@ -368,8 +370,9 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     ["work_axial", "omega_imu"].map(|name| real(&mut instance, name))
 }
 
-/// The reference adds up its step sizes as the FMU does. Earlier versions had errors of the work of up to 1.5e-4 J because of
-/// rounding errors of the host's times, and at 1e9 s gyro samples were one step late.
+/// The expected outputs are those of a host that passes the FMU's own time and starts at 0. Before this was corrected,
+/// rounding errors of the host's times caused errors of the work of up to 1.5e-4 J, and at 1e9 s gyro samples were one step
+/// late.
 #[test]
 fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock() {
     fn compare<V: Version>() {
@@ -388,7 +391,7 @@ fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock(
 
 /// The energy of a suspension line that is twisted by 1e308 rad is not finite.
 #[test]
-fn an_initial_state_too_large_for_the_equations_is_refused_by_the_name_of_its_parameter() {
+fn the_error_about_a_too_large_initial_state_names_its_parameter() {
     fn refused<V: Version>() {
         let mut instance =
             Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);

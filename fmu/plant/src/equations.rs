@@ -585,7 +585,7 @@ mod tests {
     }
 
     #[test]
-    fn gyro_samples_that_are_due_are_taken_up_to_a_limit() {
+    fn each_due_gyro_sample_is_taken_once_and_too_many_samples_are_an_error() {
         let mut p = Parameters::default();
         p.imu.enabled = true;
         p.imu.rate = 1e4;
@@ -610,7 +610,7 @@ mod tests {
 
     /// A step of 1e12 s with the gyro enabled would take 5e13 samples, more than `solver.max_steps` allows.
     #[test]
-    fn a_step_with_more_samples_than_allowed_is_refused_at_once() {
+    fn a_step_with_too_many_gyro_samples_is_refused_at_once() {
         let mut p = Parameters::default();
         p.slosh.model = SloshModel::Frozen;
         p.imu.enabled = true;

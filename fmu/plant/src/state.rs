@@ -237,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn saved_words_that_are_not_a_valid_state_are_refused() {
+    fn saved_data_that_are_no_valid_state_of_the_plant_are_refused() {
         let state = State {
             time: 1.5,
             x: core::array::from_fn(|i| i as f64 - 3.0),

@@ -120,7 +120,7 @@ mod tests {
     /// If rounding of times made the command pass a limit twice, the step would be divided at the same limit again and again,
     /// into parts of zero length, until it is refused.
     #[test]
-    fn a_torque_command_passes_each_limit_once_despite_rounding() {
+    fn a_torque_ramp_passes_each_limit_of_the_wheel_once_despite_rounding() {
         let mut rng = fastrand::Rng::with_seed(1);
         for _ in 0..100_000 {
             let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();

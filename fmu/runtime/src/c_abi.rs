@@ -578,7 +578,7 @@ mod tests {
     use std::rc::Rc;
 
     #[test]
-    fn a_panic_is_fatal_and_reported_with_its_text() {
+    fn a_panic_within_a_call_is_a_fatal_error_and_its_text_is_reported() {
         let lines = Rc::new(RefCell::new(Vec::new()));
         let to = lines.clone();
         let log = Log::new(Some(Box::new(move |status, _, message| {

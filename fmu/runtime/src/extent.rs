@@ -261,7 +261,7 @@ mod tests {
 
     /// The test model has up to three trays, by default two, and the level of each is a continuous state.
     #[test]
-    fn the_token_of_a_reduced_description_contains_its_number_of_states() {
+    fn the_instantiation_token_of_a_reduced_description_contains_its_number_of_states() {
         assert_eq!(extent_with("000000000").unwrap().places(), [0_usize; 0]);
         assert_eq!(Trays::table().sizes(), [("rows", 3)]);
         let extent = extent_with("100010000").unwrap();

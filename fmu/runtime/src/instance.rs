@@ -1661,7 +1661,7 @@ mod tests {
     /// hundredth of these values, so that dependencies can be tested at nearby points. Inputs are only increased, and stay
     /// within their ranges.
     #[test]
-    fn nearby_points_for_differences_move_every_state_and_input_by_a_share_of_its_size() {
+    fn finite_differences_move_every_state_and_input_in_proportion_to_its_size() {
         let moved = |share: f64, point: u64, q: f64| {
             let mut instance = Instance::<Trays, Fmi3>::new(Interface::ModelExchange);
             instance.enter_initialization_mode().unwrap();

@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_category_is_named_with_the_known_ones() {
+    fn the_error_about_an_unknown_log_category_lists_the_known_categories() {
         let message = spring_filter(&["logStatusEror".into()]).unwrap_err();
         assert!(message.contains("logStatusEror") && message.contains("logStatusError"));
     }

@@ -429,7 +429,7 @@ mod tests {
     /// integrates, and the coordinates xi, whose acceleration follows from Lagrange's equations. The random angles lie
     /// between hanging straight down and 20 degrees from straight up.
     #[test]
-    fn direction_and_velocity_follow_lagranges_equations() {
+    fn direction_and_velocity_of_a_spherical_pendulum_follow_lagranges_equations() {
         let mut rng = fastrand::Rng::with_seed(3);
         let mut between = |low: f64, high: f64| low + rng.f64() * (high - low);
         for _ in 0..1000 {

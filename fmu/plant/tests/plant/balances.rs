@@ -318,7 +318,7 @@ fn hub_liquid_and_wheel_together_keep_their_momentum() {
 /// The specific force falls to 0, so that nothing restores the liquid. All results must stay finite, or the run must end with
 /// an error because the liquid has drifted beyond the largest displacement of the slosh model.
 #[test]
-fn without_gravity_results_stay_finite_or_the_liquid_drifts_over_the_rim() {
+fn without_gravity_results_stay_finite_or_drifting_liquid_ends_the_run() {
     for slosh in SLOSH {
         let mut p = bench(slosh, FrictionModel::Stribeck);
         p.init.slosh_angle = 0.1;

@@ -86,8 +86,9 @@ fn energy_is_balanced_if_the_work_of_a_changing_g_is_included() {
     }
 }
 
-/// A jump of the specific force does the work jump times mass times height of hub and liquid. The expected energy, and its
-/// derivative, is computed in another way, from the components of gravity across the axis.
+/// If the specific force jumps by dg, the potential energy of a mass m at the height z changes by m z dg, and the output
+/// `work_axial` must contain this work for hub and liquid. The output `energy` is computed in another way, from the
+/// components of gravity across the axis; its jump, and the jump of its derivative, must be equal.
 #[test]
 fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
     for slosh in SloshModel::ALL {
@@ -110,7 +111,7 @@ fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
 }
 
 #[test]
-fn motion_under_ramps_does_not_depend_on_the_communication_step() {
+fn motion_under_ramps_of_g_does_not_depend_on_the_communication_step() {
     for slosh in SLOSHING {
         for correlation in [true, false] {
             let mut p = bench(slosh, FrictionModel::Viscous);
@@ -235,7 +236,7 @@ fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
 /// A plant that starts without specific force dissipates nothing. If 1 m/s² acts later, its damping ratio is that of a plant
 /// that starts at 1 m/s².
 #[test]
-fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
+fn a_plant_that_starts_at_zero_g_has_damping_once_g_acts() {
     for correlation in [true, false] {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         p.hub.inertia = 1e9;
@@ -251,7 +252,7 @@ fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
 }
 
 #[test]
-fn directional_derivatives_along_g_include_the_change_of_the_damping() {
+fn directional_derivatives_with_respect_to_g_include_the_change_of_the_damping() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.init.slosh_rate = 1.0;

@@ -79,8 +79,8 @@ fn parameters(rng: &mut fastrand::Rng) -> Parameters {
     p
 }
 
-/// Simulates a table of inputs, whose `rows` contain their values, with steps of at most `longest` seconds. Returns the
-/// states after each row, or the reason why the motion ends because large waves leave the range of the slosh model.
+/// Simulates the inputs in `rows`, each of which lasts for a time `h`, with steps of at most `longest` seconds. Returns the
+/// states after each row, or the message of the plant if large waves leave the range of the slosh model.
 fn run(p: &Parameters, rows: &[Row], tolerance: f64, longest: f64) -> Result<Vec<f64>, String> {
     let first = rows[0].inputs(0.0);
     let mut plant = Plant::new(p, &first, 0.0, tolerance).map_err(|why| why.join("; "))?;
@@ -137,10 +137,11 @@ fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
     println!("worst error: {:.2} tolerances, seed {} at {:e}", worst.0, worst.1, worst.2);
 }
 
-/// The named seeds have shown errors in the past. The drag of liquid at rest under zero specific force starts with the fourth
-/// power of time, which the first terms of its series do not show; the error was 6e-4 at every tolerance (seed 1651). In seed
-/// 52 a step never ended, because rounding left the torque command just before a limit of the wheel. Near zero specific force
-/// the drag has singularities, which once did not limit the step (seeds 234, 1040, 1224).
+/// The four seeds after the first 60 are random cases that once failed. Seed 1651 had an error of 6e-4 at every tolerance:
+/// without specific force the drag of liquid that starts from rest grows with the fourth power of time, which the first
+/// terms of its Taylor series do not contain. In seeds 234, 1040 and 1224 the drag has singularities near zero specific
+/// force that did not limit the step. In seed 52 a step never ended, because rounding left the torque command just before a
+/// limit of the wheel.
 #[test]
 fn amplitude_damping_keeps_the_solver_tolerance_where_g_vanishes() {
     keep_the_tolerance((0..60).chain([234, 1040, 1224, 1651]));

@@ -113,9 +113,10 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     found
 }
 
-/// The damping ratio that follows from each decrement must be zeta + zeta_A A, up to an amplitude A of 0.3 rad. In the
-/// nonlinear models the decrement also depends on the amplitude by itself, by about A^2/16 for a pendulum. The measured
-/// difference of 0.8 % is within the tolerance; for the linear model it is 5e-5.
+/// With the parameters zeta (viscous) and zeta_A (`slosh.zeta_amplitude`), the damping ratio that follows from the decrement
+/// of each period must be zeta + zeta_A A at the amplitude A, up to 0.3 rad. In a nonlinear model the waveform changes with
+/// the amplitude, too, so that the decrement of a pendulum differs by about A^2/16. The measured difference of 0.8 % is
+/// within the tolerance; for the linear model it is 5e-5.
 #[test]
 fn the_damping_ratio_is_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -138,13 +139,15 @@ fn the_damping_ratio_is_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     }
 }
 
-/// Steepness of mode 1 in an upright cylinder per slosh angle, 2 xi_1/(xi_1^2 - 1).
+/// Steepness of the first mode in an upright cylinder divided by the slosh angle, 2 xi_1/(xi_1^2 - 1), where xi_1 = 1.841 is
+/// the first zero of the derivative of the Bessel function J_1.
 const STEEPNESS: f64 = 2.0 * 1.8411837813 / (1.8411837813 * 1.8411837813 - 1.0);
 
-/// Above the onset of breaking, the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A, where sigma is the steepness
-/// per slosh angle and s_b the steepness at the onset. The solution is 1/A = sigma/s_b + (1/A_1 - sigma/s_b) exp(-omega
-/// zeta_b s_b t). The rounded corner of the damping law adds up to 4e-4 to a steepness that exceeds the onset by 0.26 to
-/// 0.72.
+/// If breaking waves are the only damping, the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A. Here omega is the
+/// angular frequency, zeta_b the parameter `slosh.zeta_breaking`, sigma the steepness divided by the slosh angle, and s_b
+/// the steepness at which waves begin to break. From the amplitude A_1 on the solution is 1/A = sigma/s_b + (1/A_1 -
+/// sigma/s_b) exp(-omega zeta_b s_b t). The smooth transition of the damping law at the onset adds up to 4e-4 to a steepness
+/// that exceeds the onset by 0.26 to 0.72.
 #[test]
 fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     let (zeta_b, onset) = (0.05, 0.2);
@@ -165,8 +168,9 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     }
 }
 
-/// The damping ratio that follows from each decrement must be zeta + zeta_b max(0, steepness - onset). The tested steepness
-/// differs from the onset by 0.1, where the rounded corner of the damping law changes zeta by 1 %. In a nonlinear model the
+/// The damping ratio that follows from the decrement of each period must be zeta + zeta_b max(0, steepness - onset), with
+/// the viscous damping ratio zeta and the parameter `slosh.zeta_breaking` = zeta_b. Steepnesses closer than 0.1 to the onset
+/// are left out, because the smooth transition of the damping law changes zeta by 1 % there. In a nonlinear model the
 /// amplitude varies within a period by the relative amount A^2/16, as for a pendulum.
 #[test]
 fn breaking_waves_have_more_damping_above_the_onset_in_every_model() {
@@ -218,8 +222,9 @@ fn breaking_waves_only_dissipate_energy() {
     }
 }
 
-/// For a vanishing wave the amplitude-dependent damping ratio is 1e-4 zeta_A instead of 0, because the small constant A_0 =
-/// 1e-4 rad is added to the amplitude. The viscous damping ratio is added to it.
+/// The damping law adds the small constant A_0 = 1e-4 rad to the amplitude. Therefore the amplitude-dependent part of the
+/// damping ratio of a vanishing wave is 1e-4 zeta_A instead of 0, where zeta_A is `slosh.zeta_amplitude`. The viscous
+/// damping ratio is added to this part.
 #[test]
 fn a_wave_of_vanishing_amplitude_keeps_its_viscous_damping() {
     let mut p = held(SloshModel::Linear);

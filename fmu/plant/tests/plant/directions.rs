@@ -71,11 +71,12 @@ fn damping_of_modes_in_any_direction_does_not_change_momentum() {
     }
 }
 
-/// Newton's equations of hub and slosh masses, in which the forces of the guides are unknowns, integrated by Runge–Kutta. The
-/// states are the angle of the hub and its rate w, then the angle al of each mode and its rate. A slosh mass at P = (r + l s
-/// n_x, l s n_t, -l c) in the hub's frame (s and c are sine and cosine of al) has the acceleration P'' + 2 w x P' + w' x P +
-/// w x (w x P). Gravity, drag along its path and the guide's force N across the path act on it; -N and minus the drag act on
-/// the hub.
+/// Newton's equations of hub and slosh masses, integrated by Runge–Kutta. Each slosh mass moves on a circle of radius l
+/// about a hinge at the distance r from the axis, in the horizontal direction (n_x, n_t); the force N of its guide, across
+/// this path, is an unknown. The states are the angle of the hub and its rate w, then the angle al of each mode and its
+/// rate. A slosh mass at P = (r + l s n_x, l s n_t, -l c) in the hub's frame, with s = sin(al) and c = cos(al), has the
+/// acceleration P'' + 2 w x P' + w' x P + w x (w x P). Gravity, N and the drag along the path act on the slosh mass; -N and
+/// minus the drag act on the hub.
 struct Newton<'a> {
     p: &'a Parameters,
     drag: Vec<f64>,
@@ -159,10 +160,10 @@ impl Newton<'_> {
     }
 }
 
-/// The independent motion is integrated by Runge–Kutta in steps of 0.1 ms. At 14 rad/s its error is (14e-4)^4/120 per radian,
-/// which is 1e-12 after three seconds. The slosh angles reach 40 degrees.
+/// `Newton` is integrated by Runge–Kutta in steps h of 0.1 ms, whose relative error (omega h)^4/120 per radian is 1e-12
+/// after three seconds at omega = 14 rad/s. The slosh angles reach 40 degrees.
 #[test]
-fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
+fn the_planar_model_moves_as_newtons_equations_with_guide_forces() {
     for tilt in [0.0, 0.1] {
         let mut p = askew(SloshModel::Planar, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (tilt, 0.7);
@@ -206,10 +207,11 @@ fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     [value, 2.0 * m * x * l * c, 2.0 * m * l * (l * c * c - x * s)]
 }
 
-/// On a hub that rotates at the rate w, the pendulum of a radial mode is in equilibrium at the angle be with g tan(be) = w^2
-/// (r + l sin be). Small oscillations about this angle have the frequency Omega^2 = V''/(m l^2) with the effective potential
-/// V = H^2/(2 J) + m g l (1 - cos be), where H is the constant angular momentum and J(be) the inertia about the hub's axis.
-/// If the hub is so heavy that w is constant, Omega^2 = g/(l cos be) - w^2 cos^2 be.
+/// A tank at the distance r from the axis has one radial mode with the mass m and the pendulum length l. On a hub that
+/// rotates at the rate w, the pendulum is in equilibrium at the angle be with g tan(be) = w^2 (r + l sin be). Small
+/// oscillations about this angle have the frequency Omega^2 = V''/(m l^2) with the effective potential V = H^2/(2 J) + m g l
+/// (1 - cos be), where H is the constant angular momentum and J(be) the inertia about the hub's axis. If the hub is so heavy
+/// that w is constant, Omega^2 = g/(l cos be) - w^2 cos^2 be.
 #[test]
 fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     for (hub, shift) in [(0.1, 1.0), (1e6, -1.0)] {

@@ -13,7 +13,7 @@ fn torque(value: f64) -> Inputs {
 /// A torque just below the static friction does not break the hub away, and a torque just above it makes an event overdue.
 /// After the event has been handled, the hub turns.
 #[test]
-fn after_a_break_away_no_event_is_overdue() {
+fn after_the_hub_breaks_away_no_event_is_overdue() {
     let p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
     let limit = p.friction.c + p.friction.d;
     for sign in [1.0, -1.0] {
@@ -47,8 +47,8 @@ fn after_a_break_away_no_event_is_overdue() {
     }
 }
 
-/// A hub with LuGre friction at rest, without torque and with undeflected bristles, keeps the direction of its last motion as
-/// its contact. If a torque acts, the torque determines the direction.
+/// Without torque, a hub with LuGre friction that comes to rest keeps the direction of its last motion as the direction of
+/// its contact. If a torque acts, the torque determines this direction.
 #[test]
 fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     let p = bench(SloshModel::Frozen, FrictionModel::Lugre);
@@ -198,7 +198,7 @@ fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
 
 /// The speed of the rotor falls by 1 rad/s per second and reaches its lowest value after a quarter of a second.
 #[test]
-fn a_step_stops_where_the_wheel_s_torque_changes() {
+fn a_step_stops_where_the_wheel_reaches_a_limit_or_its_torque_passes_0() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
     p.wheel.enabled = true;
     p.wheel.speed_min = p.wheel.speed_0 - 0.25;
@@ -270,10 +270,11 @@ fn a_step_continued_after_events_equals_one_whole_step_to_the_last_bit() {
     }
 }
 
-/// After a stop the host usually continues with a step that has the same end and the same torque, which skips this event. If
-/// the next step has another end or another torque, it must find the same events as in a plant that has never stopped.
+/// After a step has stopped at an event, a host usually simulates the rest of this step with the same torque, and the plant
+/// does not stop at this event again. If the next step has another end or another torque, it must give the same result as in
+/// a new plant that was created from the saved state.
 #[test]
-fn after_a_stop_at_an_event_a_step_with_another_end_or_torque_is_a_new_step() {
+fn after_an_event_a_changed_step_equals_that_of_a_restored_plant() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
     (p.imu.enabled, p.init.omega, p.init.slosh_angle) = (true, 0.05, 0.1);
     let inputs = torque(0.01);
@@ -304,9 +305,9 @@ fn after_a_stop_at_an_event_a_step_with_another_end_or_torque_is_a_new_step() {
     assert_eq!(plant.state().to_words(), whole.state().to_words());
 }
 
-/// The saved numbers must be finite, and the time of the stop must be within the step.
+/// Saved data of a stopped step are valid only if all numbers are finite and the time of the stop lies within the step.
 #[test]
-fn saved_data_that_is_not_a_stopped_step_is_refused() {
+fn invalid_saved_data_of_a_step_stopped_at_an_event_are_refused() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     p.imu.enabled = true;
     let inputs = torque(0.01);

@@ -10,8 +10,9 @@ use crate::common::SLOSHING;
 
 const G: f64 = 9.81;
 
-/// Returns a tank of h/R = 1 without damping on a hub that is too heavy to move. Gravity across the axis has the slope `s`,
-/// and `beta` is its direction, rad, measured from outwards to the tangent.
+/// Returns a tank of h/R = 1 without damping on a hub that is too heavy to move. The axis is tilted, so that the transverse
+/// component of gravity is `s` times the axial component. `beta` is the direction of the transverse component, rad, measured
+/// from the radial direction (outwards) to the tangential direction.
 fn leaning(model: SloshModel, s: f64, beta: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -89,7 +90,7 @@ fn measured(p: &Parameters) -> f64 {
 /// elements (`hubslosh.liquid_modes`; `formulas::tilt` names the programs) on two meshes, whose results differ by 2e-4. The
 /// tolerance of the frequency is half this difference plus the neglected second order, 1e-4 and 0.15 %.
 #[test]
-fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
+fn free_decays_on_a_tilted_bench_have_the_frequencies_of_finite_elements() {
     for (s, change, allowed) in
         [(0.15, [-0.00941, 0.00526], 2e-4), (0.35, [-0.04879, 0.02775], 1.5e-3)]
     {
@@ -108,7 +109,7 @@ fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
 /// The allowed difference is the square of the amplitude, 1e-4 rad, plus the measurement error of 1e-7. Models with one
 /// direction are tested in a direction oblique to the slope.
 #[test]
-fn the_stated_frequency_equals_that_of_a_free_decay() {
+fn the_frequency_output_on_a_tilted_bench_equals_that_of_a_free_decay() {
     for model in SLOSHING {
         let oblique = model != SloshModel::Liquid;
         for beta in [0.0, FRAC_PI_2, 0.6] {
@@ -128,11 +129,11 @@ fn the_stated_frequency_equals_that_of_a_free_decay() {
     }
 }
 
-/// When a torque begins to act, it accelerates the hub and the liquid that does not slosh, with the inertia I + r^2 (m_liq -
-/// sum of m f), where m f is the sloshing mass of a mode on the tilted bench. A planar slosh mass contributes as well,
-/// because it cannot move radially.
+/// When a torque begins to act, the angular acceleration is torque/(I + r^2 (m_liq - m)), with the inertia I of the hub, the
+/// distance r of the tank, the mass m_liq of all liquid, and the slosh mass m that moves tangentially on the tilted bench.
+/// In the model `planar` the slosh mass cannot move radially, so that its tangential displacement adds to the inertia.
 #[test]
-fn rigid_liquid_accelerates_with_the_hub() {
+fn on_a_tilted_bench_only_liquid_that_does_not_slosh_accelerates_with_the_hub() {
     for model in SLOSHING {
         for beta in [0.0, FRAC_PI_2, 0.6] {
             let mut p = leaning(model, 0.3, beta);
@@ -160,7 +161,7 @@ fn rigid_liquid_accelerates_with_the_hub() {
 }
 
 #[test]
-fn without_tilt_or_with_a_table_the_modes_are_used_as_given() {
+fn modes_are_corrected_for_tilt_only_on_a_tilted_bench_without_a_table() {
     for model in SLOSHING {
         let mut p = leaning(model, 0.0, 0.7);
         p.slosh.modes = 3;
@@ -193,7 +194,7 @@ fn a_surface_that_reaches_the_bottom_is_refused_unless_the_liquid_is_rigid() {
 
 /// In a tilted cylinder the frequencies across and along the slope differ, but a spherical pendulum has only one frequency.
 #[test]
-fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
+fn warnings_name_large_tilts_and_spherical_pendulums_in_a_tilted_cylinder() {
     let warnings = |model, s| Plant::warnings(&leaning(model, s, 0.0), &inputs_with_torque(0.0));
     let said = |model, s, text: &str| warnings(model, s).iter().any(|said| said.contains(text));
     for model in SLOSHING {

@@ -7,10 +7,10 @@ use plant::{Inputs, Parameters, Plant, SloshModel, SloshSource};
 
 const SAMPLE: f64 = 1e-3;
 
-/// The relative change of the squared frequency must be −1/8 of the squared angle in planar motion, and 1/2 of the squared
-/// displacement in circular motion.
+/// If both large-wave coefficients s and kappa are 1, the relative change of the squared frequency must be −1/8 of the
+/// squared angle in planar motion, and 1/2 of the squared displacement in circular motion, as for a pendulum.
 #[test]
-fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
+fn large_wave_coefficients_of_1_give_the_frequency_shift_of_a_pendulum() {
     let found = shifts(SloshModel::Spherical, 0.10, SAMPLE);
     assert!((found[0] / -0.125 - 1.0).abs() < 0.01, "{found:?}");
     assert!((found[1] / 0.5 - 1.0).abs() < 0.01, "{found:?}");
@@ -20,7 +20,7 @@ fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
 /// must be 3 kappa/8 - s/2 in planar and kappa/2 in circular motion. `tests/physics/liquid.rs` compares these values with
 /// potential flow at the same depths.
 #[test]
-fn the_liquid_model_has_the_frequency_shifts_of_the_third_order() {
+fn the_model_liquid_has_the_frequency_shifts_of_third_order_theory() {
     for (depth, potential_flow) in [(0.10, [-0.4285, 0.3671]), (0.05, [-0.2566, 0.4208])] {
         let found = shifts(SloshModel::Liquid, depth, SAMPLE);
         let (s, kappa) = coefficients(depth / 0.0815);
@@ -44,7 +44,7 @@ fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
 /// The tested pairs of s and kappa include soft and hard springs. For each pair the measured change of the frequency must be
 /// that of third-order theory.
 #[test]
-fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
+fn large_wave_coefficients_in_a_table_give_the_frequency_shifts_of_third_order_theory() {
     for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {
         let p = table(held(SloshModel::Liquid, 0.1), s, kappa);
         let found = shifts_of(p, SAMPLE);
@@ -58,7 +58,7 @@ fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
 /// If the table leaves s and kappa at 1, the values of a pendulum, the model `liquid` warns, because it is meant for the
 /// tank's own coefficients.
 #[test]
-fn the_liquid_model_requires_s_and_kappa_of_a_table() {
+fn the_model_liquid_warns_about_a_table_without_large_wave_coefficients() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());
     let p = table(held(SloshModel::Liquid, 0.1), 1.0, 1.0);
     assert!(warnings(&p)[0].contains("like the frequency of a pendulum"), "{:?}", warnings(&p));

@@ -63,7 +63,7 @@ fn dissipation(plant: &mut Plant, p: &Friction, omega: f64, share: f64) -> f64 {
 }
 
 #[test]
-fn dissipation_becomes_negative_only_if_sigma1_is_above_its_limit() {
+fn dissipation_of_lugre_friction_is_negative_only_if_sigma1_exceeds_its_limit() {
     let mut p = bench(SloshModel::Frozen);
     let limit = p.friction.b * p.friction.c / p.friction.d;
     p.friction.sigma1 = limit;
@@ -183,7 +183,7 @@ fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
 /// Before a hub with LuGre friction slides, its friction torque as a function of the deflection is a hysteresis loop, which
 /// is closed from the second cycle on.
 #[test]
-fn friction_before_sliding_follows_a_closed_hysteresis_loop() {
+fn lugre_friction_before_sliding_follows_a_closed_hysteresis_loop() {
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma1 = 0.0;
     p.friction.b = 0.0;

@@ -114,7 +114,7 @@ fn motion_with_all_options_does_not_depend_on_the_communication_step() {
 /// The derivative of the angular momentum must equal the moment of gravity on all masses at their positions. Both are
 /// compared by Simpson's rule over 1 ms, whose error is (2 pi f h)^4/180 of the torque, 1e-10.
 #[test]
-fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
+fn momentum_on_a_tilted_bench_changes_by_the_moment_of_gravity() {
     for slosh in SloshModel::ALL {
         let mut p = everything(slosh, FrictionModel::None);
         (p.init.slosh_rate, p.init.slosh_rate_radial) = (2.0, -1.0);
@@ -160,7 +160,7 @@ fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
 /// With rigid liquid, hub and liquid are one pendulum about the bearing, with omega^2 = g tan(tilt) M/I, where M is the
 /// static moment of all masses and I their inertia.
 #[test]
-fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
+fn an_unbalanced_hub_on_a_tilted_bench_swings_at_the_frequency_of_its_imbalance() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
     p.bench.tilt = 0.1;
     p.hub.imbalance = 0.3;
@@ -178,7 +178,7 @@ fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
 }
 
 #[test]
-fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
+fn liquid_on_a_tilted_bench_comes_to_rest_along_gravity() {
     for slosh in [SloshModel::Spherical, SloshModel::Liquid] {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.friction.b = 0.3;
@@ -267,11 +267,11 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     );
 }
 
-/// The damping ratio of a ring baffle is Z a^(1/2) at the amplitude a, so that a^(-1/2) grows at the rate Z omega/2. The test
-/// starts at 0.2 rad and covers ten periods. The tolerance of 1 % includes the effect of the ring on the frequency and the
-/// cubic terms of the pendulum.
+/// Under a ring baffle the damping ratio at the amplitude a is Z a^(1/2) with a constant Z, so that a^(-1/2) grows at the
+/// rate Z omega/2. The oscillation starts at 0.1 rad and lasts ten periods. The tolerance of 1 % includes the effect of the
+/// ring on the frequency and the cubic terms of the pendulum.
 #[test]
-fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
+fn with_a_ring_baffle_damping_follows_the_root_of_the_decaying_amplitude() {
     for slosh in sloshing() {
         let mut p = ringed(slosh);
         p.init.slosh_angle = 0.1;
@@ -367,7 +367,7 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
 /// For example, `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the reason must contain the name
 /// `slosh.zeta_from_correlation`.
 #[test]
-fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
+fn a_parameter_without_effect_is_reported_with_the_parameter_that_replaces_it() {
     let why = |p: &Parameters, name: &str| p.overridden(name).unwrap_or_default();
     let mut p = Parameters::default();
     assert!(why(&p, "slosh.zeta").contains("slosh.zeta_from_correlation is true"));
@@ -435,8 +435,9 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
     }
 }
 
-/// Breaking needs both of its parameters, and an onset that waves of the model can reach: at an amplitude of 1 rad the
-/// steepness is 1.541.
+/// A warning is due if one of the two parameters of breaking waves is missing, or if waves of the slosh model cannot reach
+/// the steepness at which they would break. For example, waves of the model `liquid` have an amplitude of up to 1 rad, at
+/// which their steepness is 1.541.
 #[test]
 fn warnings_name_parameters_of_breaking_waves_that_have_no_effect() {
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
@@ -472,7 +473,7 @@ fn warnings_name_parameters_of_breaking_waves_that_have_no_effect() {
 /// With the wave elevation and the wave number of a cylinder in the table, the amplitude at which waves begin to break equals
 /// that of the cylinder.
 #[test]
-fn steepness_follows_from_the_wave_elevation_and_wave_number_in_the_table() {
+fn wave_steepness_follows_from_the_wave_elevation_and_wave_number_in_the_table() {
     let power = |p: &Parameters| plant(p).outputs(&inputs_with_gravity(9.81)).power_dissipated;
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     (p.slosh.zeta_breaking, p.slosh.breaking_steepness, p.init.slosh_rate) = (0.04, 0.25, 1.0);

@@ -9,7 +9,8 @@ fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// Height of the first mode's wave at the wall divided by slosh angle and tank radius, 2/(xi_1^2 - 1).
+/// Height of the first mode's wave at the wall divided by slosh angle and tank radius, 2/(xi_1^2 - 1), where xi_1 = 1.841 is
+/// the first zero of the derivative of the Bessel function J_1.
 const WAVE: f64 = 2.0 / (1.841_183_781_340_659_5 * 1.841_183_781_340_659_5 - 1.0);
 
 #[test]
@@ -109,7 +110,8 @@ fn a_ring_wider_than_the_tank_or_below_its_bottom_is_refused() {
     assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "no baffle");
 }
 
-/// The masses in the table may differ from the mass of the liquid by 1e-9 of it.
+/// A sum of the modal masses that exceeds the mass of the liquid by a relative amount of up to 1e-9 is accepted as a
+/// rounding error.
 #[test]
 fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -141,8 +143,9 @@ fn a_spherical_pendulum_that_starts_above_the_horizontal_is_refused() {
     assert!(refused(0.9, 0.9), "beyond");
 }
 
-/// At h/R = 0.2 the large-wave coefficient s is -38.7, so that the inertia of hub and liquid would not be positive at
-/// amplitudes that depend on the hub. Near the secondary resonances at 0.829 and 1.012 the coefficients are interpolated.
+/// In the model `liquid` the large-wave coefficient s changes the inertia of the slosh mass with the amplitude. At h/R =
+/// 0.2, s is -38.7, so that the inertia would become 0 or negative, and the fill is refused. Near the secondary resonances
+/// at h/R = 0.829 and 1.012 the coefficients are interpolated, so that these fills are accepted.
 #[test]
 fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     let said = |fill: f64, model: SloshModel| {
@@ -161,9 +164,9 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     }
 }
 
-/// For every reason there is a plant just beyond the limit and a plant just within it. The bench's cylinder has h/R = 1.227;
-/// there the squared frequency changes by the factors 1 - 0.429 A^2 in planar and 1 + 0.367 A^2 in circular motion at the
-/// slosh angle A.
+/// The output `limited_by` names the limit of the slosh model that the motion has passed. For each limit the test has a
+/// plant just beyond it and a plant just within it. The bench's cylinder has h/R = 1.227; there the squared frequency
+/// changes by the factors 1 - 0.429 A^2 in planar and 1 + 0.367 A^2 in circular motion at the slosh angle A.
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {
@@ -224,7 +227,7 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
 /// If the slosh model uses the coefficients of the table, a mode is out of range above the limits in the table. With other
 /// slosh models it is out of range at smaller angles.
 #[test]
-fn a_table_of_modes_has_its_own_limits() {
+fn limits_in_a_table_of_modes_apply_if_the_slosh_model_uses_its_coefficients() {
     let reason = |model: SloshModel, limit: f64, degrees: f64| {
         let mut p = bench(model, FrictionModel::None);
         (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 1);

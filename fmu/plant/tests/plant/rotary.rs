@@ -102,8 +102,9 @@ fn stereographic_and_unit_vector_pendulums_agree_beyond_the_horizontal() {
 }
 
 /// Returns true if a small radial displacement grows, that is, if planar motion is unstable. The hub is too heavy for the
-/// liquid to move it, and the tank is so far from the axis that the hinge moves on a straight line, by `eps` l cos(w t). The
-/// motion starts on the planar periodic orbit with the amplitude a eps^(1/3), where `mu` a + a^3/8 + 1 = 0.
+/// liquid to move it, and the tank is so far from the axis that the hinge moves on a straight line, by `eps` l cos(w t),
+/// where l is the pendulum length. `mu` is the detuning: w^2 = (g/l) (1 + mu eps^(2/3)). The motion starts on the planar
+/// periodic orbit with the amplitude a eps^(1/3), where mu a + a^3/8 + 1 = 0.
 fn leaves_the_plane(eps: f64, mu: f64) -> bool {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.tank.r = 1000.0;

@@ -50,9 +50,10 @@ fn errors_of_states_stay_within_the_solver_tolerance() {
     }
 }
 
-/// Angle, rate and energies of a hub without liquid and friction, under a ramp of torque, are polynomials of time.
+/// For a hub without liquid and friction under a ramp of torque, angle, rate and energies are polynomials of time, which the
+/// integrator solves exactly in steps of any length.
 #[test]
-fn internal_steps_are_the_same_for_long_and_short_communication_steps() {
+fn for_polynomial_motion_the_number_of_internal_steps_does_not_depend_on_the_communication_step() {
     let p = bench(SloshModel::Frozen, FrictionModel::None);
     let inputs = Inputs { tau_cmd: Ramp { value: 0.01, slope: 1e-3 }, ..Inputs::default() };
     let [short, long] = [0.02, 1e4].map(|h| steps(&p, &inputs, 1e-9, h));
@@ -93,7 +94,7 @@ fn a_second_of_motion_takes_the_expected_number_of_internal_steps() {
 /// The tolerance is relative to the size of the motion, so that small waves on a hub at rest take no more steps than large
 /// waves.
 #[test]
-fn a_small_motion_takes_no_more_steps_than_a_large_one() {
+fn a_small_motion_takes_no_more_internal_steps_than_a_large_one() {
     for slosh in SloshModel::ALL {
         let of_angle = |angle: f64| {
             let mut p = bench(slosh, FrictionModel::None);

@@ -77,7 +77,7 @@ fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
 /// The expected frequencies are the eigenvalues of the coupled equations of hub and linear pendulum with the stiffness of the
 /// line.
 #[test]
-fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() {
+fn suspension_line_and_liquid_swing_at_the_frequencies_of_two_coupled_pendulums() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.0);
     p.hub.k = 40.0; // near the slosh frequency: strongly coupled

@@ -127,7 +127,7 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
 
 /// Liquid that rotates with the walls of the tank (`tank.I_own`) adds to the inertia of the hub, wherever the tank is.
 #[test]
-fn the_tanks_own_inertia_is_turned_with_the_hub() {
+fn the_tanks_own_inertia_adds_to_the_inertia_of_the_hub() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
     let inputs = Inputs { tau_cmd: Ramp::held(1e-3), ..Inputs::default() };
     for r in [0.0, 0.225] {
@@ -146,7 +146,7 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
 /// If the table contains only the modes along one axis of a box, slosh models in which the liquid also moves along the other
 /// axis are refused, because the modes along that axis are different.
 #[test]
-fn modes_along_one_axis_are_refused_where_the_liquid_moves_along_both() {
+fn a_table_of_modes_along_one_axis_is_refused_for_liquid_that_moves_along_both() {
     for model in SloshModel::ALL {
         let mut p = sphere();
         (p.slosh.model, p.slosh.table.one_axis) = (model, true);

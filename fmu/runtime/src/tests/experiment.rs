@@ -43,7 +43,7 @@ fn setup_experiment_refuses_invalid_values_and_names_each_of_them() {
 }
 
 #[test]
-fn instance_goes_through_the_states_of_its_interface() {
+fn an_instance_passes_through_the_states_of_co_simulation_or_model_exchange() {
     use InstanceState::*;
     let mut instance = fresh(CS);
     assert_eq!((instance.interface(), instance.state()), (CS, Instantiated));
@@ -266,7 +266,7 @@ fn compare(interface: Interface, events: Events, state: InstanceState, mut expec
 }
 
 #[test]
-fn the_instance_states_that_can_be_reached_follow_from_the_interface_and_from_who_handles_events() {
+fn reachable_instance_states_depend_on_the_interface_and_on_event_handling_by_the_host() {
     use Events::{ByHost, InStep};
     use InstanceState::*;
     let reached = |interface, events| -> Vec<_> {

@@ -43,7 +43,7 @@ fn the_log_of_a_failure_has_its_status_and_category() {
 }
 
 #[test]
-fn events_are_logged_on_request_with_the_last_one_and_their_number() {
+fn on_request_a_step_logs_its_number_of_events_and_the_last_one() {
     let (mut log, lines) = log();
     let mut instance = started(CS, &[("z", 3.0)]);
     set(&mut instance, "z", 1.0).unwrap();

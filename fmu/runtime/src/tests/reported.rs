@@ -215,7 +215,7 @@ fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
 }
 
 #[test]
-fn events_are_handled_by_the_interface_or_reported_in_co_simulation() {
+fn each_interface_and_fmi_version_allows_its_own_kinds_of_event_handling() {
     let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));
     assert_eq!(allowed(CS), [true, false, true]);
     assert_eq!(allowed(ME), [false, true, false]);

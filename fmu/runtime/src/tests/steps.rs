@@ -141,7 +141,7 @@ fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
 }
 
 #[test]
-fn a_step_that_is_refused_keeps_the_slopes() {
+fn a_refused_step_keeps_the_slopes_of_the_inputs() {
     let mut instance = started(CS, &[("w", 1.0)]);
     slope(&mut instance, "w", 2.0).unwrap();
     let why = unchanged(&mut instance, |i| i.do_step(0.0, 1.0));
@@ -202,7 +202,7 @@ fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
 }
 
 #[test]
-fn a_model_whose_outputs_use_no_slopes_keeps_none() {
+fn input_slopes_are_not_kept_for_a_model_whose_outputs_do_not_use_them() {
     let mut instance = spring(CS);
     let force = Spring::table().find("F").unwrap();
     instance.set_input_derivatives(&[force], &[1], &[3.0]).unwrap();
@@ -213,7 +213,7 @@ fn a_model_whose_outputs_use_no_slopes_keeps_none() {
 }
 
 #[test]
-fn slopes_that_an_input_cannot_have_are_refused() {
+fn input_slopes_that_are_not_finite_or_out_of_range_are_refused() {
     let mut instance = started(CS, &[]);
     let names = references(["q[1]", "w", "z"]);
     assert_eq!(
@@ -257,7 +257,7 @@ fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
 /// A valve of the test model opens if a platform, whose height is an input, is high enough. Between steps the outputs show
 /// the valve in the position that the present inputs cause, but the valve in the model moves only in the next step.
 #[test]
-fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
+fn reading_outputs_uses_the_present_inputs_and_does_not_change_the_model() {
     let mut instance = started(CS, &[]);
     set(&mut instance, "z", 3.0).unwrap();
     assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(true)));

@@ -14,7 +14,7 @@ fn scalar(name: &str) -> &'static Scalar<Vessels> {
 }
 
 #[test]
-fn a_table_lists_its_inputs_parameters_and_states() {
+fn the_table_of_variables_lists_inputs_parameters_and_states() {
     assert_eq!(TABLE.scalars.len(), 25);
     assert_eq!(names(TABLE.inputs()), ["q[1]", "q[2]", "z", "w"]);
     assert_eq!(
@@ -219,7 +219,7 @@ fn the_guid_changes_with_everything_that_a_host_depends_on() {
 }
 
 #[test]
-fn token_of_fmi_3_changes_with_an_input_that_can_be_set_within_a_step() {
+fn the_fmi_3_token_depends_on_which_inputs_can_be_set_within_a_step() {
     let token = |variables: Vec<Variable<Vessels>>| {
         Table::new(TABLE.about, variables.leak(), &[]).token(Layout::Scalars).to_string()
     };
@@ -234,7 +234,7 @@ fn token_of_fmi_3_changes_with_an_input_that_can_be_set_within_a_step() {
 
 #[test]
 #[should_panic(expected = "each stand together in the table")]
-fn a_table_whose_inputs_are_not_adjacent_is_refused() {
+fn a_table_of_variables_whose_inputs_are_not_adjacent_is_refused() {
     let apart = [9, 0, 10].map(|n| TABLE.variables[n]).to_vec().leak();
     const N: usize = 4 + 1;
     assert_eq!(scalar_count(apart), N);

@@ -193,7 +193,7 @@ fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_re
 /// In an intermediate update the host lets the force rise to 1, but also requests a return at once. In the next step the host
 /// sets no force, so that the force stays 0.
 #[test]
-fn after_a_return_at_the_start_of_a_step_inputs_keep_their_values() {
+fn after_an_early_return_at_the_start_of_a_step_inputs_keep_their_values() {
     let (instance, host) = stepping(true);
     (host.lock().unwrap().force, host.lock().unwrap().wish) = (Some(1.0), Some(-1.0));
     assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, true, 0.0));
@@ -240,7 +240,7 @@ fn after_an_error_values_can_be_read_and_the_instance_reset() {
 }
 
 #[test]
-fn counts_types_and_references_are_checked_before_anything_is_written() {
+fn counts_types_and_value_references_are_checked_before_any_value_is_written() {
     for case in 0..6 {
         let (instance, host) = stepping(false);
         let references = [reference("x"), reference("v")];
@@ -428,7 +428,7 @@ fn adjoint_derivatives_are_the_transpose_of_directional_derivatives() {
 }
 
 #[test]
-fn dependencies_are_those_of_the_start_during_initialization_and_the_declared_ones_afterwards() {
+fn initial_values_have_their_own_dependencies_until_initialization_ends() {
     let host = Mutex::new(TestHost::default());
     unsafe {
         let instance = model_exchange(&host);

@@ -139,7 +139,7 @@ fn changing_the_size_of_an_array_resets_its_elements() {
 
 /// The table has 24 scalars. The time and two event indicators follow, and the host can read each of them as a Float64.
 #[test]
-fn time_and_event_indicators_follow_the_scalars_of_the_table() {
+fn value_references_of_time_and_event_indicators_follow_those_of_the_scalars() {
     let lines = Lines::default();
     let token = c_string(Trays::table().token(Layout::Scalars));
     let environment = std::ptr::from_ref(&lines).cast_mut().cast();
@@ -191,7 +191,7 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
 /// Each element of the output `square` depends on all levels and inflows of the present trays, even where all of them are 0,
 /// so that the derivatives vanish. The rate of a level depends only on the inflow of its own tray.
 #[test]
-fn array_elements_depend_on_others_even_where_the_derivative_vanishes() {
+fn dependencies_of_array_elements_are_reported_even_where_the_derivative_vanishes() {
     let lines = Lines::default();
     let instance = instance_with_arrays(&lines);
     unsafe {

@@ -221,7 +221,7 @@ fn directional_derivatives_equal_the_partial_derivatives_of_the_equations() {
 }
 
 #[test]
-fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
+fn in_initialization_mode_directional_derivatives_are_by_inputs_and_parameters() {
     let mut instance = fresh(CS);
     set(&mut instance, "q[1]", 4.0).unwrap();
     instance.enter_initialization_mode().unwrap();

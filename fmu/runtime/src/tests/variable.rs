@@ -138,7 +138,7 @@ fn a_variable_has_the_unit_range_and_nominal_value_that_were_given() {
 }
 
 #[test]
-fn parameters_are_read_and_set_at_their_places_in_the_model() {
+fn a_parameter_is_read_back_as_it_was_set_unless_its_type_is_wrong() {
     let mut parameters = vessels::Parameters::default();
     let mut all = TABLE.parameters().to_vec();
     all.extend(TABLE.inputs());

@@ -218,7 +218,7 @@ mod tests {
 
     /// A scalar that is within the present size of its array has a position in it; beyond the size there is none.
     #[test]
-    fn a_scalar_has_an_array_and_an_index_within_its_size() {
+    fn every_scalar_variable_within_the_size_of_its_array_has_an_index() {
         let arrays = Arrays::new::<Trays>(&parameters(2));
         let places = [1, 2, 3, 4, 11, 15, 16, 18, 19, 20, 21, 22, 23, 24].map(|n| arrays.place(n));
         let (level, square, rows, w, m, k) = (1, 2, 5, 6, 7, 8);
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variable_has_its_reference_name_type_and_shape() {
+    fn every_variable_of_fmi_3_has_its_value_reference_name_type_and_shape() {
         let arrays = Arrays::new::<Trays>(&parameters(2));
         let names = ["level", "square", "der(level)", "q", "rows", "w", "m", "k"];
         for (n, (variable, known)) in Trays::table().variables.iter().zip(names).enumerate() {

@@ -273,7 +273,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn writing_outside_an_array_is_a_fault_and_writing_inside_is_not() {
+    fn an_fmu_that_writes_outside_an_array_of_the_host_is_detected() {
         let mut array = Guarded::output::<c_int>(3);
         // SAFETY: the address is inside the array.
         unsafe { array.pointer::<c_int>().add(2).write(7) };
