@@ -259,9 +259,9 @@ impl List {
     }
 }
 
-/// Largest number of dependencies of an initial value that are written. Values that depend on
-/// accelerations depend on nearly all parameters, and their lists would be the largest part of the
-/// file.
+/// Length above which the list of dependencies of an initial value is shortened, as [`Long`] says.
+/// Values that depend on accelerations depend on nearly all parameters, so that their lists would
+/// be the largest part of the file.
 const LONGEST: usize = 100;
 
 #[derive(Clone, Copy, PartialEq)]

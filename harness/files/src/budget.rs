@@ -6,18 +6,21 @@ use anyhow::{Result, ensure};
 /// Largest number of rows of a table, and of steps of a run. At 50 Hz this is a recording of 111
 /// hours.
 pub const ROWS: usize = 20_000_000;
-/// Largest memory that a command may use for numbers at the same time, bytes. It is twice the
-/// memory that the longest allowed run of the bench needs for its columns.
+/// Largest memory that a command may use for numbers at the same time, bytes. The columns of the
+/// longest run of the FMU HubSlosh ([`ROWS`] rows) need half of it.
 pub const BYTES: u64 = 4 << 30;
 /// Largest text file that is read as a whole, bytes, for example a plan or a parameter set. Tables
 /// are read in parts, so that they are limited by [`ROWS`] instead.
 pub const TEXT: u64 = 64 << 20;
-/// Number of bytes of numbers that any recording may contain: three signals in [`ROWS`] rows.
+/// Size of the table of numbers that a recording of any file size may contain, bytes: three columns
+/// of [`ROWS`] rows. Larger tables must come from a large file, see [`PER_BYTE`].
 pub const RECORDING: u64 = 512 << 20;
-/// Number of bytes of numbers that a file may contain for each byte of its size, if this is more
-/// than [`RECORDING`]. Compressed tables of runs contain up to 10.
+/// Largest ratio of the size of a table in memory to the size of the file from which it is read,
+/// for tables larger than [`RECORDING`]. The ratio is at most 10 in compressed tables that HubSlosh
+/// writes; a larger ratio shows that the file is damaged or malicious.
 pub const PER_BYTE: u64 = 32;
-/// Largest size of one file while it is decompressed, bytes, including the parts that are skipped.
+/// Largest total size of the decompressed pages of one column of a Parquet file, bytes. Pages whose
+/// rows are skipped also count, because they must be decompressed.
 pub const INFLATED: u64 = 2 << 30;
 pub const RUNS: usize = 100_000;
 pub const JOBS: usize = 512;
@@ -25,8 +28,9 @@ pub const LINES: usize = 20_000;
 /// Largest number of sines that are evaluated for a multisine: the number of frequencies times the
 /// number of rows. This takes half a minute.
 pub const SINES: u64 = 2_000_000_000;
-/// Largest number of products for the frequency responses of one run: the number of rows times the
-/// number of frequencies. This takes about ten seconds.
+/// Largest product of rows and frequencies for the frequency responses of one run, because each
+/// frequency needs one multiplication in each row. The computation takes about ten seconds at this
+/// limit.
 pub const PRODUCTS: f64 = 4e9;
 /// Highest frequency that a torque may have, Hz. The lowest frequency is the inverse of this
 /// number, Hz.

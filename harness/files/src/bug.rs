@@ -11,8 +11,8 @@ static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
 
 /// Functions that are called when this process panics.
 ///
-/// - `panics`: receives the report before the panic unwinds, because a panic that cannot unwind
-///   ends the process.
+/// - `panics`: is called with the report before the stack is unwound. A later call could be too
+///   late, because a panic inside a function that C calls ends the process.
 /// - `catches`: is called when [`catch_panic`] has caught the panic.
 pub struct Listener {
     pub panics: fn(&str),
@@ -25,8 +25,8 @@ pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }
 
-/// From now on stores the messages of panics of this process, from which [`catch_panic`] takes
-/// them, and does not print them.
+/// Makes this process store the messages of its panics instead of printing them. [`catch_panic`]
+/// returns the stored messages.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));
@@ -72,8 +72,8 @@ pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     })
 }
 
-/// Formats the message of a panic for the user: the panic itself, the files that had been read, and
-/// the request to report it as a bug.
+/// Formats the message of a panic for the user: the panic itself, the files that this process has
+/// read so far, and the request to report the panic as a bug.
 pub fn report(panic: &str) -> String {
     let read = input::read_so_far();
     let files = match read.is_empty() {

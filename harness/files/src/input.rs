@@ -137,11 +137,11 @@ pub fn protect(path: &Path) {
     }
 }
 
-/// Checks that `path` does not lead to a protected input, for example by a relative path, a
-/// symbolic link or a hard link.
+/// Checks that an output to `path` would not replace a protected input. Relative paths, symbolic
+/// links and hard links are followed.
 ///
 /// # Errors
-/// If it does; the message names both paths.
+/// If `path` leads to a protected input; the message names both paths.
 pub fn check_replaceable(path: &Path) -> Result<()> {
     let Some(identity) = identity(path) else { return Ok(()) };
     let all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);

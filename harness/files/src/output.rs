@@ -62,8 +62,8 @@ fn containing_folder(path: &Path) -> &Path {
 
 /// Calls `write` to write the output `path`, completely or not at all. A regular file is replaced
 /// only when the new file is on the disk, so that an error or a power failure does not leave an
-/// incomplete file. A device or a pipe receives the bytes when all of them exist. A protected input
-/// ([`input::protect`]) is never overwritten.
+/// incomplete file. A device or a pipe receives bytes only after `write` has succeeded. A protected
+/// input ([`input::protect`]) is never overwritten.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
     input::check_replaceable(path)?;
     let cannot = || format!("{} cannot be written", path.display());
@@ -223,7 +223,8 @@ mod tests {
         }
     }
 
-    /// The device is a copy of `/dev/full`, which accepts no bytes. Only root can create a device.
+    /// Uses a copy of the device `/dev/full`, every write to which fails. Only root can create the
+    /// copy; for other users the test checks only that the device is recognised as a device.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_device_is_written_to_and_its_error_is_reported() {

@@ -35,11 +35,13 @@ const TABLE: &str = "runs.csv";
 /// Kind of a folder with stored runs: a campaign, or a study of `monte_carlo`.
 ///
 /// - `name`, `noun`: the name without and with its article, for messages.
-/// - `definition`: file that determines the runs.
+/// - `definition`: name of the file that describes which runs the folder contains: the plan of a
+///   campaign, or seed and ranges of a study.
 /// - `ending`: ending of the files of the runs.
-/// - `elsewhere`: advice in messages if another program uses the folder.
-/// - `is_published`: true for names of files that are published with the last run. Other files are
-///   never removed, even if the manifest lists them.
+/// - `elsewhere`: advice in messages if the folder belongs to something else.
+/// - `is_published`: returns true for the names of the files that [`Store::publish`] writes when
+///   all runs are stored, for example `report.html`. Outdated files are removed only if they have
+///   one of these names, even if the manifest lists others.
 #[derive(Debug)]
 pub struct Kind {
     name: &'static str,
@@ -100,10 +102,12 @@ pub enum Damage {
     Unreadable(anyhow::Error),
 }
 
-/// Definition of the runs in a folder, which a folder with stored runs must have too.
+/// Definition of the runs of a study (seed and ranges), with which [`Store::take`] checks that a
+/// folder contains runs of the same study.
 ///
-/// - `text`: content of the file with the definition.
-/// - `compare`: fails if the text in the folder, which it receives, defines other runs.
+/// - `text`: content of the file with the definition, `study.json`.
+/// - `compare`: receives the content of the file that is in the folder. Returns an error if the
+///   file defines other runs than `text`.
 #[derive(Clone, Copy)]
 pub struct Definition<'a> {
     pub text: &'a str,
@@ -113,7 +117,8 @@ pub struct Definition<'a> {
 /// A locked folder with stored runs; it is unlocked when this value is dropped.
 ///
 /// - `lost`: files that are in the manifest but not in the folder.
-/// - `is_new`: true if the folder had no manifest, so that its runs come from other programs.
+/// - `is_new`: true if the folder had no manifest when it was locked. HubSlosh has not yet stored a
+///   run in such a folder, so that any runs in it were put there by another program.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
@@ -127,10 +132,10 @@ pub struct Store {
     _lock: File,
 }
 
-/// The list of the stored files.
+/// The manifest of a folder: the list of its files with their SHA-256.
 ///
-/// - `file`: the open file of the list. It is `None` after publication, and after a line could not
-///   be written.
+/// - `file`: the open file `manifest.sha256`, to which lines are appended. It is `None` when
+///   nothing more may be appended: after publication, or after writing a line has failed.
 /// - `sums`: SHA-256 of each file by its name.
 #[derive(Debug)]
 struct Manifest {
@@ -177,8 +182,8 @@ fn has_no_runs(path: &Path) -> bool {
 /// before.
 ///
 /// # Errors
-/// If the folder contains runs and the manifest is damaged, or is missing although the folder was
-/// used. Nothing would then verify the stored runs.
+/// If the folder contains runs, but the manifest cannot verify them because it is damaged, or
+/// because it was removed from a folder that was used before.
 fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
     let place = path.join(MANIFEST);
     let read = || -> Result<BTreeMap<String, String>> {
@@ -223,8 +228,9 @@ impl Definition<'_> {
 
 impl Store {
     /// Locks the folder `path` for stored runs of this kind, and creates it if it does not exist.
-    /// `about` tells other programs why the folder is locked. A study passes its `definition`; a
-    /// campaign passes none, because it is published with the tables.
+    /// `about` tells other programs why the folder is locked. For a study the `definition` is
+    /// compared with the file in the folder, or written there. A campaign passes `None`, because
+    /// its plan is written only when the campaign is complete, by [`Store::publish`].
     ///
     /// # Errors
     /// If another program has locked the folder, the folder contains runs of another kind or of
@@ -305,9 +311,10 @@ impl Store {
         self.manifest().sums.contains_key(&self.kind.run_file(run))
     }
 
-    /// Returns the SHA-256 of the stored run `run`, or `None` if the run was never stored. A run
-    /// without a line in the manifest is accepted if the folder is new, or if `is_ours` returns
-    /// false for its file, because another program has written it.
+    /// Returns the SHA-256 of the stored run `run`, or `None` if the run was never stored. A file
+    /// without a line in the manifest is accepted only if another program has put it into the
+    /// folder: if the folder had no manifest when it was locked, or if `is_ours`, which receives
+    /// the path, returns false because HubSlosh has not written the file.
     ///
     /// # Errors
     /// If the file differs from the file that was stored.
@@ -337,8 +344,8 @@ impl Store {
         self.read_checked(run, |_| true, read)
     }
 
-    /// Reads the file of a stored run with `read`, and returns the value that `read` has extracted.
-    /// `read` also returns the SHA-256 of the file, which must be the SHA-256 in the manifest. For
+    /// Calls `read` with the path of the stored run `run`. `read` returns the SHA-256 of the file,
+    /// which is compared with the manifest, and the extracted content, which is then returned. For
     /// `is_ours` see [`Store::check`].
     fn read_checked<T>(
         &self,
@@ -370,9 +377,9 @@ impl Store {
         stored.with_context(|| format!("{} cannot be stored", self.run(run).display()))
     }
 
-    /// Writes `file` into the folder with `write`. The line in the manifest comes first; then the
-    /// complete file gets its name. A program that is killed in between leaves no file without a
-    /// line.
+    /// Writes `file` into the folder. First `write` writes a temporary file, then the SHA-256 is
+    /// added to the manifest, and then the file gets its name. If the program is killed in between,
+    /// every file in the folder therefore has a line in the manifest.
     fn write(&self, file: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let place = self.path.join(file);
         input::check_replaceable(&place)?;

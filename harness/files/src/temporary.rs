@@ -43,8 +43,9 @@ pub fn remove_all() {
     std::mem::forget(paths);
 }
 
-/// Runs `work`, and delays signals that would end the program until `work` returns. `work` must not
-/// register a temporary file, because it would wait for itself.
+/// Runs `work`, and delays signals that would end the program until `work` returns. The list of
+/// temporary files is locked meanwhile. `work` must therefore not register a temporary file,
+/// because it would wait for this lock forever.
 pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     let _held = paths();
     work()

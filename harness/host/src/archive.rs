@@ -22,12 +22,12 @@ pub const MOST_ENTRIES: usize = 20_000;
 /// Longest allowed name of a file in an archive, bytes. Windows opens paths of up to 259
 /// characters, so that longer names only occur in damaged or hostile archives.
 pub const LONGEST_NAME: usize = 1024;
-/// Total size to which the files of an archive of any size may unpack, bytes. It protects against
-/// archives that unpack to far more data than they contain.
+/// Constant part of the limit on the total unpacked size of an archive, bytes. The limit is
+/// `UNPACKED` + [`UNPACKED_PER_BYTE`] · size of the archive. It protects against archives that
+/// unpack to far more data than they contain.
 pub const UNPACKED: u64 = 64 << 20;
-/// Number of unpacked bytes that are allowed for each byte of the archive, in addition to
-/// [`UNPACKED`]. Larger archives may therefore unpack to more; binaries usually compress to a third
-/// and descriptions to a twentieth.
+/// Unpacked bytes that are allowed for each byte of the archive, in addition to [`UNPACKED`].
+/// Binaries usually unpack to three times, and descriptions to twenty times their compressed size.
 pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 

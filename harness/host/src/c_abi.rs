@@ -80,8 +80,9 @@ pub(crate) fn count_foreign_environment() {
     FOREIGN.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Environment pointer of an instance, under which messages of the instance are stored. It must be
-/// dropped after the instance is freed, because an FMU may still log while it is freed.
+/// Receiver of the log messages of one instance. Its address is the environment pointer that the
+/// FMU passes to the callbacks. It must be dropped after the instance is freed, because an FMU may
+/// still log while it is freed.
 pub(crate) struct Environment {
     sink: Arc<Sink>,
 }
@@ -243,9 +244,9 @@ pub(crate) struct Function<T> {
     pub call: T,
 }
 
-/// Declares a struct of C functions, with a field, the symbols and the type of each function.
-/// `load` finds the functions in a library by their symbols. If the struct is for both versions of
-/// FMI, each function has one symbol for each version.
+/// Declares a struct that holds functions of a loaded FMI library. A line such as `reset
+/// "fmi2Reset" "fmi3Reset", Call;` gives a field, the symbol of its function in FMI 2.0 and in FMI
+/// 3.0, and the type of the function. `load` fills the struct from a library.
 macro_rules! functions {
     ($table:ident $(<$boolean:ident>)?: $($field:ident $($symbol:literal)+, $type:ty;)*) => {
         pub(crate) struct $table $(<$boolean>)? {
@@ -257,8 +258,8 @@ macro_rules! functions {
                 vec![$([$($symbol),+][version],)*]
             }
 
-            /// Finds the functions in `library`. `version` is the position of the version of FMI
-            /// among the symbols of each function.
+            /// Finds the functions in `library`. `version` selects the symbol of each function if
+            /// several are declared: 0 for FMI 2.0, 1 for FMI 3.0.
             ///
             /// # Safety
             ///

@@ -578,8 +578,9 @@ impl Reader {
     }
 }
 
-/// Returns pairs of value references, of each derivative in ModelStructure and of its state. FMI
-/// 2.0 identifies variables by their positions in ModelVariables, FMI 3.0 by value references.
+/// Returns the value references of each state derivative that ModelStructure lists, and of its
+/// state, as pairs (derivative, state). FMI 2.0 identifies variables by their positions in
+/// ModelVariables, FMI 3.0 by value references.
 fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     let all: Vec<&Element> = root.list("ModelVariables").collect();
     let reference = |variable: &Element| variable.get("valueReference")?.trim().parse::<u32>().ok();
@@ -636,8 +637,8 @@ fn indices(mut index: usize, dimensions: &[usize]) -> String {
 
 const LONGEST_NAME: usize = 1024;
 /// Largest number of types in a description, and of items of one enumeration. The number is limited
-/// because the type of every variable is searched among all types, so that the time would grow with
-/// the product of both numbers.
+/// because the type of a variable is found by a search through all types, so that the time grows
+/// with the number of variables times the number of types.
 const MOST_TYPES: usize = 5000;
 const MOST_ELEMENTS: usize = 100_000;
 const NAMED: usize = 20;
@@ -671,8 +672,8 @@ impl ModelDescription {
         self.fmi_version.starts_with("3.")
     }
 
-    /// Returns the array and the position in it to which the value reference `reference` was
-    /// assigned, or `None` for a variable that is not an element of an array.
+    /// Returns the array to which the value reference `reference` belongs, and the position of the
+    /// element in this array. Returns `None` if the variable is not an element of an array.
     pub fn element(&self, reference: u32) -> Option<ArrayElement> {
         self.elements.get(&reference).copied()
     }

@@ -23,15 +23,16 @@ pub struct Inputs {
 /// Relative tolerance of the host's solver in Model Exchange if neither the user nor the FMU's
 /// default experiment states a tolerance.
 const TOLERANCE: f64 = 1e-6;
-/// Limit above which the deviation of an input from the value that its last slope predicts counts
-/// as a jump, relative to the input's magnitude. A jump is an event in Model Exchange, whereas
-/// rounding errors of a ramp must not be.
+/// Largest relative difference between an input and its linear extrapolation from the last
+/// communication point that is not yet a jump. The limit separates jumps, which are events in Model
+/// Exchange, from rounding errors of a ramp, which are not.
 const JUMP: f64 = 1e-9;
 
-/// Values and slopes of the inputs until the next communication point, in the order of [`Inputs`].
+/// Inputs for the time until the next communication point, which the closure of [`Inputs::drive`]
+/// fills. Both lists have the order of the names that [`Inputs::new`] received.
 ///
-/// - `slopes`: time derivatives until the next communication point, per s. They are ignored if the
-///   FMU cannot interpolate its inputs or if the inputs are held.
+/// - `slopes`: time derivatives, per s. They are ignored if the FMU cannot interpolate its inputs
+///   or if the inputs are held.
 pub struct Course<'a> {
     pub values: &'a mut [f64],
     pub slopes: &'a mut [f64],
@@ -119,8 +120,9 @@ impl Inputs {
     }
 
     /// Simulates as [`Inputs::drive`] does, but in Model Exchange, with the host's solver of
-    /// relative tolerance `tolerance`. A Real input that deviates from the line with its last slope
-    /// causes an event, and so does every change of another input.
+    /// relative tolerance `tolerance`. An event is handled at a communication point if a Real input
+    /// differs from its linear extrapolation from the previous point, or if an input of another
+    /// type has changed.
     fn integrate<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,

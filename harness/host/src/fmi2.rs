@@ -505,8 +505,9 @@ pub struct Instantiation<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Callbacks {
     Full,
-    /// Like `Full`, but the host overwrites the struct after fmi2Instantiate has returned, because
-    /// FMI guarantees it only during this call. An FMU that uses it later fails the test.
+    /// All callbacks, but the host overwrites the struct fmi2CallbackFunctions after
+    /// fmi2Instantiate has returned, because FMI guarantees the struct only during this call. An
+    /// FMU that uses it later fails the test.
     Fleeting,
     Logger,
     Empty,

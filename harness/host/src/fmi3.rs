@@ -855,21 +855,21 @@ impl<'fmu> Instance<'fmu> {
     }
 }
 
-/// Inputs that change linearly within a step and that an FMU 3.0 accepts within the step, by their
-/// value references. FMI sets arrays as a whole: if one element changes, all elements of the array
-/// are listed.
+/// The inputs that the host sets within a step because they change linearly, with their value
+/// references and values. FMI sets arrays as a whole: if one element changes, `values` contains all
+/// elements of the array.
 #[derive(Default)]
 struct Line {
     references: Vec<u32>,
     values: Vec<f64>,
-    /// Pairs of positions of each value that changes within the step: in `values`, and among the
-    /// arguments of the step.
+    /// Position in `values`, and position in the list of inputs that the step received, of each
+    /// input that changes within the step.
     moving: Vec<(usize, usize)>,
 }
 
 impl Line {
-    /// Fills this list with those of the inputs `references` that the FMU accepts within a step.
-    /// `values` are the present values of the inputs.
+    /// Replaces the content by those of the inputs `references` that the host may set within a
+    /// step. `values` are the present values of `references`.
     fn fill(&mut self, instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
         let description = instance.fmu().description();
         self.references.clear();
@@ -904,8 +904,8 @@ impl Line {
     }
 }
 
-/// Returns an error if the step ended before its end although the host had not allowed early
-/// return. `done` is the result of fmi3DoStep.
+/// Returns an error if fmi3DoStep has not simulated the whole step, although the host had not
+/// allowed early return. `done` is the result of fmi3DoStep.
 fn require_whole_step(instance: &Instance, done: Step) -> Called {
     let time = done.last_time;
     let (status, mut messages, text) = if done.terminate == 1 {

@@ -211,8 +211,8 @@ impl<'fmu> Instance<'fmu> {
     }
 
     /// Returns `true` if an FMU 2.0 has refused a step because it requests the end of the
-    /// simulation. An FMU 3.0 states this in the result of the step, so that the function returns
-    /// `false`.
+    /// simulation (fmi2Terminated). Returns `false` for an FMU 3.0, because the error of the
+    /// refused step already says this.
     pub fn wants_to_end(&mut self) -> bool {
         match self {
             Instance::V2(instance) => instance.boolean_status(fmi2::TERMINATED).unwrap_or(false),

@@ -40,7 +40,8 @@ pub const MEMORY: u64 = 320 << 20;
 /// Default limit of the size of a file that the process may write, bytes. It is raised for large
 /// tables of results.
 pub const FILE: u64 = 64 << 20;
-/// Number of bytes of stdout, and of stderr, that are stored. The rest is counted, but not stored.
+/// Number of bytes of the output of a guarded process that are stored, for stdout and for stderr
+/// each. Further bytes are only counted.
 pub const PRINTED: usize = 64 << 10;
 
 /// Number of bytes that a process may print if its output is stored. Above this limit the process
@@ -69,7 +70,8 @@ pub enum Cause {
     Flood,
     /// The process was killed because its temporary files or its shared memory exceeded [`Limits::memory`].
     Hoard,
-    /// The process was killed because its connection was closed or carried bytes that the program itself had not sent.
+    /// The process was killed because its connection to the parent was closed, or carried bytes
+    /// that the FMU's binary and not the program had sent.
     Interfered,
     Panicked(String),
 }
@@ -166,8 +168,8 @@ pub fn run<A: AsRef<OsStr>>(
     Ok(Outcome { cause, printed })
 }
 
-/// Waits until the process `child` ends, or kills it when it exceeds a limit. Returns the reason
-/// why it ended.
+/// Waits until the process `child` ends, or kills it when it exceeds a limit. `news` receives the
+/// messages of the process. Returns the reason why the process ended.
 fn wait_for_end(
     mut child: Child,
     news: &mut Messages<impl FnMut(&[u8])>,
@@ -406,13 +408,17 @@ struct Messages<F> {
 // Kinds of messages from the process to its parent.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
-/// Kind of the message that the first binary is going to be loaded. The content is the size of the temporary files, bytes.
+/// Kind of the message that announces that the process is about to load its first binary. The
+/// content is the size of its temporary files at this time, bytes, which does not count towards the
+/// limit.
 const LOADS: u8 = b'+';
 const ANSWER: u8 = b'>';
-/// Kind of the message that the program itself has panicked. The content is the report of the panic.
+/// Kind of the message that reports a panic of the program itself. The content is the report for
+/// the user.
 const PANICS: u8 = b'?';
 const CATCHES: u8 = b'-';
-/// Kind of the message that the process has done its work. The content is the exit code.
+/// Kind of the message that reports that the process has done its work. The content is the exit
+/// code.
 const DONE: u8 = b'=';
 
 impl<F: FnMut(&[u8])> Messages<F> {

@@ -14,12 +14,14 @@ use crate::description::{ModelDescription, Value};
 
 pub const START_VALUES: &str = "resources/start_values.txt";
 
-/// Number of elements, for example of tanks, that a reduced description keeps of some arrays.
+/// Number of tanks, modes or appendages that a reduced description keeps.
 ///
+/// - `parameter`: the parameter of the FMU for this number, for example `tanks`.
+/// - `size`, `most`: the number to keep, and the number in the full description.
 /// - `has_indicators`: true if each element of the arrays has its own event indicators.
-/// - `arrays`: the arrays whose size the parameter determines. Each is listed with the position of
-///   the index that counts up to the parameter, for example 0 for the tank and 1 for the mode of
-///   `tank[1].p[2,3]`.
+/// - `arrays`: the arrays that become shorter, each with the position of the index that counts the
+///   elements. For example, in `tank[1].p[2,3]` the index at position 0 counts tanks, and the index
+///   at position 1 counts modes.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit<'a> {
     pub parameter: &'a str,

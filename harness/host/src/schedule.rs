@@ -19,8 +19,8 @@ const SAME: f64 = 1e-6;
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 
-/// Returns the words with which the metadata of a result describe the inputs between rows. `hold`
-/// is true for a zero-order hold.
+/// Returns the words that describe the course of the inputs between two rows in the metadata of a
+/// result file. `hold` is true for a zero-order hold.
 pub const fn between(hold: bool) -> &'static str {
     if hold { "held from row to row" } else { "straight lines between rows" }
 }
@@ -102,16 +102,16 @@ impl History {
         self.at_row(self.time.partition_point(|row| *row <= t), t)
     }
 
-    /// Returns the value of the input at the time `t`, s, of a clock with rounding errors. A row
-    /// that begins at most 1e-9 (1 + |t|) s after `t` counts as begun, so that a jump at this row
-    /// is not missed.
+    /// Returns the value of the input at the time `t`, s, which may have a rounding error because
+    /// it is a sum of steps. A jump at most 1e-9 (1 + |t|) s after `t` counts as having happened,
+    /// so that it is not missed.
     pub fn near(&self, t: f64) -> f64 {
         let slack = 1e-9 * (1.0 + t.abs());
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
     /// Returns the value of the input and its slope, per s, at the time `t`, s. `begun` is the
-    /// number of rows that begin at `t` or before; the callers find it by a search or by counting.
+    /// number of rows whose times are at most `t`.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);
@@ -145,7 +145,8 @@ impl Cursor<'_> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     pub time: Vec<f64>,
-    /// For each point, true if the point is a row of the result. `None` if every point is a row.
+    /// For each communication point, true if the result has a row at this point. `None` means that
+    /// it has a row at every point.
     pub rows: Option<Vec<bool>>,
 }
 

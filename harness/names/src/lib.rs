@@ -27,8 +27,9 @@ impl<const D: usize> Array<D> {
 ///
 /// - `most`: largest value of the parameter.
 /// - `has_indicators`: true if each element has its own event indicators.
-/// - `arrays`: names of these arrays, each with the position, among the indices of the array, of
-///   the index that counts up to the parameter.
+/// - `arrays`: names of these arrays, each with the position of the index that counts the elements.
+///   For example, in `tank[2].p[1,3]` the index at position 0 counts tanks, and the index at
+///   position 1 counts modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub parameter: &'static str,

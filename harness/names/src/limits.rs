@@ -5,8 +5,9 @@ use formulas::limits::LimitedBy;
 
 use crate::{hubslosh, sloshtank, spacecraft};
 
-/// Output variables that tell why a tank is out of the range of its model. Each entry has the name
-/// of the variable, and the words that precede the reason in messages.
+/// Names of the output variables of an FMU that give the reason why a tank is outside the range of
+/// its model, one for each tank. Each name is paired with the words that precede the reason in
+/// messages, for example `tank 2: `.
 pub struct Limits {
     tanks: Vec<(String, String)>,
 }
@@ -29,7 +30,7 @@ impl Limits {
     /// Returns a sentence for each tank that was out of the range of its model in a run. The
     /// sentence lists the reasons with their shares of the time, the largest first, and the time at
     /// which each reason first occurred. `column` returns the column of the run's table with a
-    /// given name. A row counts until the next row.
+    /// given name. The reason in a row is taken to hold until the next row.
     pub fn describe<'t>(&self, column: impl Fn(&str) -> Option<&'t [f64]>) -> Vec<String> {
         let of_tank = |(name, tank): &(String, String)| {
             let found = reasons(column("time")?, column(name)?);

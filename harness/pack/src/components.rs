@@ -24,8 +24,8 @@ pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
     pub name: String,
-    /// Version of the component. `None` if the component has the version of the tool that linked
-    /// it.
+    /// Version of the component. `None` if the component belongs to the linker or C compiler and
+    /// has the version of this tool, which is not recorded.
     pub version: Option<String>,
     pub licence: String,
     pub texts: Vec<String>,

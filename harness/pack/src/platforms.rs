@@ -357,7 +357,7 @@ mod tests {
     use super::*;
     use crate::fmi::Fmi;
 
-    /// A binary without a folder would be missing in the archive without any error.
+    /// A binary for which no folder is known would be left out of the archive without an error.
     #[test]
     fn every_platform_has_its_folder_in_an_fmu() {
         for platform in &PLATFORMS {

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail, ensure};
 use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Message, TargetKind};
 
-/// Returns the root of the project's source. It is the current folder, because this program was
-/// built on another machine.
+/// Returns the root of the project's source: the current folder. The distributed program does not
+/// know another place, because it was built on another machine.
 #[cfg(feature = "shipped")]
 pub fn root() -> PathBuf {
     std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))

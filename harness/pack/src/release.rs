@@ -20,10 +20,10 @@ pub const PRESENT: &str = "SHA256SUMS";
 /// files of older versions, and wheels that are published, but not kept in the folder.
 pub const MANIFEST: &str = "SHA256SUMS.all";
 
-/// Largest wheel for Linux that is kept in the folder of the release, bytes. It is limited because
-/// the wheel stays in the project's history forever. Of 17.0 MB the command has 6.6, the nine FMUs
-/// 7.7, and the library of the package 2.3. The two FMUs 3.0 of a model repeat the binary of its
-/// FMU 2.0, because a zip archive cannot share it.
+/// Largest wheel for Linux that is kept in the folder of the release, bytes. The size is limited
+/// because the wheel stays in the project's history forever. The present wheel has 17.0 MB: 6.6 MB
+/// for the command, 7.7 MB for the nine FMUs and 2.3 MB for the library of the package. The two
+/// FMUs 3.0 of a model repeat the binary of its FMU 2.0, because a zip archive cannot share it.
 pub const LARGEST_WHEEL: u64 = 20_000_000;
 
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {

@@ -14,8 +14,9 @@ use crate::archive::{Files, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::root;
 
-/// Line of pyproject.toml with the path of the build backend: relative to the folder of this file
-/// in the project, and relative to the root of the source distribution (sdist).
+/// Line of pyproject.toml with the path of the build backend. The first text is the line in the
+/// project, where the path is relative to `harness/python`. The second text replaces it in the
+/// source distribution (sdist), where pyproject.toml is at the root.
 const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
 
 /// Writes the source distribution of the Python package (sdist) to `folder` and returns its path.

@@ -57,14 +57,19 @@ functions! { Exchange<B>:
 }
 
 pub(crate) trait Getter<T> {
+    /// Calls this get function of an FMU, for example fmi2GetReal, and returns its status.
+    ///
     /// # Safety
-    /// The function must belong to the FMU of this instance.
+    /// The function must belong to the FMU of the instance `component`.
     unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int;
 }
 
 pub(crate) trait Setter<T> {
+    /// Calls this set function of an FMU, for example fmi2SetReal, and returns its status.
+    ///
     /// # Safety
-    /// The function must belong to the FMU of this instance, and everything that the values point to must exist.
+    /// The function must belong to the FMU of the instance `component`. If the values are pointers,
+    /// their targets must exist.
     unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int;
 }
 
@@ -90,10 +95,11 @@ pub struct Updated {
     pub next_event: Option<f64>,
 }
 
-/// Folders of the binaries for the platform of this program in FMI 2.0 (FMI 2.0.5, section 2.3) and in FMI 3.0 (FMI
-/// 3.0.2, section 2.5.1.4.1). In FMI 2.0 names with 32 and 64 are for x86, and other processors use the platform
-/// tuples of FMI 3.0. On macOS darwin64 is used for both processors, because hosts look there on both, and one
-/// universal binary serves both.
+/// Folder below `binaries/` with the binaries for the platform of this program, in FMI 2.0 (FMI
+/// 2.0.5, section 2.3) and in FMI 3.0 (FMI 3.0.2, section 2.5.1.4.1). FMI 2.0 defines names such as
+/// `linux64` only for x86; for other processors the names of FMI 3.0 are used. On macOS `darwin64`
+/// is used for both processors, because hosts look there on both, and one universal binary serves
+/// both.
 pub(crate) const PLATFORM: [&str; 2] = {
     let (is_arm, has_64_bits) = (cfg!(target_arch = "aarch64"), cfg!(target_pointer_width = "64"));
     match (cfg!(target_os = "windows"), cfg!(target_os = "macos"), is_arm) {
@@ -153,8 +159,8 @@ pub trait Version: Sized {
 
     fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
 
-    /// Sets time derivatives of the inputs with the value references `references`, per s. In a
-    /// version of FMI without a function for derivatives of inputs it does nothing.
+    /// Sets the time derivatives `slopes`, per s, of the inputs with the value references
+    /// `references`. Nothing happens in FMI 3.0, which has no function for derivatives of inputs.
     fn set_slopes(instance: &mut Instance<'_, Self>, references: &[u32], slopes: &[f64]) -> Called;
 
     /// Simulates from `time` to `time + step`, s, while the inputs change linearly: `values` are
@@ -208,8 +214,8 @@ pub struct Fmu<V: Version> {
     /// without a check of each reference.
     is_plain: bool,
     plain: Vec<u32>,
-    /// Value references, in ascending order, of Float64 inputs, and of elements of input arrays,
-    /// whose values an FMU 3.0 accepts within a step.
+    /// Value references of the Float64 inputs, also elements of arrays, that the host may set
+    /// within a step (attribute intermediateUpdate of FMI 3.0), in ascending order.
     pub(crate) taken: Vec<u32>,
     structural: BTreeMap<u32, Value>,
     // The order of these fields is the order in which they are dropped: first the library, then its files.
@@ -525,8 +531,9 @@ pub struct Instance<'fmu, V: Version> {
     pub(crate) kept: V::Kept,
     warned: Cell<Option<&'static str>>,
     pub(crate) calls: Calls,
-    /// Values of arrays by value reference. FMI sets an array as a whole, so that the array is
-    /// stored here if single elements were set before the array could be read from the FMU.
+    /// Values of the arrays of which the host has set single elements, by value reference. FMI can
+    /// only set a whole array, so that the values of the other elements must be known when the next
+    /// element is set.
     arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
     one_thread: PhantomData<*mut ()>,
 }

@@ -46,8 +46,9 @@ pub struct Process {
 pub const REQUEST: usize = 3;
 const REQUEST_BYTES: usize = NONCE + 8 * REQUEST;
 
-/// Returns random bytes that mark messages of our own code. They come from the hashers of the
-/// standard library's maps, which are seeded with random numbers of the system.
+/// Returns random bytes with which every message of our own code begins, so that bytes from an
+/// FMU's binary are recognised. They come from the hashers of the standard library's maps, which
+/// are seeded with random numbers of the system.
 fn nonce() -> [u8; NONCE] {
     let half = || u128::from(RandomState::new().hash_one(0));
     (half() << 64 | half()).to_ne_bytes()
@@ -151,8 +152,9 @@ impl Parent {
 }
 
 impl Process {
-    /// Takes over the connection from stdin, which is empty afterwards, so that an FMU cannot read
-    /// it. Returns the connection, the request of the parent, and the pipe for the output.
+    /// Takes the connection to the parent from stdin, and replaces stdin by an empty file, so that
+    /// an FMU cannot read the connection. Returns the connection, the request of the parent, and
+    /// the pipe for the output.
     #[cfg(unix)]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::io::IoSliceMut;

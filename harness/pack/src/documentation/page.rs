@@ -73,8 +73,8 @@ impl Page {
         Ok(page)
     }
 
-    /// Returns the paths of the pages that this page lists, relative to the project's root, in the
-    /// order of the list.
+    /// Returns the paths of the Markdown pages to which the bulleted and numbered lists of this
+    /// page link, relative to the project's root and in the order of the links.
     pub fn listed(&self) -> Vec<String> {
         let (mut items, mut paths) = (0, Vec::new());
         for event in events(&self.text) {
@@ -147,8 +147,11 @@ impl Page {
         PreEscaped(page)
     }
 
-    /// Returns the target of the link `link` in the file with all `pages`, or `None` if it leads
-    /// out of the documentation. The inner error means that the target does not exist.
+    /// Returns the address to which the link `link` of this page leads in the file with all
+    /// `pages`, or `None` if it leads out of the documentation.
+    ///
+    /// # Errors
+    /// If the target of the link does not exist.
     fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>> {
         if link.contains("://") {
             return Ok(None);
