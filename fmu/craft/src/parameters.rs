@@ -1082,8 +1082,8 @@ impl Tank {
         let least = libm::sqrt(surface.half * surface.gyration);
         if ball.radius > 0.0 && ball.radius < least {
             problems.0.push(format!(
-                "{name}.ball.radius = {:?} m (allowed: 0, or at least {least:?} m, which gives the surface at the bottom the curvature \
-                 of the path of the pendulums' common centre)",
+                "{name}.ball.radius = {:?} m (allowed: 0, or at least {least:?} m, so that the surface at the bottom \
+                 is not more curved than the path of the pendulums' common centre of mass)",
                 ball.radius
             ));
         }

@@ -1627,7 +1627,8 @@ fn check_order<M: Model>(call: &Call, scalar: &Scalar<M>, order: i32) -> Result<
     if order == 1 {
         return Ok(());
     }
-    Err(call.error(format_args!("order {order} of {} (allowed: 1)", scalar.name())))
+    Err(call
+        .error(format_args!("derivative of order {order} of {} (allowed: order 1)", scalar.name())))
 }
 
 fn check_direction<M: Model>(call: &Call, scalar: &Scalar<M>, d: f64) -> Result<(), Fault> {

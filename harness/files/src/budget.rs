@@ -49,7 +49,7 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
     );
     ensure!(
         span > 0.0 && span.is_finite(),
-        "{span} s is not a span of time (allowed: more than 0 s)"
+        "the duration must be a positive number of seconds, not {span}"
     );
     let exact = span / step;
     ensure!(
@@ -125,8 +125,8 @@ mod tests {
             (steps(1e12, 0.02).map(drop), "5.000e13 steps (allowed: at most 20000000)"),
             (steps(1.0, 1e-300).map(drop), "1.000e300 steps"),
             (steps(1.0, 0.0).map(drop), "must be a positive number of seconds, not 0"),
-            (steps(f64::NAN, 0.1).map(drop), "NaN s is not a span"),
-            (steps(f64::INFINITY, 0.1).map(drop), "inf s is not a span"),
+            (steps(f64::NAN, 0.1).map(drop), "seconds, not NaN"),
+            (steps(f64::INFINITY, 0.1).map(drop), "seconds, not inf"),
             (table(ROWS + 2, 1).map(drop), "rows (allowed: at most 20000000)"),
             (table(ROWS, 100).map(drop), "take 16.0 GB (allowed: at most 4.3 GB)"),
             (table(usize::MAX, usize::MAX).map(drop), "allowed"),

@@ -195,8 +195,8 @@ fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>>
     };
     match read() {
         Err(error) if !has_no_runs(path) => Err(error.context(format!(
-            "{} is damaged, so nothing verifies the stored runs; restore it, or remove {} to \
-             simulate all runs again",
+            "{} is damaged or missing, so nothing verifies the stored runs; restore it, or remove {} to simulate all \
+             runs again",
             place.display(),
             path.join(RUNS).display()
         ))),
@@ -449,7 +449,12 @@ impl Store {
         let name = self.path.join(MANIFEST);
         let name = name.display();
         let place = manifest.file.as_mut();
-        let place = place.with_context(|| format!("{name} is closed, or could not be written"))?;
+        let place = place.with_context(|| {
+            format!(
+                "{name} takes no further lines, because the folder is closed or an earlier line \
+                 could not be written"
+            )
+        })?;
         let added = place.write_all(line.as_bytes()).and_then(|()| place.sync_data());
         if added.is_err() {
             // No further line is written, because an incomplete line must be the last one.

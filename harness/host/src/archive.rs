@@ -54,7 +54,7 @@ impl Entry {
         } else if name.split('/').any(|part| part == "..") {
             Some("its name leads out of the archive by \"..\"")
         } else if name.is_empty() || name.contains(['\\', '\0']) {
-            Some("its name is empty, or has a backslash or a zero")
+            Some("its name is empty, or contains a backslash or a NUL character")
         } else if name.trim_end_matches('/').split('/').any(|part| matches!(part, "" | ".")) {
             Some("its name has an empty part or \".\"")
         } else if self.link {

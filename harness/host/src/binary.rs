@@ -387,7 +387,9 @@ fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
     match wrong_pages() {
         None => Some("its signature cannot be read".into()),
         Some(0) => None,
-        Some(wrong) => Some(format!("{wrong} pages of it differ from the signed pages")),
+        Some(wrong) => {
+            Some(format!("it was changed after it was signed (pages that differ: {wrong})"))
+        }
     }
 }
 
@@ -514,7 +516,10 @@ mod tests {
         let mut changed = code.clone();
         changed[4500] = 8;
         let fault = signature_fault(&changed, &signature);
-        assert_eq!(fault.as_deref(), Some("1 pages of it differ from the signed pages"));
+        assert_eq!(
+            fault.as_deref(),
+            Some("it was changed after it was signed (pages that differ: 1)")
+        );
         assert!(signature_fault(&code, &signature[..30]).is_some());
     }
 

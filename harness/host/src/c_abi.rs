@@ -402,8 +402,8 @@ fn explain_needs(error: &str) -> &'static str {
     let symbol = error.split("undefined symbol: ").nth(1).unwrap_or_default();
     match symbol.trim_start_matches('_').starts_with("Py") {
         true => {
-            ": it needs a Python host, whose process brings the Python interpreter that the binary is not linked to (allowed: \
-             FMUs that load without one)"
+            ": it needs a Python host, because it uses a Python interpreter but is not linked to one (allowed: FMUs \
+             that load in every host)"
         }
         false => "",
     }

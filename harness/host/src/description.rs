@@ -555,7 +555,10 @@ impl Reader {
             };
             match size {
                 Some(size) => dimensions.push(size as usize),
-                None => self.problem(dimension, "the size of the array is not known"),
+                None => self.problem(
+                    dimension,
+                    "the dimension has no size (allowed: start, or the valueReference of a structural parameter)",
+                ),
             }
         }
         dimensions
@@ -821,7 +824,9 @@ impl ModelDescription {
         let plain = BaseUnit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
         let known = if own.is_empty() { Some(plain) } else { known };
         let Some(known) = known else {
-            bail!("{name}: {unit} cannot be converted, the FMU does not define {own} by base units")
+            bail!(
+                "{name}: {unit} cannot be converted, because the FMU does not define the unit {own} by SI base units"
+            )
         };
         ensure!(
             base.exponents == known.exponents,

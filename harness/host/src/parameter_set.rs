@@ -82,7 +82,7 @@ impl Parameter {
             let variable = description.variable(name)?;
             ensure!(
                 variable.kind() == Type::Real,
-                "{name} is a {:?} and has no unit, but \"{}\" is given",
+                "{name} has the type {:?} and no unit, but the file gives the unit \"{}\"",
                 variable.kind(),
                 unit.name
             );

@@ -164,7 +164,8 @@ fn token_of_part(
 ) -> Result<String> {
     ensure!(
         whole.len() == 38 && whole.is_ascii() && (1..=3).contains(&limits.len()) && states < 256,
-        "no tanks, modes or appendages can be left out of this FMU, because its GUID has another form than those of this project"
+        "tanks, modes and appendages can be left out only of FMUs of this project, and the GUID of this FMU has \
+         another form"
     );
     let sizes: String = limits.iter().map(|limit| format!("{:x}", limit.size)).collect();
     let sum = start_values.map_or(0, |text| (fnv(text.as_bytes()) & 0xffff).max(1));

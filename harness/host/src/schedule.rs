@@ -54,7 +54,7 @@ impl History {
         ensure!(rows >= 2, "the table of inputs has {rows} rows (allowed: at least two)");
         ensure!(
             values.len() == rows && slopes.as_ref().is_none_or(|slopes| slopes.len() == rows),
-            "the columns have different lengths"
+            "the columns of times, values and slopes have different lengths (allowed: one number of each in every row)"
         );
         // The condition is also true for NaN.
         if let Some(row) = time
@@ -254,8 +254,8 @@ pub fn check_interpolation<'h>(
     for (name, history) in inputs {
         ensure!(
             history.is_held(),
-            "{} cannot interpolate its inputs (canInterpolateInputs), and {name} is not constant between its rows; with {hold} it \
-             is held from row to row",
+            "{} cannot interpolate its inputs (canInterpolateInputs is false), but {name} is not constant between its \
+             rows: run with {hold} to hold each value until the next row",
             description.model_name
         );
     }

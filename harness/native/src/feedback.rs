@@ -313,7 +313,10 @@ fn wheels(
         *place >= commands || !(*inertia > 0.0 && *max_torque >= 0.0 && *max_speed >= 0.0)
     };
     if given.iter().any(wrong) {
-        return Err(PyValueError::new_err("wheels: a place or a limit is out of range"));
+        return Err(PyValueError::new_err(
+            "wheels: the index of a command, an inertia or a limit is out of range (allowed: index below the number \
+             of commands, inertia above 0, max_torque and max_speed 0 or more)",
+        ));
     }
     let speeds = Numbers::borrow(&feedback.getattr("speeds")?, rows, given.len(), true)?;
     let each = given

@@ -119,8 +119,8 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
         licence: "MIT OR Apache-2.0".into(),
         texts: vec![STANDARD_TEXT.into()],
         origin:
-            "Rust's standard library: core, alloc, std, panic_unwind, compiler_builtins, and of \
-                 the crates it is made from what is used; those that the binaries name follow"
+            "Rust's standard library: core, alloc, std, panic_unwind, compiler_builtins, and the parts of other crates that it uses; \
+                 those of these crates that can be recognised in the binaries follow"
                 .into(),
         platforms: everywhere,
         ..Component::default()
@@ -265,9 +265,9 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
 pub fn licence_note(description: &ModelDescription, components: &[Component]) -> String {
     let mut note = format!(
         "{} {}\nSPDX-License-Identifier: {OWN}\n\n\
-         The texts are in LICENSE-MIT and LICENSE-APACHE; the choice is yours. The binaries also \
-         hold what is listed\nhere; none of it asks more than that its notice travels with the \
-         binary, as it does here.\n",
+         You may use this FMU under either licence; the texts are in LICENSE-MIT and LICENSE-APACHE. The binaries\n\
+         also contain the components below, whose licences require only that their notices are distributed\n\
+         with the binary, as they are here.\n",
         description.model_name, description.version
     );
     for component in components {
@@ -335,8 +335,8 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
         }
     }
     let mut notices = format!(
-        "The command hubslosh and the library _native in this package hold the following; none of it asks more than that \n\
-         its notice travels with the program, as it does here.\n\n{list}"
+        "The command hubslosh and the library _native in this package contain the components below, whose licences\n\
+         require only that their notices are distributed with the program, as they are here.\n\n{list}"
     );
     for (text, names) in texts {
         let names: Vec<_> = names.into_iter().collect();

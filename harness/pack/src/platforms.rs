@@ -235,7 +235,7 @@ impl Toolchain {
         let private = self.private().into_iter();
         let named = private
             .filter(|folder| bytes.windows(folder.len()).any(|w| w == folder.as_bytes()))
-            .map(|folder| format!("it names the folder {folder}"));
+            .map(|folder| format!("it contains the path {folder} of this machine"));
         let all = found.into_iter().chain(named);
         all.map(|fault| format!("\n  {}: {fault}", platform.folder)).collect()
     }

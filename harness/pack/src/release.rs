@@ -164,7 +164,7 @@ pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
         }
         if is_kept {
             eprintln!(
-                "{} has {} bytes and is not kept in {} (allowed: {LARGEST_WHEEL})",
+                "{} has {} bytes and is not kept in {} (allowed: at most {LARGEST_WHEEL} bytes)",
                 path.display(),
                 bytes.len(),
                 folder.display()

@@ -57,8 +57,8 @@ pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>>
 fn check_folder(folder: &Path) -> Result<()> {
     ensure!(
         folder.extension().is_none_or(|ending| ending != "whl"),
-        "{} is the name of a file; a folder is expected, for pip reads package, version and platform \
-         from the wheel's own name",
+        "{} is the name of a file; a folder is expected, because pip reads package, version and platform from the \
+         name of the wheel, which must not be changed",
         folder.display()
     );
     Ok(())

@@ -92,7 +92,10 @@ pub fn tank_damping(
         outside(measured, nu, effective).into_iter().map(|why| format!("damping: {why}")).collect();
     let layer = (2.0 * nu / first.omega).sqrt();
     if layer >= 0.1 / first.lambda {
-        warnings.push(format!("damping: the laminar layer at the wall, {layer:.3e} m, is not thin compared with the wave"));
+        warnings.push(format!(
+            "damping: the laminar layer at the wall is {layer:.3e} m thick, but the formulas assume a layer that is thin compared \
+             with the wave"
+        ));
     }
     let mut all = |modes: &[formula::Mode]| -> Vec<ModeDamping> {
         let of_mode = |(n, mode): (usize, &formula::Mode)| {

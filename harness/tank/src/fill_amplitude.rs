@@ -142,8 +142,8 @@ pub(crate) fn columns(
     let worst = between.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((worst, fill)) = worst {
         let text = format!(
-            "between the points s and kappa of mode {n} are within {worst:.0e} of 1 + |s| and 1 + |kappa|, the largest error at \
-             a fill of {} m",
+            "between the points of the table the errors of s and kappa of mode {n} are at most {worst:.0e} of 1 + |s| \
+             and 1 + |kappa|; they are largest at a fill of {} m",
             format_length(fill)
         );
         if worst > LARGEST {

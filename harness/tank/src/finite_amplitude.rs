@@ -276,12 +276,14 @@ enum NoEnergy {
     )]
     NoWaves,
     #[error(
-        "the shift of omega^2 per squared slosh angle of small waves differs by {0:.2} from the shift by third-order theory \
-         (allowed: {LARGEST_SHIFT_ERROR}): deep liquid and strong resonances need more functions"
+        "the shift of omega^2 per squared slosh angle of small waves differs by {0:.2} from the shift by third-order \
+         theory (allowed: {LARGEST_SHIFT_ERROR}): for deep liquid and strong resonances this computation has too few \
+         basis functions"
     )]
     OtherThirdOrder(f64),
     #[error(
-        "no slosh mass has the frequencies of the waves within {:.1} %: the error of the best one is {:.1} %",
+        "no coefficients of a slosh mass give the frequencies of the waves within {:.1} %: the best ones have an \
+         error of {:.1} %",
         100.0 * LARGEST_FREQUENCY_ERROR,
         100.0 * .0
     )]

@@ -81,8 +81,9 @@ impl Liquid {
         let matters = self.sigma.is_none() && self.gravity > 0.0 && bond < LOW_BOND;
         (matters && !data.modes.is_empty()).then(|| {
             format!(
-                "surface tension: none is given (sigma). With {LARGEST_TENSION:e} m³/s² over density, that of water, the Bond number \
-                 is {bond:.3}, and below {LOW_BOND} surface tension changes frequencies and masses. Give sigma, in N/m"
+                "surface tension: sigma is not given. With the ratio of surface tension to density of water, \
+                 {LARGEST_TENSION:e} m³/s², the Bond number would be {bond:.3}, and below {LOW_BOND} surface tension \
+                 changes frequencies and masses. Give sigma, in N/m"
             )
         })
     }
@@ -534,9 +535,11 @@ impl ParameterSet {
         if let (Some([length_x, length_y]), Target::HubSlosh) = (sides, target) {
             let first_across = count + 1;
             set.notes.push(format!(
-                "modes 1 to {count} are those along the box's first length, {length_x} m, which lies along the tangent on HubSlosh's hub; \
-                 {first_across} to {} those along {length_y} m, along the radius (slosh.table.direction). slosh.model = planar \
-                 includes the effect of the hub's rate on them, which is 0 to first order (linear); HubSlosh refuses spherical and liquid",
+                "modes 1 to {count} move along the box's first length, {length_x} m, which is tangential on \
+                 HubSlosh's hub; modes {first_across} to {} move along the second length, {length_y} m, which is \
+                 radial (slosh.table.direction). The hub's rate acts on radial modes to second order: slosh.model = \
+                 planar includes this, and linear does not. HubSlosh refuses slosh.model = spherical and liquid with \
+                 these modes",
                 2 * count
             ));
             for n in first_across..=2 * count {

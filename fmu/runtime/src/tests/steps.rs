@@ -231,11 +231,11 @@ fn input_slopes_that_are_not_finite_or_out_of_range_are_refused() {
     );
     assert_eq!(
         unchanged(&mut instance, |i| i.set_input_derivatives(&names, &[1, 2, 1], &[0.0; 3])),
-        "fmi2SetRealInputDerivatives: order 2 of w (allowed: 1)"
+        "fmi2SetRealInputDerivatives: derivative of order 2 of w (allowed: order 1)"
     );
     assert_eq!(
         unchanged(&mut instance, |i| i.output_derivatives(&names, &[1, 1, 0], &mut [0.0; 3])),
-        "fmi2GetRealOutputDerivatives: order 0 of z (allowed: 1)"
+        "fmi2GetRealOutputDerivatives: derivative of order 0 of z (allowed: order 1)"
     );
     assert_eq!(slope(&mut instance, "w", 7.9e9), Ok(()));
     assert_eq!(slope(&mut instance, "z", 1e300), Ok(()));

@@ -73,7 +73,7 @@ impl AnalyseArgs {
         let cases = plan.cases(fmu.description())?;
         ensure!(
             cases.iter().any(|case| case.recording.is_some()),
-            "no [[run]] of the plan has recording = \"FILE\"; hubslosh campaign --plan simulates it"
+            "no [[run]] of the plan has recording = \"FILE\"; hubslosh campaign --plan simulates the plan"
         );
         let campaign = Campaign { plan, force: false, jobs: self.runs.jobs, compare: None, out };
         let store = campaign.take()?;

@@ -197,7 +197,7 @@ impl AnyFmuArgs {
         let model = Model::open(&path, question.solver)?;
         for what in model.changed() {
             terminal::warn(format_args!(
-                "loading {} has changed this process's {what}",
+                "loading {} has changed the {what} of this process, which an FMU must not do",
                 path.display()
             ));
         }

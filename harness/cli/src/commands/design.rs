@@ -255,8 +255,8 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
         let made = lines.after(if (t - row).abs() < 1e-6 * STEP { row } else { t }).0;
         ensure!(
             (made - wanted(t)).abs() <= COARSEST * peak,
-            "the torque is {:.4} N·m at {t:.6} s, but lines between the rows of a plan, {STEP} s apart, give {made:.4} N·m (allowed: edges \
-             at multiples of {STEP} s, frequencies up to {:.2} Hz)",
+            "rows {STEP} s apart, joined by straight lines, do not describe this torque: at {t:.6} s they give \
+             {made:.4} N·m in place of {:.4} N·m (allowed: edges at multiples of {STEP} s, frequencies up to {:.2} Hz)",
             wanted(t),
             profile::cycles(COARSEST) / STEP
         );

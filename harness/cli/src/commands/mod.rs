@@ -66,7 +66,7 @@ pub fn open_to_run(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
 fn opened(fmu: Fmu) -> Result<Fmu> {
     for what in fmu.changed() {
         terminal::warn(format_args!(
-            "loading {} has changed this process's {what}",
+            "loading {} has changed the {what} of this process, which an FMU must not do",
             fmu.path().display()
         ));
     }

@@ -28,7 +28,7 @@ pub fn deviances(
     let result: Value = serde_json::from_str(result).context("the result cannot be read")?;
     let (system, unknowns) = FmuSystem::new(model, question, records)?;
     let mut problem = system.problem(unknowns, question);
-    let other = "the result belongs to another question: its unknowns or outputs differ";
+    let other = "the result belongs to another fit: its unknowns or outputs differ";
     let estimate = |name: &str| {
         let of = |kind: &str| result[kind][name]["value"].as_f64();
         of("parameters").or_else(|| of("measurement")).context(other)

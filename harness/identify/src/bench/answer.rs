@@ -247,7 +247,8 @@ fn findings(
     let pull = solution.fit.pull(z);
     if pull > LIMIT {
         doubts.push(format!(
-            "the known values are together {pull:.1} standard deviations off their tolerances: check --set, --start and --tolerance"
+            "the fit needs known values outside their tolerances, together by {pull:.1} standard deviations: check \
+             --set, --start and --tolerance"
         ));
     }
     for j in &solution.at_bound {
@@ -319,7 +320,7 @@ fn torque_words(solution: &Solution) -> Option<String> {
         match r.delay.filter(|_| r.early) {
             Some(delay) => format!("{hold} would need a delay of {:.2} ms", 1e3 * delay),
             None if r.lost => {
-                format!("{hold} was given up with a sum of squares {:.0} larger", r.more)
+                format!("{hold} was given up, because its sum of squares was {:.0} larger", r.more)
             }
             None => format!("{hold}{} changes the sum of squares by {:+.0}", late(r.delay), r.more),
         }

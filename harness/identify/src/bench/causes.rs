@@ -25,7 +25,8 @@ impl Cause {
             format!(" ({name} = {value:.3e}{unit})")
         });
         format!(
-            "The cause is {}: with it{size} the residual is noise, and no other effect that was tried explains it as well. {} fits it.",
+            "The cause is {}: with it{size} the residual is noise, and no other effect that was tried explains it as \
+             well. {} includes it in the fit.",
             self.effect, self.flags
         )
     }

@@ -175,7 +175,7 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         } else {
             let mut asked = scores(&mut fit, &other, &rivals)?;
             asked.retain(|score| score.score.abs() >= LIMIT);
-            (!asked.is_empty()).then(|| format!("noise is left that asks for {}", words(&asked)))
+            (!asked.is_empty()).then(|| format!("the residual still shows {}", words(&asked)))
         };
         let value = problem.unknowns[j].value(other.point.z[j]);
         let slope = if problem.unknowns[j].log { value } else { 1.0 };

@@ -336,7 +336,9 @@ impl Fit<'_> {
         let beyond = self.across_ridges(&mut at)?;
         let (mut found, mut profile) = self.settle(at, &beyond, news)?;
         if let Some(other) = self.with_tolerances(&found)? {
-            news(&News::Detail("known values within their tolerances leave noise alone".into()));
+            news(&News::Detail(
+                "changing known values within their tolerances makes the residual noise".into(),
+            ));
             (found, profile) = self.settle(other, &[], news)?;
         }
         self.derivatives_at(&mut found)?;
@@ -551,7 +553,7 @@ impl Fit<'_> {
                 own.push((part, cost));
                 let before = best.iter().find(|(other, _)| *other == part && part > ASTRAY.0);
                 if let Some((_, best)) = before {
-                    ensure!(cost < ASTRAY.1 * best, "it leads nowhere");
+                    ensure!(cost < ASTRAY.1 * best, "the fit is far worse than from another start");
                     if minimum.decrement < ENDS.0 && (cost - best).abs() < ALIKE {
                         return Ok(None);
                     }

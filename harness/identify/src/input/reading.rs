@@ -117,7 +117,11 @@ pub fn read_decay(
 ) -> Result<(&'static str, Recording)> {
     let name = path.display().to_string();
     let given = DECAYING.iter().filter(|name| source.columns.names(name)).collect::<Vec<_>>();
-    ensure!(given.len() < 2, "--columns names {} signals; a free decay is one", given.len());
+    ensure!(
+        given.len() < 2,
+        "--columns names {} signals (allowed: one, because a free decay is a record of one signal)",
+        given.len()
+    );
     let signal = |name| Signal { name, required: true, between: Between::Line, unit: None };
     let there = recording::assigned(path, &DECAYING.map(signal))?;
     let own = |k: usize| there.iter().any(|(_, signal)| *signal == Some(k));

@@ -374,7 +374,10 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
         said.contains("smooth between rows (band-limited) changes the sum of squares by +"),
         "{said}"
     );
-    assert!(said.contains("held from row to row (zero-order hold) was given up with"), "{said}");
+    assert!(
+        said.contains("held from row to row (zero-order hold) was given up, because"),
+        "{said}"
+    );
     for (name, estimated) in &told.parameters {
         // both searches end a fiftieth of a standard deviation from the minimum, but at a larger distance along the
         // valley of the friction

@@ -119,7 +119,8 @@ pub fn read(
             if let (Some(Kind::Date(ticks)), Some((_, Some(unit)))) = (kind, time) {
                 ensure!(
                     (unit * ticks as f64 - 1.0).abs() < 1e-9,
-                    "column {} holds timestamps, which have a unit, but another one is stated for it, of {unit} s: leave the unit out",
+                    "column {} holds timestamps, whose unit the file contains, but its name or --columns states \
+                     another unit, {unit} s: leave the unit out",
                     names[position]
                 );
             }
@@ -134,9 +135,7 @@ pub fn read(
                     .logical_type_ref()
                     .map_or(column.physical_type().to_string(), |of| format!("{of:?}"));
                 let allowed = match time.is_some() {
-                    true => {
-                        "timestamps, floating-point numbers in s, integers of a unit that is stated"
-                    }
+                    true => "timestamps, floating-point numbers in s, integers with a stated unit",
                     false => "numbers",
                 };
                 return Err(Foreign(format!(

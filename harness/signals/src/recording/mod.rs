@@ -399,7 +399,7 @@ fn read_as(
         header.names.join(", "),
         if let File::Text(layout) = &file { &layout.texts } else { "" },
         if timeless {
-            "; --columns rate=HZ, of gyro --rate HZ, reads equally spaced rows without times"
+            "; --columns rate=HZ, or --rate HZ of the command gyro, reads equally spaced rows without times"
         } else {
             ""
         }
@@ -474,21 +474,25 @@ fn read_as(
         return Ok(Table::new(names, columns));
     }
     if timed && stated.is_none() && !seconds {
-        plausible(&columns[0]).map_err(|why| anyhow!("column {time} {why}: --columns time={time}:ms, or :s, :us, :ns, :min, :h, states it"))?;
+        plausible(&columns[0]).map_err(|why| {
+            anyhow!("column {time} {why}: --columns time={time}:ms, or :s, :us, :ns, :min, :h, states its unit")
+        })?;
     }
     match stamps::regular(&columns[0]) {
         Stamps::AsTheyAre => {}
         Stamps::On(grid) => {
             done(format!(
-                "the times are printed to {}: rows {:.6} ms apart have these times, so that this spacing is used",
+                "the times are rounded to {}: rows {:.6} ms apart have these times, so that the rows are taken as \
+                 equally spaced",
                 stamps::format_quantum(grid.quantum),
                 1e3 * grid.step
             ));
             columns[0] = grid.time;
         }
         Stamps::Unknown(why) => bail!(
-            "column {time}: {why} (allowed: times that grow from row to row; log them with more digits, or leave them out and give the \
-             rows a second, if these are even and complete: --columns rate=HZ, of gyro --rate HZ)"
+            "column {time}: {why} (allowed: times that grow from row to row; log them with more digits, or leave them \
+             out and give the rows a second, if these are even and complete: --columns rate=HZ, or --rate HZ of the \
+             command gyro)"
         ),
     }
     let columns = complete(&signals, columns, rows_signal, done)?;
@@ -581,7 +585,7 @@ fn complete(
     }
     let origin = if time[0].abs() > LATE { time[0] } else { 0.0 };
     if origin != 0.0 {
-        done(format!("time counts from its first row, {origin} s"));
+        done(format!("time counts from the first row, whose time is {origin} s"));
         columns[0].iter_mut().for_each(|t| *t -= origin);
     }
     let complete = |column: &Vec<f64>| column.iter().all(|value| !value.is_nan());

@@ -29,7 +29,8 @@ pub enum Unreadable {
     #[error("has day and month in another order than the lines above")]
     OtherOrder,
     #[error(
-        "has another date than the lines above, in an order that two digits of the year do not show (allowed: years of four digits)"
+        "has another date than the lines above, and a year of two digits does not show the order of day, month and \
+         year (allowed: years of four digits)"
     )]
     ShortYear,
     #[error(

@@ -196,7 +196,7 @@ fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
         assert!(said.contains(&format!("time counts from {origin}")), "{said}");
         // a stated unit must agree with the unit of the type
         let error = read_file(&path, &columns("time=time:min")).unwrap_err();
-        assert!(error.contains("but another one is stated for it, of 60 s"), "{name}: {error}");
+        assert!(error.contains("states another unit, 60 s"), "{name}: {error}");
         // the file is also read by the reader of tables that `hubslosh run` has written
         let table = Table::read(&path, &["time", "omega"]).unwrap();
         assert_close(column(&table, "time"), &expected, name);
@@ -419,7 +419,7 @@ fn a_file_without_times_is_read_only_with_a_stated_rate() {
     let text = "tau_cmd,omega\n0.1,0\n0.25,1\n-0.3,2\n";
     let error = read_text("csv", text.as_bytes(), "").unwrap_err();
     assert!(
-        error.contains("; --columns rate=HZ, of gyro --rate HZ, reads equally spaced rows without"),
+        error.contains("; --columns rate=HZ, or --rate HZ of the command gyro, reads equally"),
         "{error}"
     );
     let directory = tempfile::tempdir().unwrap();
@@ -482,7 +482,7 @@ fn times_printed_to_milliseconds_are_restored_to_the_even_grid_of_33_hz() {
     let time = column(&table, "time");
     let worst = (0..400).map(|k| (time[k] - time[0] - k as f64 / 33.0).abs()).fold(0.0, f64::max);
     assert!(worst < 2e-5, "{worst:e}");
-    assert!(said.contains("the times are printed to 1 ms: rows 30.303"), "{said}");
+    assert!(said.contains("the times are rounded to 1 ms: rows 30.303"), "{said}");
 }
 
 fn write_parquet(path: &Path, names: [&str; 3], codec: parquet::basic::Compression) {

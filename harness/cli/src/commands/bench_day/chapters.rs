@@ -106,7 +106,9 @@ fn missing_chapter(title: &str, kind: Kind, problems: &[String]) -> Chapter {
             "decay",
             "a push forwards and one backwards with the tank empty, each with its free decay and the encoder's angle (theta)",
         ),
-        Kind::Rest => ("rest", "the gyro of a hub that stands still, for an hour or more"),
+        Kind::Rest => {
+            ("rest", "recordings of the gyro while the hub stands still, for an hour or more")
+        }
         Kind::Sweep => ("sweep", "sine sweeps"),
     };
     let why = if problems.is_empty() {
@@ -117,7 +119,7 @@ fn missing_chapter(title: &str, kind: Kind, problems: &[String]) -> Chapter {
     Chapter {
         title: title.into(),
         text: vec![format!(
-            "No usable recordings with kind = \"{word}\" in day.toml. They are: {needs}.{why}"
+            "No usable recordings with kind = \"{word}\" in day.toml. Recordings of this kind are {needs}.{why}"
         )],
         ..Chapter::default()
     }
