@@ -90,8 +90,8 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     let most = RECORDING.max(size.saturating_mul(PER_BYTE));
     ensure!(
         bytes <= most,
-        "{rows} rows of {columns} columns take {:.1} GB in a file of {:.1} MB (allowed: {:.1} GB, or {PER_BYTE} times the \
-         file); fewer columns take less",
+        "{rows} rows of {columns} columns take {:.1} GB in a file of {:.1} MB (allowed: {:.1} GB, or {PER_BYTE} times \
+         the size of the file); fewer columns take less",
         bytes as f64 / 1e9,
         size as f64 / 1e6,
         RECORDING as f64 / 1e9

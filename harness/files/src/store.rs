@@ -38,7 +38,8 @@ const TABLE: &str = "runs.csv";
 /// - `definition`: name of the file that describes which runs the folder contains: the plan of a
 ///   campaign, or seed and ranges of a study.
 /// - `ending`: ending of the files of the runs.
-/// - `elsewhere`: advice in messages if the folder belongs to something else.
+/// - `elsewhere`: advice in messages if the folder cannot be used, for example "give another
+///   folder".
 /// - `is_published`: returns true for the names of the files that [`Store::publish`] writes when
 ///   all runs are stored, for example `report.html`. Outdated files are removed only if they have
 ///   one of these names, even if the manifest lists others.
@@ -95,7 +96,7 @@ pub enum Damage {
     )]
     Changed,
     #[error(
-        "the run has no line in {MANIFEST}, which is damaged, so that nothing verifies the run"
+        "the run has no line in {MANIFEST}: the manifest is damaged, and nothing verifies the run"
     )]
     Unlisted,
     #[error("{0}")]

@@ -195,9 +195,16 @@ impl Binary {
         named.dedup();
         named.truncate(NAMED);
         (self.kind != Kind::MacOs && count > 0).then(|| match (named.len(), count) {
-            (0, _) => format!("it also exports {count} mangled symbols"),
-            (some, all) if some == all => format!("it also exports {}", named.join(", ")),
-            _ => format!("it also exports {count} symbols, among them {}", named.join(", ")),
+            (0, _) => {
+                format!("it also exports {count} mangled symbols (allowed: functions of FMI)")
+            }
+            (some, all) if some == all => {
+                format!("it also exports {} (allowed: functions of FMI)", named.join(", "))
+            }
+            _ => format!(
+                "it also exports {count} symbols, among them {} (allowed: functions of FMI)",
+                named.join(", ")
+            ),
         })
     }
 }
@@ -474,7 +481,7 @@ mod tests {
                 "it needs glibc 2.34 (allowed: at most 2.17)",
                 "it makes the loader search /opt/lib for libraries",
                 "it does not export fmi2Reset",
-                "it also exports rust_eh_personality",
+                "it also exports rust_eh_personality (allowed: functions of FMI)",
             ]
         );
         let mut windows = faultless(Kind::Windows);

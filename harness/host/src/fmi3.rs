@@ -868,8 +868,8 @@ struct Line {
 }
 
 impl Line {
-    /// Replaces the content by those of the inputs `references` that the host may set within a
-    /// step. `values` are the present values of `references`.
+    /// Clears this list, and adds each input of `references` that the host may set within a step.
+    /// `values` are the present values of `references`.
     fn fill(&mut self, instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
         let description = instance.fmu().description();
         self.references.clear();

@@ -326,7 +326,7 @@ def test_campaigns_and_studies_accept_and_refuse_the_same_folders(
             assert first.read_bytes() == whole
         first.unlink()
         says(True, "re-running .*: the file of the run is missing")
-        unlisted = "re-running .*: the run has no line in manifest.sha256, which is damaged"
+        unlisted = "re-running .*: the run has no line in manifest.sha256: the manifest is damaged"
         unverified = "manifest.sha256 is damaged or missing, so nothing verifies the stored runs; restore it"
         for data, succeeds, words in (
             (good + row[:30], True, []),  # as a kill leaves it

@@ -458,8 +458,9 @@ impl ParameterSet {
             };
             if let (Some(angle), None) = (angle, written) {
                 set.notes.push(format!(
-                    "mode {n} is a pendulum: in range up to {:.1} degrees (angle_limit). Beyond, its frequency differs too much from \
-                     the liquid's, by the third order of potential flow or an estimate of it",
+                    "mode {n} is a pendulum: it is in range up to {:.1} degrees (angle_limit). Above this angle its \
+                     frequency differs too much from the frequency of the liquid, which is computed to the third \
+                     order of potential flow or estimated",
                     angle.to_degrees()
                 ));
             }

@@ -132,7 +132,7 @@ impl Text {
             let Some(known) = mode else { continue };
             let along = if axis.is_empty() { "".into() } else { format!("motion along {axis}: ") };
             let source = match known.bridged {
-                true => "bridged across a secondary resonance".to_string(),
+                true => "interpolated across a secondary resonance".to_string(),
                 false => format!("error {:.0e} of the series", known.error),
             };
             let (s, kappa) = (known.nonlinear_inertia, known.nonlinear_stiffness);
