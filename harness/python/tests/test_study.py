@@ -178,8 +178,8 @@ def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
         assert len(warned) == (again > 0) and manifest.read_bytes() == good
     for data, said in (
         (None, "nothing verifies the stored runs; restore it, or remove .*runs .*it is missing"),
-        (good.replace(b"  runs/000005", b" runs/000005"), "is damaged, so nothing .*line 7 is"),
-        (good.replace(b"\n", b"\nxx\n", 1), 'is damaged, so .*line 2 is "xx"'),
+        (good.replace(b"  runs/000005", b" runs/000005"), "is damaged or missing, so .*line 7 is"),
+        (good.replace(b"\n", b"\nxx\n", 1), 'is damaged or missing, so .*line 2 is "xx"'),
         (b"\xff" + good, "is damaged or missing, so nothing verifies .*byte 1 is not UTF-8"),
     ):
         if data is None:
@@ -327,7 +327,9 @@ def test_campaigns_and_studies_accept_and_refuse_the_same_folders(
         first.unlink()
         says(True, "re-running .*: the file of the run is missing")
         unlisted = "re-running .*: the run has no line in manifest.sha256: the manifest is damaged"
-        unverified = "manifest.sha256 is damaged or missing, so nothing verifies the stored runs; restore it"
+        unverified = (
+            "manifest.sha256 is damaged or missing, so nothing verifies the stored runs; restore it"
+        )
         for data, succeeds, words in (
             (good + row[:30], True, []),  # as a kill leaves it
             (good.replace(row, b""), True, [unlisted]),

@@ -440,7 +440,7 @@ fn units_of_a_parameter_set_are_converted_or_refused() {
         ),
         (
             ssv("slosh.model", "<ssv:Enumeration value=\"linear\" unit=\"m\"/>", ""),
-            "slosh.model is a Enumeration and has no unit",
+            "slosh.model has the type Enumeration and no unit",
         ),
     ] {
         let (ok, _, said) = run(&text);
