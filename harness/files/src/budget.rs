@@ -19,8 +19,9 @@ pub const RECORDING: u64 = 512 << 20;
 /// for tables larger than [`RECORDING`]. The ratio is at most 10 in compressed tables that HubSlosh
 /// writes; a larger ratio shows that the file is damaged or malicious.
 pub const PER_BYTE: u64 = 32;
-/// Largest total size of the decompressed pages of one column of a Parquet file, bytes. Pages whose
-/// rows are skipped also count, because they must be decompressed.
+/// Largest total size of the decompressed pages of a column chunk of a Parquet file (one column in
+/// one row group), bytes. Pages whose rows are skipped also count, because they must be
+/// decompressed.
 pub const INFLATED: u64 = 2 << 30;
 pub const RUNS: usize = 100_000;
 pub const JOBS: usize = 512;

@@ -24,8 +24,8 @@ pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
     pub name: String,
-    /// Version of the component. `None` if the component belongs to the linker or C compiler and
-    /// has the version of this tool, which is not recorded.
+    /// Version of the component. `None` for run-time libraries of the tools that link the binaries
+    /// (zig and MinGW), such as libgcc, because the version of these tools is not recorded.
     pub version: Option<String>,
     pub licence: String,
     pub texts: Vec<String>,
