@@ -1,6 +1,6 @@
 """Simulates the runs of a campaign's plan on a Dask cluster, with the Python package as host.
 
-    PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan monte_carlo --workers 4
+    PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan thesis_models --workers 4
     PYTHONPATH=harness/python python3 harness/studies/cluster.py --plan mine.toml --scheduler tcp://head:8786
 
 It needs dist/HubSlosh.fmu and the program hubslosh (``cargo run --release -- pack`` builds both)

@@ -1,14 +1,14 @@
 """Simulates the runs of a plan both by the harness and by Dask, and compares the results.
 
     export PYTHONPATH=harness/python
-    python3 harness/studies/cluster_comparison.py --plan monte_carlo --workers 2
+    python3 harness/studies/cluster_comparison.py --plan thesis_models --workers 2
 
 The Dask workers host the FMU by the Python package. After the first run is finished, one worker is
 killed in the middle of another run. The program compares all columns of features.csv,
 features_spa.csv and runs.csv, and all signals of all runs. It ends with an error if a relative
 difference exceeds 1e-9.
 
-It needs what cluster.py needs. The 200 runs of monte_carlo take some minutes on two cores.
+It needs what cluster.py needs. The 88 runs of thesis_models take some minutes on two cores.
 """
 
 import csv

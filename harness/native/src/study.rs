@@ -20,8 +20,7 @@ use crate::fmu::error;
 /// numbers of NumPy's generator (0.6.1).
 const FORMAT: u32 = 3;
 
-/// Return `count` random numbers, uniform from 0 (included) to 1 (excluded), of stream number `run` for this seed. Run number
-/// `run` of a campaign's plan with `[random]` uses the same numbers.
+/// Return `count` random numbers, uniform from 0 (included) to 1 (excluded), of stream number `run` for this seed.
 #[pyfunction]
 pub fn uniforms(seed: u64, run: u64, count: usize) -> Vec<f64> {
     let mut random = Random::new(seed, run);

@@ -54,8 +54,7 @@ def draw(
     """Return the values of one run of `monte_carlo`.
 
     A value depends only on the seed, on the number of the run, and on the names in ``ranges`` up to
-    its own name; it does not depend on the number of runs in the study. A plan of ``hubslosh
-    campaign`` with the same uniform distributions in ``[random]`` has the same values.
+    its own name; it does not depend on the number of runs in the study.
 
     Parameters
     ----------

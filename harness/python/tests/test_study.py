@@ -237,26 +237,6 @@ def test_folders_of_campaigns_and_of_older_studies_are_refused(tmp_path: Path) -
         assert [path for path in folder.rglob("*") if path.is_file()] == [folder / name]
 
 
-def test_a_study_draws_the_random_numbers_of_a_campaign_plan_with_equal_seed(
-    request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
-) -> None:
-    """For each run, `draw` gives exactly the numbers that the program draws for ``[random]``."""
-    ranges = {"tank.h": (0.05, 0.12), "hub.I": (0.30, 0.34), "friction.b": (0.02, 0.05)}
-    drawn = [
-        f'{name} = {{ distribution = "uniform", from = {low}, to = {high} }}'
-        for name, (low, high) in ranges.items()
-    ]
-    plan = tmp_path / "plan.toml"
-    head = ['profile = "sine:duration=1"', "[random]", "runs = 5", "seed = 7", "[random.draw]"]
-    plan.write_text("\n".join(head + drawn))
-    command = [option(request, "--hubslosh"), "campaign", "--plan", plan, "--fmu", fmu, "--list"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    runs = json.loads(done.stdout)["runs"]
-    for run, listed in enumerate(runs):
-        assert draw(ranges, run, 7).items() <= listed["settings"].items()
-    assert len(runs) == 5
-
-
 Door = Callable[[Path], tuple[bool, str]]
 """Function that stores two runs in a folder; it returns success, and errors and warnings."""
 

@@ -186,17 +186,16 @@ fn runs_that_need_more_memory_than_any_machine_has_are_refused() {
     }
 }
 
+/// Numbers of runs or steps that need too much memory are refused
+/// before anything is allocated.
 #[test]
 fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_allocation() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
-    std::fs::write(
-        directory.join("plan.toml"),
-        "profile = \"sine:duration=1\"\n[random]\nruns = 9000000000000000000\nseed = 1\n[random.draw]\n\
-         hub.I = { distribution = \"uniform\", from = 0.3, to = 0.4 }\n",
-    )
-    .unwrap();
+    let many = [0.1; 100];
+    let plan = format!("profile = \"sine\"\n[vary]\ntank.h = {many:?}\ntank.d = {many:?}\ntank.r = {many:?}\n");
+    std::fs::write(directory.join("plan.toml"), plan).unwrap();
     let steps = "steps (allowed: at most 20000000)";
     for (arguments, words) in [
         (&["run", "--fmu", fmu, "--profile", "zero:duration=1e12", "--out", "a.csv"][..], steps),

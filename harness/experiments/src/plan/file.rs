@@ -11,7 +11,6 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::problems::{Lines, Problems};
-use super::random::{Distribution, Draws, Family};
 use super::{Listed, Named, Onset, Plan, Recorded, STEP};
 use crate::profile::Written;
 use crate::sensors::Sensor;
@@ -43,7 +42,7 @@ impl fmt::Display for Scalar {
     }
 }
 
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 13] = [
     "title",
     "profile",
     "input",
@@ -54,7 +53,6 @@ const KEYS: [&str; 14] = [
     "set",
     "vary",
     "run",
-    "random",
     "count",
     "onset",
     "sensor",
@@ -107,7 +105,7 @@ pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Opti
     let count = reader.names(table, "count");
     let count =
         reader.named("[count] ", count, &expected, |first: &i64| (0..=most).contains(first));
-    let (listed, draws) = (reader.listed(table), reader.draws(table));
+    let listed = reader.listed(table);
     let onset = reader.onset(table, profile.as_ref());
     let sensors = reader.sensors(table);
     Some(Plan {
@@ -123,7 +121,6 @@ pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Opti
         vary: vary.collect(),
         listed,
         count,
-        draws,
         onset,
         sensors,
     })
@@ -132,13 +129,12 @@ pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Opti
 type Values<'t, 'i> = Vec<(String, &'t Spanned<DeValue<'i>>)>;
 
 /// Returns values by name. In TOML `tank.h = 1` is a table within a table; here it becomes the name `tank.h`.
-/// Tables for which `is_value` returns true are values.
-fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) -> Values<'t, 'i> {
+fn names<'t, 'i>(table: &'t DeTable<'i>) -> Values<'t, 'i> {
     let mut all = Values::new();
     for (key, value) in table {
         match value.get_ref() {
-            DeValue::Table(inner) if !is_value(inner) => {
-                let inner = names(inner, is_value).into_iter();
+            DeValue::Table(inner) => {
+                let inner = names(inner).into_iter();
                 all.extend(inner.map(|(name, v)| (format!("{}.{name}", key.get_ref()), v)));
             }
             _ => all.push((key.get_ref().to_string(), value)),
@@ -213,7 +209,7 @@ impl Reader<'_> {
 
     fn names<'t, 'i>(&mut self, table: &'t DeTable<'i>, key: &str) -> Values<'t, 'i> {
         match table.get(key).map(|value| (value, value.get_ref())) {
-            Some((_, DeValue::Table(inner))) => names(inner, &|_| false),
+            Some((_, DeValue::Table(inner))) => names(inner),
             Some((value, _)) => {
                 self.add_unexpected(value, &format!("[{key}] must be a table"));
                 Values::new()
@@ -261,7 +257,7 @@ impl Reader<'_> {
             let name = self.take(&place, table, "name", &expected, allowed);
             let recording = self.recording(&place, table);
             let own = ["name", "recording", "columns"];
-            let values = names(table, &|_| false).into_iter();
+            let values = names(table).into_iter();
             let values = values.filter(|(key, _)| !own.contains(&key.as_str()));
             let values = self.settings(&place, values.collect());
             listed.push(Listed { name: name.map(|name| name.value), values, recording });
@@ -320,9 +316,6 @@ impl Reader<'_> {
         if profile.is_some_and(|profile| profile.value.name() != "sine") {
             self.add(header.span(), "[onset] expects a profile of one frequency, sine".into());
         }
-        if table.contains_key("random") {
-            self.add(header.span(), "[onset] is not allowed with [random]".into());
-        }
         let lines = self.lines(header.span());
         Some(Onset {
             frequency: frequency?.value,
@@ -330,64 +323,5 @@ impl Reader<'_> {
             found: false,
             lines,
         })
-    }
-
-    fn draws(&mut self, table: &DeTable) -> Option<Draws> {
-        let (header, value) = table.get_key_value("random")?;
-        let Some(table) = value.get_ref().as_table() else {
-            self.add_unexpected(value, "[random] must be a table");
-            return None;
-        };
-        self.check_keys("[random] ", table, &["runs", "seed", "draw"]);
-        for key in ["runs", "seed"].iter().filter(|key| !table.contains_key(**key)) {
-            self.add(header.span(), format!("[random] has no {key}"));
-        }
-        let mut whole = |key: &str, least: i64| {
-            let expected = format!("a whole number from {least} on");
-            self.take("[random] ", table, key, &expected, |v: &i64| *v >= least)
-        };
-        let (runs, seed) = (whole("runs", 1), whole("seed", 0));
-        let Some(DeValue::Table(inner)) = table.get("draw").map(Spanned::get_ref) else {
-            self.add(header.span(), "[random] has no table [random.draw]".into());
-            return None;
-        };
-        let mut draw = Vec::new();
-        for (name, value) in names(inner, &|table| table.contains_key("distribution")) {
-            let distribution = self.distribution(&format!("[random.draw] {name}: "), value);
-            let lines = self.lines(value.span());
-            draw.extend(distribution.map(|value| Named { name, value, lines }));
-        }
-        Some(Draws { runs: runs?.value as usize, seed: seed?.value as u64, draw })
-    }
-
-    fn distribution(&mut self, place: &str, value: &Spanned<DeValue>) -> Option<Distribution> {
-        let Some(table) = value.get_ref().as_table() else {
-            let like = "{ distribution = \"normal\", mean = 1.0, deviation = 0.1 } or the like";
-            self.add_unexpected(value, &format!("{place}it expects {like}"));
-            return None;
-        };
-        let kind = self.text(place, table, "distribution")?.value;
-        let Some(family) = Family::ALL.iter().find(|family| family.name == kind) else {
-            let all = Family::ALL.map(|family| family.name);
-            let (hint, all) = (did_you_mean(&kind, all.into_iter()), all.join(", "));
-            let problem = format!("there is no distribution \"{kind}\" (there are {all}){hint}");
-            self.add(value.span(), format!("{place}{problem}"));
-            return None;
-        };
-        let [first, second] = family.parameters;
-        self.check_keys(place, table, &["distribution", first, second, "min", "max"]);
-        for key in [first, second].iter().filter(|key| !table.contains_key(**key)) {
-            self.add(value.span(), format!("{place}{kind} expects {key}"));
-        }
-        // None for a wrong value, NaN for a missing one
-        let mut number = |key: &str| match table.contains_key(key) {
-            true => self.take(place, table, key, "a number", |v: &f64| v.is_finite()),
-            false => Some(Named { name: key.into(), value: f64::NAN, lines: Lines::default() }),
-        };
-        let [a, b, min, max] = [first, second, "min", "max"].map(|key| Some(number(key)?.value));
-        let bounds = (f64::NEG_INFINITY.max(min?), f64::INFINITY.min(max?));
-        let (a, b) = (a.filter(|a| !a.is_nan())?, b.filter(|b| !b.is_nan())?);
-        let distribution = family.distribution([a, b], bounds);
-        distribution.map_err(|rule| self.add(value.span(), format!("{place}{rule}"))).ok()
     }
 }

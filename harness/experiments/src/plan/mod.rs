@@ -4,7 +4,6 @@
 mod draft;
 mod file;
 mod problems;
-mod random;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -25,7 +24,6 @@ use signals::recording::Columns;
 
 pub use self::draft::Draft;
 use self::problems::{Lines, Problems};
-use self::random::Draws;
 
 /// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model that is
 /// closest to its bench.
@@ -44,7 +42,7 @@ macro_rules! plans {
 pub const BUILT_IN: &[(&str, &str)] = plans! {
     "thesis" "thesis_models" "t1_resonance" "t2_mass" "t3_diameter" "t4_distance"
     "t5_near_resonance" "t6_high_amplitude" "t7_on_the_axis" "fills" "amplitudes" "bench_damping"
-    "bench_as_built" "monte_carlo" "low_thrust" "slew"
+    "bench_as_built" "low_thrust" "slew"
 };
 
 /// Time between the rows of a result, s, if the plan does not state it: the sampling period of the thesis's IMU at 50 Hz.
@@ -83,7 +81,6 @@ pub struct Plan {
     vary: Vec<Named<Vec<String>>>,
     listed: Vec<Listed>,
     count: Vec<Named<i64>>,
-    draws: Option<Draws>,
     onset: Option<Onset>,
     sensors: Vec<Sensor>,
 }
@@ -206,7 +203,6 @@ impl Plan {
                 .chain(names_in(&self.vary, "[vary]"))
                 .chain(listed)
                 .chain(names_in(&self.count, "[count]"))
-                .chain(self.draws.iter().flat_map(|draws| names_in(&draws.draw, "[random.draw]")))
                 .chain(self.onset.iter().flat_map(|onset| {
                     [FREQUENCY, AMPLITUDE].map(|n| (n, "[onset]", &onset.lines))
                 }));
@@ -228,7 +224,6 @@ impl Plan {
 
     pub fn varied(&self) -> Vec<&str> {
         let mut names = self.grouping();
-        names.extend(self.draws.iter().flat_map(|d| &d.draw).map(|one| one.name.as_str()));
         names.extend(self.count.iter().map(|one| one.name.as_str()));
         names
     }
@@ -246,8 +241,7 @@ impl Plan {
     }
 
     /// Returns the name of the varied number with the most values in the plan, which becomes the horizontal axis of
-    /// figures; if several have equally many values, the last one of them. Returns `None` if no number is varied, or if
-    /// values are drawn at random.
+    /// figures; if several have equally many values, the last one of them. Returns `None` if no number is varied.
     pub fn axis(&self) -> Option<&str> {
         self.axis_of_vary().or_else(|| self.axis_of_listed())
     }
@@ -264,14 +258,14 @@ impl Plan {
         let several = values.into_iter().filter(|(_, values)| values.len() > 1);
         // if several numbers have equally many values, the amplitude of the torque is chosen
         let most = several.max_by_key(|(name, values)| (values.len(), *name == NAMING[2]));
-        most.map(|(name, _)| name).filter(|_| !self.is_random())
+        most.map(|(name, _)| name)
     }
 
     fn axis_of_vary(&self) -> Option<&str> {
         let numbers = |values: &[String]| values.iter().all(|v| v.parse::<f64>().is_ok());
         let along = self.vary.iter().filter(|vary| vary.value.len() > 1 && numbers(&vary.value));
         let most = along.max_by_key(|vary| vary.value.len());
-        most.map(|vary| vary.name.as_str()).filter(|_| !self.is_random())
+        most.map(|vary| vary.name.as_str())
     }
 
     /// Converts values with a unit (`50 mm`) to numbers in the FMU's unit. Values that cannot be read are not changed,
@@ -327,24 +321,18 @@ impl Plan {
         self.onset.iter_mut().for_each(|onset| onset.found = true);
     }
 
-    pub fn is_random(&self) -> bool {
-        self.draws.is_some()
-    }
-
     /// Returns the plan's runs for an FMU with this description: every `[[run]]` with every combination of `[vary]` (the
-    /// last varies fastest) and every draw. The error lists all problems of the plan. The FMU checks the values only
-    /// when it is simulated.
+    /// last varies fastest). The error lists all problems of the plan. The FMU checks the values only when it is simulated.
     pub fn cases(&self, description: &ModelDescription) -> Result<Vec<Case>> {
         ensure!(
             self.pending_onset().is_none(),
             "only `hubslosh campaign` runs a plan with [onset]"
         );
-        let draws = self.draws.as_ref().map_or(1, |d| d.runs);
         let count = self
             .vary
             .iter()
             .map(|vary| vary.value.len())
-            .chain([self.listed.len().max(1), draws])
+            .chain([self.listed.len().max(1)])
             .try_fold(1_usize, usize::checked_mul)
             .filter(|count| *count <= budget::RUNS)
             .with_context(|| {
@@ -389,38 +377,25 @@ impl Plan {
             model.into_iter().for_each(|place| case.varied[place] = RECORDING.into());
             case.model = Some(RECORDING.into());
             case.recording = Some(recording.clone());
-            case.name = self.name(run, &case, 0, &mut names);
+            case.name = self.name(run, &case, &mut names);
             cases.push(case);
         }
         let recorded = cases.len();
         for run in &combinations {
-            for draw in 0..draws {
-                let mut values = run.values.clone();
-                if let Some(random) = &self.draws {
-                    let number = draw as u64;
-                    values.extend(random.draw(
-                        description,
-                        &self.profile.value,
-                        number,
-                        &mut problems,
-                    ));
-                }
-                for count in &self.count {
-                    let number = |first: i64| (first + (cases.len() - recorded) as i64).to_string();
-                    values.push(count.clone().map(number));
-                }
-                let case = self.case(description, &input, &mut torques, &mut problems, &values);
-                let Some(mut case) = case else {
-                    continue;
-                };
-                case.name = self.name(run, &case, draw, &mut names);
-                // a recording is plotted over its varied values, as simulated runs are, and not over its name
-                case.listed = run.name.clone().filter(|_| run.recording.is_none());
-                cases.push(case);
-            }
             if problems.len() > 20 {
                 break; // enough to report that there are too many
             }
+            let mut values = run.values.clone();
+            for count in &self.count {
+                let number = |first: i64| (first + (cases.len() - recorded) as i64).to_string();
+                values.push(count.clone().map(number));
+            }
+            let case = self.case(description, &input, &mut torques, &mut problems, &values);
+            let Some(mut case) = case else { continue };
+            case.name = self.name(run, &case, &mut names);
+            // a recording is plotted over its varied values, as simulated runs are, and not over its name
+            case.listed = run.name.clone().filter(|_| run.recording.is_none());
+            cases.push(case);
         }
         problems.check()?;
         Ok(cases)
@@ -523,8 +498,8 @@ impl Plan {
     }
 
     /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if nothing else is
-    /// varied. Otherwise the name consists of the varied values, as in `d_0.111_amplitude_0.1`. Random draws have numbers.
-    fn name(&self, run: &Listed, case: &Case, draw: usize, taken: &mut BTreeSet<String>) -> String {
+    /// varied. Otherwise the name consists of the varied values, as in `d_0.111_amplitude_0.1`.
+    fn name(&self, run: &Listed, case: &Case, taken: &mut BTreeSet<String>) -> String {
         let mut parts = match &run.name {
             // if a named run is varied further, the varied values are appended to its name
             Some(name) => vec![name.clone()],
@@ -540,7 +515,6 @@ impl Plan {
         match (&case.model, case.fill, case.amplitude) {
             (Some(model), Some(fill), Some(amplitude))
                 if run.name.is_none()
-                    && self.draws.is_none()
                     && values.iter().all(|one| NAMING.contains(&one.name.as_str())) =>
             {
                 let [fill, amplitude] = [fill, amplitude].map(thousandths);
@@ -559,9 +533,6 @@ impl Plan {
                     }
                 }
             }
-        }
-        if self.draws.is_some() {
-            parts.push(format!("{:04}", draw + 1));
         }
         if parts.is_empty() {
             parts.push("run".into());
@@ -655,7 +626,6 @@ mod tests {
             ("amplitudes", 30),
             ("bench_damping", 63),
             ("bench_as_built", 22),
-            ("monte_carlo", 200),
             ("low_thrust", 8),
             ("slew", 27),
         ];
@@ -698,20 +668,9 @@ mod tests {
             let error = Plan::parse(&text).unwrap_err().to_string();
             assert!(error.contains(words), "{words}: {error}");
         }
-        for (profile, other, words) in [
-            ("exp-sweep:amplitude=0.1", "", "a profile of one frequency, sine"),
-            (
-                "sine",
-                "[random]\nruns = 2\nseed = 1\n[random.draw]\ntank.h = { distribution = \"uniform\", from = 0.05, to = 0.1 }\n",
-                "[random]",
-            ),
-        ] {
-            let text = format!(
-                "profile = \"{profile}\"\n[onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n{other}"
-            );
-            let error = Plan::parse(&text).unwrap_err().to_string();
-            assert!(error.contains(words), "{words}: {error}");
-        }
+        let text = "profile = \"exp-sweep\"\n[onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n";
+        let error = Plan::parse(text).unwrap_err().to_string();
+        assert!(error.contains("a profile of one frequency, sine"), "{error}");
     }
 
     #[test]
@@ -837,8 +796,7 @@ mod tests {
     fn all_faults_of_a_wrong_plan_are_reported_at_once() {
         let text = "titel = \"x\"\nprofile = 3\nstep = -1\nhold = 1\n\
             [set]\ntank.h = [1]\nprofile.amplitude = 1\n[vary]\ntank.d = 1\n\
-            [random]\nruns = 0\n[random.draw]\nhub.I = { distribution = \"norml\" }\n\
-            tank.r = { distribution = \"uniform\", from = 2, to = 1, mx = 3 }\n";
+            [count]\nimu.seed = -1\n[onset]\nfrequency = [2, 1]\namplitud = 1\n";
         let error = Plan::parse(text).unwrap_err().to_string();
         for words in [
             "line 1: there is no key \"titel\" (there are title, profile,",
@@ -849,11 +807,10 @@ mod tests {
             "line 6: [set] tank.h expects a number, true, false or a text in quotes, not [1]",
             "line 7: [set] profile.amplitude: write it into profile",
             "line 9: [vary] tank.d expects a list of values, such as [0.05, 0.1], not 1",
-            "line 11: [random] runs expects a whole number from 1 on, not 0",
-            "line 10: [random] has no seed",
-            "line 13: [random.draw] hub.I: there is no distribution \"norml\" (there are normal, uniform, lognormal); did you mean \"normal\"",
-            "line 14: [random.draw] tank.r: there is no key \"mx\"",
-            "line 14: [random.draw] tank.r: from must be less than to",
+            "line 11: [count] imu.seed expects the whole number to count from, 0 to",
+            "line 12: [onset] has no amplitude",
+            "line 13: [onset] frequency expects two frequencies in Hz, such as [2.3, 2.5], not [2, 1]",
+            "line 14: [onset] there is no key \"amplitud\" (there are frequency, amplitude); did you mean \"amplitude\"?",
         ] {
             assert!(error.contains(words), "\"{words}\" is not in:\n{error}");
         }
@@ -870,13 +827,12 @@ mod tests {
             syntax.iter().filter_map(|line| line.split_once(": the plan is not valid TOML: "));
         let places: Vec<&str> = places.map(|(place, _)| place).collect();
         assert_eq!(places, ["line 1", "line 2", "line 2", "line 4"], "{syntax:?}");
-        let text = "profile = [\n1,\n2]\n[random]\nruns = 1\nseed = 1e3\nset = 1\n\
+        let text = "profile = [\n1,\n2]\n[onset]\nfrequency = [2, 3]\namplitude = 1e3\nset = 1\n\
             [[run]]\nname = \"\"\n[vary]\na.b = [1, nan]\n";
         let expected = [
             "line 1: profile expects a text in quotes, not [ 1, 2]",
-            "line 4: [random] has no table [random.draw]",
-            "line 6: [random] seed expects a whole number from 0 on, not 1e3",
-            "line 7: [random] there is no key \"set\" (there are runs, seed, draw); did you mean \"seed\"?",
+            "line 6: [onset] amplitude expects ascending torques in N·m, at least two, such as [0.03, 0.1], not 1e3",
+            "line 7: [onset] there is no key \"set\" (there are frequency, amplitude)",
             "line 9: [[run]] number 1: name expects a text in quotes, which must have 1 to 200 bytes (for a run without a name, leave the key out), not \"\"",
             "line 11: [vary] a.b expects a list of values, such as [0.05, 0.1], not [1, nan]",
         ];
@@ -915,64 +871,6 @@ mod tests {
     fn an_unknown_plan_lists_the_built_in_ones() {
         let error = Plan::read("thesis_model").unwrap_err().to_string();
         assert!(error.contains("did you mean \"thesis_models\""), "{error}");
-    }
-
-    const RANDOM: &str = "profile = \"zero:duration=1\"\n[random]\nruns = RUNS\nseed = 3\n[random.draw]\n\
-        hub.I = { distribution = \"normal\", mean = 0.3, deviation = 0.01 }\n\
-        slosh.zeta = { distribution = \"lognormal\", median = 0.003, deviation = 0.2 }\n\
-        friction.b = { distribution = \"uniform\", from = 0.03, to = 0.05 }\n\
-        friction.c = { distribution = \"normal\", mean = 0.0, deviation = 0.01, max = 0.02 }\n\
-        imu.seed = { distribution = \"uniform\", from = 1, to = 6 }\n";
-
-    #[test]
-    fn draws_have_the_specified_distributions_within_the_variables_bounds() {
-        let cases = cases(&RANDOM.replace("RUNS", "4000"));
-        assert_eq!((cases[0].name.as_str(), cases[3999].name.as_str()), ("0001", "4000"));
-        let drawn = |i: usize| -> Vec<f64> {
-            cases.iter().map(|case| case.varied[i].parse().unwrap()).collect()
-        };
-        let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-        let deviation = |x: &[f64]| {
-            let m = mean(x);
-            (x.iter().map(|v| (v - m).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
-        };
-        // limits of four standard errors of 4000 draws: 0.063 standard deviations for a mean, 4.5 %
-        // for a standard deviation
-        let inertia = drawn(0);
-        assert!((mean(&inertia) - 0.3).abs() < 0.01 * 0.063, "{}", mean(&inertia));
-        assert!((deviation(&inertia) / 0.01 - 1.0).abs() < 0.045);
-        let logarithms: Vec<f64> = drawn(1).iter().map(|zeta| (zeta / 0.003).ln()).collect();
-        assert!(mean(&logarithms).abs() < 0.2 * 0.063);
-        assert!((deviation(&logarithms) / 0.2 - 1.0).abs() < 0.045);
-        let even = drawn(2);
-        assert!(even.iter().all(|b| (0.03..0.05).contains(b)));
-        assert!((mean(&even) - 0.04).abs() < 0.02 / 12_f64.sqrt() * 0.063);
-        // friction.c has the FMU's minimum, 0, and the plan's maximum
-        assert!(drawn(3).iter().all(|c| (0.0..=0.02).contains(c)));
-        let seeds = drawn(4);
-        for seed in 1..=6 {
-            let count = seeds.iter().filter(|s| **s == f64::from(seed)).count();
-            // 667 draws are expected; the limit of four standard deviations is 94 draws
-            assert!(count.abs_diff(667) < 94, "{seed}: {count}");
-        }
-    }
-
-    #[test]
-    fn a_draw_does_not_depend_on_the_number_of_draws() {
-        let (few, many) =
-            (cases(&RANDOM.replace("RUNS", "3")), cases(&RANDOM.replace("RUNS", "9")));
-        assert_eq!(few[2].settings, many[2].settings);
-        assert_ne!(few[0].settings, few[1].settings);
-    }
-
-    #[test]
-    fn limits_that_no_random_value_meets_are_named() {
-        let text = "profile = \"zero\"\n[random]\nruns = 1\nseed = 1\n[random.draw]\n\
-            tank.h = { distribution = \"uniform\", from = -2, to = -1 }\n";
-        let error = Plan::parse(text).unwrap().cases(&description()).unwrap_err().to_string();
-        let expected = "line 6: [random.draw] tank.h: none of 10000 random values lies within 0.0001 to 100; \
-            change the distribution or the limits";
-        assert_eq!(error, expected);
     }
 
     #[test]

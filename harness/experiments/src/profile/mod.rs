@@ -177,12 +177,6 @@ impl Written {
         Torque::read(path, held)
     }
 
-    pub fn is_whole(&self, key: &str) -> bool {
-        let kind = KINDS.iter().find(|kind| kind.name == self.name);
-        let parameter = kind.and_then(|kind| kind.parameters.iter().find(|p| p.name == key));
-        parameter.is_some_and(|p| matches!(p.allowed, Allowed::Whole(_)))
-    }
-
     pub(crate) fn name(&self) -> &str {
         &self.name
     }

@@ -3,7 +3,6 @@
 mod chapter;
 mod colors;
 mod compare;
-mod draws;
 mod figure;
 mod general;
 mod histories;
@@ -144,8 +143,7 @@ fn bench_sections<'a>(
     results: &Results,
     figures: &mut Figures,
 ) -> Vec<(&'a str, Markup)> {
-    let (groups, plan) = (&page.groups, page.plan);
-    let random = plan.is_random();
+    let groups = &page.groups;
     let has_response = groups.iter().any(|group| group.band().is_some());
     let swept = groups.iter().any(|group| group.sweep.is_some());
     let axis = page.axis.as_ref();
@@ -156,9 +154,7 @@ fn bench_sections<'a>(
 
     // The answer to the question of the plan comes first.
     let mut first = Vec::new();
-    if random && has_response {
-        first.extend(groups.iter().flat_map(|group| draws::draws(page, group)));
-    } else if let (Some(axis), true) = (axis, has_response) {
+    if let (Some(axis), true) = (axis, has_response) {
         first.push(over_axis::extrema(page, axis));
     } else if let (Some(axis), false) =
         (axis, groups.iter().all(|g| manoeuvre(g.runs[0]).is_none()))
@@ -170,7 +166,7 @@ fn bench_sections<'a>(
     } else if results.outcomes.len() > 1 {
         first.push(histories::compared(page));
     }
-    sections.push((if random { "What decides" } else { "In short" }, add(first)));
+    sections.push(("In short", add(first)));
     let histories = |few: &[&Group]| {
         few.iter().map(|group| histories::history(page, group)).collect::<Vec<_>>()
     };
@@ -186,10 +182,8 @@ fn bench_sections<'a>(
     }
     sections.push(("Comparison of models with recordings", recordings::comparison_table(results)));
     sections.push(("Time histories", add(histories(&few))));
-    if !random {
-        let paths = few.iter().flat_map(|group| histories::paths(page, group));
-        sections.push(("Rotary slosh", add(paths.collect())));
-    }
+    let paths = few.iter().flat_map(|group| histories::paths(page, group));
+    sections.push(("Rotary slosh", add(paths.collect())));
     if let Some(axis) = axis {
         let title = "Against what is varied";
         let mut all = Vec::new();
@@ -347,7 +341,7 @@ fn card(page: &Page, group: &Group) -> Markup {
     };
     let exact = group.exact[0].f_dip.zip(group.exact[0].f_res);
     let one_response = page.axis.as_ref().is_none_or(|axis| axis.name == "torque amplitude");
-    let exact = exact.filter(|_| one_response && !page.plan.is_random());
+    let exact = exact.filter(|_| one_response);
     html! {
         div .card {
             b { (over(&|f| f.f_dip)) }

@@ -168,7 +168,7 @@ fn cells(estimate: Option<&Estimate>) -> Markup {
     }
 }
 
-/// Formats a number multiplied by `scale`. A number with more than six digits, such as a random value, is
+/// Formats a number multiplied by `scale`. A number with more than six digits is
 /// rounded to six digits. A text that is not a number is returned unchanged.
 fn shortened(text: &str, scale: f64) -> String {
     match text.parse::<f64>() {

@@ -6,8 +6,7 @@ use experiments::plan::{AMPLITUDE, Plan};
 use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
 
-/// Runs that differ only in the parameter along the axis, and in parameters drawn at random. `fill` is in m,
-/// `None` if it is drawn at random or is the axis. `others` are further differences from other groups, for
+/// Runs that differ only in the parameter along the axis. `fill` is in m, `None` if it is the axis. `others` are further differences from other groups, for
 /// example `tank.d 111 mm`. `drawn` are the runs whose time histories are plotted, and `exact` are the
 /// features of each run's exact linear response, evaluated on a grid over its band.
 pub(super) struct Group<'a> {
@@ -192,7 +191,7 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
         .filter(|(i, _)| !recorded || differs(*i))
         .filter_map(|(i, name)| Some((i, Varied::new(name, fmu, &results.outcomes)?)))
         .collect();
-    let one_fill = axis != tank::H && (!plan.is_random() || grouping.contains(&tank::H));
+    let one_fill = axis != tank::H;
     let mut groups: Vec<Group> = Vec::new();
     for run in &results.outcomes {
         let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());

@@ -27,14 +27,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             traces.extend(intervals(&name, &color, estimate));
         }
     }
-    if !page.plan.is_random() {
-        traces.extend(bode(
-            "exact, linear and viscous",
-            colors::INK,
-            "dot",
-            &group.exact_response(),
-        ));
-    }
+    traces.extend(bode("exact, linear and viscous", colors::INK, "dot", &group.exact_response()));
     Figure {
         title: format!("Frequency response, {}", group.title()),
         caption: html! {

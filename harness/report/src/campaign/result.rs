@@ -4,7 +4,6 @@ use experiments::campaign::{Outcome, Results};
 use experiments::profile::Torque;
 use names::hubslosh::SloshModel;
 
-use super::draws::moments;
 use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, torque_amplitude};
 use super::recordings;
 
@@ -76,9 +75,6 @@ pub(super) fn sentence(page: &Page, results: &Results) -> String {
     if let Some(first) = page.groups.first() {
         let axis = page.axis.as_ref();
         let has_response = page.groups.iter().any(|group| group.band().is_some());
-        if page.plan.is_random() && has_response {
-            return scatter(page);
-        }
         if has_response {
             let series: Vec<Series> =
                 page.groups.iter().map(|group| Series::new(group, axis)).collect();
@@ -279,32 +275,6 @@ impl Series {
             .collect::<Vec<_>>()
             .join(", ")
     }
-}
-
-fn scatter(page: &Page) -> String {
-    let describe = |group: &Group| {
-        let parts: Vec<String> = super::draws::QUANTITIES[..2]
-            .iter()
-            .filter_map(|(name, _, value)| {
-                let values: Vec<f64> = group.runs.iter().filter_map(|run| value(run)).collect();
-                let (mean, deviation) = moments(&values);
-                let deviation = format!("standard deviation {} mHz", format_two_digits(deviation));
-                (values.len() > 1)
-                    .then(|| format!("the {name} is {:.3} Hz ({deviation})", 1e-3 * mean))
-            })
-            .collect();
-        let ranked = super::draws::ranked(page, group);
-        let most = ranked.last().map(|row| format!("; {} has the largest effect", row.0));
-        let title = match page.groups.len() {
-            1 => String::new(),
-            _ => format!(" ({})", group.title()),
-        };
-        let count = group.runs.len();
-        let parts_text = parts.join(", ");
-        (!parts.is_empty())
-            .then(|| format!("In {count} draws{title} {parts_text}{}", most.unwrap_or_default()))
-    };
-    finished(&few(page.groups.iter().filter_map(describe).collect(), 3))
 }
 
 fn names(page: &Page) -> Vec<String> {
