@@ -290,6 +290,6 @@ fn run_command(cli: Cli) -> u8 {
 fn run_default_job() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();
-    let campaign = Campaign { plan, force: false, jobs: 0, compare: None, out };
+    let campaign = Campaign { plan, force: false, jobs: 0, out };
     campaign::drive(&open(Path::new(DEFAULT_FMU))?, &campaign, campaign.take()?, Vec::new())
 }

@@ -75,7 +75,7 @@ impl AnalyseArgs {
             cases.iter().any(|case| case.recording.is_some()),
             "no [[run]] of the plan has recording = \"FILE\"; hubslosh campaign --plan simulates the plan"
         );
-        let campaign = Campaign { plan, force: false, jobs: self.runs.jobs, compare: None, out };
+        let campaign = Campaign { plan, force: false, jobs: self.runs.jobs, out };
         let store = campaign.take()?;
         ensure!(
             !campaign.holds_another() || self.out.is_some(),

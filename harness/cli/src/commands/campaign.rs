@@ -59,9 +59,6 @@ pub struct CampaignArgs {
     /// campaign; with --plan, dist/ and the name of the plan].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
-    /// Directory of another campaign, whose runs the report compares with the runs of this campaign.
-    #[arg(long, value_name = "DIRECTORY")]
-    compare: Option<PathBuf>,
     /// Replaces tables and report if the default directory contains the tables of another plan. Without this flag that is
     /// an error.
     #[arg(long)]
@@ -92,8 +89,7 @@ impl CampaignArgs {
         };
         let named = self.out.is_some();
         let out = self.out.clone().unwrap_or(out);
-        let compare = self.compare.clone();
-        let mut campaign = Campaign { plan, force: self.force, jobs: self.runs.jobs, compare, out };
+        let mut campaign = Campaign { plan, force: self.force, jobs: self.runs.jobs, out };
         let fmu = open(&self.runs.fmu)?;
         campaign.plan.convert_units(fmu.description());
         seek_onset(&mut campaign.plan, &fmu, self.runs.jobs, &|news| {
@@ -104,14 +100,6 @@ impl CampaignArgs {
         if self.list {
             println!("{:#}", campaign.list(&fmu)?);
             return Ok(());
-        }
-        if let Some(other) = &campaign.compare {
-            let table = other.join("runs.csv");
-            ensure!(
-                table.is_file(),
-                "--compare {}: the directory has no file runs.csv, so it is not a campaign",
-                other.display()
-            );
         }
         campaign.plan.cases(fmu.description())?; // fails for a wrong plan before anything is replaced
         let store = campaign.take()?;

@@ -194,7 +194,9 @@ fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_alloca
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
     let many = [0.1; 100];
-    let plan = format!("profile = \"sine\"\n[vary]\ntank.h = {many:?}\ntank.d = {many:?}\ntank.r = {many:?}\n");
+    let plan = format!(
+        "profile = \"sine\"\n[vary]\ntank.h = {many:?}\ntank.d = {many:?}\ntank.r = {many:?}\n"
+    );
     std::fs::write(directory.join("plan.toml"), plan).unwrap();
     let steps = "steps (allowed: at most 20000000)";
     for (arguments, words) in [

@@ -111,14 +111,12 @@ fn warning_limits(description: &ModelDescription) -> Limits {
 }
 
 /// A plan with the settings for its execution. If `force` is true, stored runs are simulated again. `jobs` is the number of
-/// runs that are simulated and analysed in parallel, 0 for the number of cores. `compare` is the directory of another
-/// campaign with which the report compares this one.
+/// runs that are simulated and analysed in parallel, 0 for the number of cores.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     pub plan: Plan,
     pub force: bool,
     pub jobs: usize,
-    pub compare: Option<PathBuf>,
     pub out: PathBuf,
 }
 

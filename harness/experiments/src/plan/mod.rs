@@ -668,7 +668,8 @@ mod tests {
             let error = Plan::parse(&text).unwrap_err().to_string();
             assert!(error.contains(words), "{words}: {error}");
         }
-        let text = "profile = \"exp-sweep\"\n[onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n";
+        let text =
+            "profile = \"exp-sweep\"\n[onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n";
         let error = Plan::parse(text).unwrap_err().to_string();
         assert!(error.contains("a profile of one frequency, sine"), "{error}");
     }

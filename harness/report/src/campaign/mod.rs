@@ -2,7 +2,6 @@
 
 mod chapter;
 mod colors;
-mod compare;
 mod figure;
 mod general;
 mod histories;
@@ -70,7 +69,7 @@ pub fn page(
     let mut sections: Vec<(String, Markup)> =
         chapters.into_iter().map(|chapter| chapter.section(&mut figures)).collect();
     let of_runs = match results.unanalysed.is_empty() {
-        true => bench_sections(&page, campaign, results, &mut figures),
+        true => bench_sections(&page, results, &mut figures),
         false => general_sections(fmu, results, &mut figures),
     };
     sections.extend(of_runs.into_iter().map(|(title, content)| (title.to_string(), content)));
@@ -139,7 +138,6 @@ fn anchor(title: &str) -> String {
 
 fn bench_sections<'a>(
     page: &Page,
-    campaign: &Campaign,
     results: &Results,
     figures: &mut Figures,
 ) -> Vec<(&'a str, Markup)> {
@@ -203,12 +201,6 @@ fn bench_sections<'a>(
             let maps = few.iter().map(|group| responses::maps(group, axis)).collect();
             sections.push(("Over the frequency", add(maps)));
         }
-    }
-    if let Some(other) = &campaign.compare {
-        sections.push((
-            "Comparison of two campaigns",
-            compare::compare(other, page, results, &mut add),
-        ));
     }
     if repeats_the_thesis(page) {
         sections.push(("Comparison with the thesis", thesis::numbers(groups)));

@@ -211,7 +211,7 @@ pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> R
     let stem = directory.canonicalize()?;
     let stem = stem.file_name().unwrap_or_default();
     let out = out.unwrap_or_else(|| Path::new("dist").join(stem));
-    let campaign = Campaign { plan, force: false, jobs, compare: None, out };
+    let campaign = Campaign { plan, force: false, jobs, out };
     let store = campaign.take()?;
     if let Some(bearing) = bearing {
         let text = bearing.json()?;
