@@ -70,7 +70,7 @@ def build() -> Path:
 
     The build does not use ``-p``, which would compile most crates again.
     """
-    command = ["cargo", "build", "--release", "--workspace", "--example", "work_precision"]
+    command = ["cargo", "build", "--release", "--workspace", "--bench", "work_precision"]
     done = subprocess.run(
         [*command, "--message-format=json"], cwd=ROOT, stdout=subprocess.PIPE, text=True
     )

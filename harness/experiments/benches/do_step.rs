@@ -5,7 +5,7 @@
 //! All integrators receive the same torque, which is linear between knots 20 ms apart. It is a sweep of 0.1 N·m from 2.2 to
 //! 2.6 Hz over antiresonance and resonance (10 cm fill).
 //!
-//! `cargo bench -p experiments`
+//! `cargo bench -p experiments --bench do_step`
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
