@@ -9,7 +9,7 @@ use super::dependencies::random_session;
 use super::description::Variable;
 use super::findings::Findings;
 use super::under_test::{FmuUnderTest, STEPS, Session, skip, start_value};
-use super::values::{contains_name, items};
+use super::values::{contains_name, items, settable};
 use host::description::{Type, Value};
 
 /// Largest amount by which a value may exceed min or max without a finding, relative to min or max or to the nominal
@@ -65,46 +65,78 @@ fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Value) -> Result<Result<()>
     Ok(session.initialise())
 }
 
+/// Returns the finite bounds of all numbers that hosts set: the variable, the bound, the direction that leaves the range, and
+/// the name of the attribute.
+fn bounds(fmu: &FmuUnderTest) -> Vec<(&Variable, f64, f64, &'static str)> {
+    let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
+    let numbers = settable.filter(|v| matches!(v.kind, Type::Real | Type::Integer));
+    let both = numbers.filter(|v| start_value(v).is_some()).flat_map(|v| {
+        let (min, max) = v.bounds();
+        [(v, min, -1.0, "min"), (v, max, 1.0, "max")]
+    });
+    both.filter(|(_, bound, ..)| bound.is_finite()).collect()
+}
+
+fn number(v: &Variable, x: f64) -> Value {
+    if v.is_real() { Value::Real(x) } else { Value::Integer(x as i64) }
+}
+
+/// Returns true if `x` is a value of the variable's type.
+fn fits(v: &Variable, x: f64) -> bool {
+    x.is_finite() && (v.is_real() || f64::from(x as i32) == x)
+}
+
+pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let bounds = bounds(fmu);
+    for &(v, bound, outwards, _) in &bounds {
+        // The FMU may refuse the value because it contradicts another parameter; the message then names this
+        // parameter, too.
+        if let Err(why) = refusal(fmu, v, &number(v, bound))?
+            && !settable(fmu)
+                .any(|(o, _)| o.name != v.name && contains_name(&why.to_string(), &o.name))
+        {
+            findings.at(v.place()).add(format!(
+                "the value {bound} lies within min and max, but the FMU refuses it: {why}"
+            ));
+        }
+        let size = if v.is_real() { bound.abs().max(1e-3 * v.nominal()) } else { 1.0 };
+        let outside = bound + outwards * size;
+        if fits(v, outside) && refusal(fmu, v, &number(v, outside))?.is_ok() {
+            let (min, max) = v.bounds();
+            findings.at(v.place()).add(format!(
+                "the value {outside} lies outside of min and max ({min} to {max}), but the FMU accepts it"
+            ));
+        }
+    }
+    if bounds.is_empty() {
+        findings.skip("no variable that hosts set has a min or a max");
+    }
+    Ok(())
+}
+
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const JUST: f64 = 1e-6;
     /// Distance from a bound at which an Integer is outside any reasonable range.
     const FAR: f64 = 1000.0;
-    let mut any = false;
-    let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
-    let numbers = settable.filter(|v| matches!(v.kind, Type::Real | Type::Integer));
-    for v in numbers.filter(|v| start_value(v).is_some()) {
-        let (min, max) = v.bounds();
-        for (bound, outwards, name) in [(min, -1.0, "min"), (max, 1.0, "max")] {
-            if !bound.is_finite() {
-                continue;
-            }
-            any = true;
-            let size = bound.abs().max(1e-3 * v.nominal());
-            let (near, far) = match v.kind {
-                Type::Real => (bound + outwards * JUST * size, bound + outwards * size),
-                _ => (bound + outwards, bound + outwards * FAR),
-            };
-            let fits = |x: f64| x.is_finite() && (v.is_real() || f64::from(x as i32) == x);
-            if near == bound || !fits(near) || !fits(far) {
-                continue;
-            }
-            let at = |x: f64| match v.kind {
-                Type::Real => Value::Real(x),
-                _ => Value::Integer(x as i64),
-            };
-            // An FMU that accepts every value breaks another rule, and has no exact range that could be compared.
-            if refusal(fmu, v, &at(far))?.is_ok() {
-                continue;
-            }
-            if refusal(fmu, v, &at(near))?.is_ok() {
-                findings.at(v.place()).add(format!(
-                    "{near} is accepted, and {far} refused: the binary's range is wider than \
-                         {name}={bound} says (allowed: the same range)"
-                ));
-            }
+    let bounds = bounds(fmu);
+    for &(v, bound, outwards, name) in &bounds {
+        let size = bound.abs().max(1e-3 * v.nominal());
+        let near = bound + outwards * if v.is_real() { JUST * size } else { 1.0 };
+        let far = bound + outwards * if v.is_real() { size } else { FAR };
+        // An FMU that accepts every value breaks another rule, and has no exact range that could be compared.
+        if near != bound
+            && fits(v, near)
+            && fits(v, far)
+            && refusal(fmu, v, &number(v, far))?.is_err()
+            && refusal(fmu, v, &number(v, near))?.is_ok()
+        {
+            findings.at(v.place()).add(format!(
+                "{near} is accepted, and {far} refused: the binary's range is wider than {name}={bound} says (allowed: the \
+                 same range)"
+            ));
         }
     }
-    if !any {
+    if bounds.is_empty() {
         findings.skip("no number that a host sets has a min or a max");
     }
     Ok(())

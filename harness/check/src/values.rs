@@ -10,7 +10,7 @@ use host::causality::{Causality, Variability};
 use host::description::{Type, Value};
 use host::fmi2::{Called, Instance};
 
-fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Value)> {
+pub fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Value)> {
     let all = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
@@ -334,56 +334,6 @@ pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     if !any {
         findings.skip("the FMU declares no calculated variable");
-    }
-    Ok(())
-}
-
-pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut any = false;
-    for (v, _) in settable(fmu).filter(|(v, _)| matches!(v.kind, Type::Real | Type::Integer)) {
-        let (min, max) = v.bounds();
-        for (bound, outwards) in [(min, -1.0), (max, 1.0)] {
-            if !bound.is_finite() {
-                continue;
-            }
-            any = true;
-            let outside = match v.kind {
-                Type::Real => bound + outwards * bound.abs().max(1e-3 * v.nominal()),
-                _ => bound + outwards,
-            };
-            let try_at = |x: f64| -> Result<Option<String>> {
-                let mut session = fmu.session(fmu.first_interface()?)?;
-                fmu.announce(format!("setting {} to {x:?} and initialising", v.name));
-                let value = match v.kind {
-                    Type::Real => Value::Real(x),
-                    _ => Value::Integer(x as i64),
-                };
-                if let Err(error) = session.set(v, &value) {
-                    return Ok(Some(error.to_string()));
-                }
-                Ok(session.initialise().err().map(|error| error.to_string()))
-            };
-            // The FMU may refuse the value because it contradicts another parameter; the message then names this
-            // parameter, too.
-            if let Some(why) = try_at(bound)?
-                && !settable(fmu).any(|(o, _)| o.name != v.name && contains_name(&why, &o.name))
-            {
-                findings.at(v.place()).add(format!(
-                    "the value {bound} lies within min and max, but the FMU refuses it: {why}"
-                ));
-            }
-            if outside.is_finite()
-                && (v.kind == Type::Real || i32::try_from(outside as i64).is_ok())
-                && try_at(outside)?.is_none()
-            {
-                findings.at(v.place()).add(format!(
-                    "the value {outside} lies outside of min and max ({min} to {max}), but the FMU accepts it"
-                ));
-            }
-        }
-    }
-    if !any {
-        findings.skip("no variable that hosts set has a min or a max");
     }
     Ok(())
 }

@@ -122,7 +122,7 @@ pub static RULES: &[Rule] = &[
     rule("values.wrong_type", Error, "value references of another type are refused with a message", "2.1.7", Calls(values::wrong_type)),
     rule("values.fixed", Warning, "setting a fixed parameter after initialisation is refused; if the binary refuses only some of them, the others are in fact tunable, which is an error", "2.2.7, 4.2.4", Calls(values::fixed)),
     rule("values.computed", Warning, "variables that the FMU calculates cannot be set", "2.1.7, 2.2.7", Calls(values::computed)),
-    rule("values.limits", Warning, "the values min and max are accepted; values beyond them are refused at the latest at the end of initialisation", "2.2.7", Calls(values::limits)),
+    rule("values.limits", Warning, "the values min and max are accepted; values beyond them are refused at the latest at the end of initialisation", "2.2.7", Calls(ranges::limits)),
     rule("values.limits_exact", Warning, "if a value far outside min and max is refused, a value just outside is refused, too: the binary does not have a wider range", "2.2.7", Calls(ranges::limits_exact)),
     rule("values.in_range", Error, "values that the FMU computes in an ordinary run are within min and max", "2.2.7", Calls(ranges::in_range)),
     rule("values.items", Warning, "enumerations accept and return exactly the items of their type", "2.2.3, 2.2.7", Calls(ranges::items_known)),
