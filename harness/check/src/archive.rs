@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::Path;
 
@@ -7,6 +7,9 @@ use files::temporary;
 use zip::CompressionMethod;
 
 use super::findings::Findings;
+
+/// Why rules are skipped that read modelDescription.xml.
+pub const NO_DESCRIPTION: &str = "there is no modelDescription.xml that can be unpacked";
 
 const AT_THE_TOP: [&str; 9] = [
     "modelDescription.xml",
@@ -25,6 +28,7 @@ pub struct Entry {
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
+    name_faults: Vec<&'static str>,
     /// Bytes of the file if rules need its content ([`is_read`] is true for its name), otherwise empty.
     content: Vec<u8>,
     fault: Option<String>,
@@ -59,6 +63,7 @@ impl Archive {
                 method: entry.method,
                 encrypted: entry.encrypted,
                 link: entry.link,
+                name_faults: name_faults(entry),
                 content: Vec::new(),
                 fault: None,
             };
@@ -87,7 +92,7 @@ impl Archive {
         if is_read(&entry.name) {
             *content = from.content(entry)?;
         }
-        let is_placed = !entry.link && !entry.is_folder() && name_faults(&entry.name).is_empty();
+        let is_placed = !entry.link && !entry.is_folder() && name_faults(entry).is_empty();
         let path = self.directory.path().join(&entry.name);
         let folder = path.parent().unwrap_or(self.directory.path());
         // If another entry uses the name of this file as a folder, a host cannot unpack the file either.
@@ -115,6 +120,21 @@ impl Archive {
         files.map(|entry| entry.name.as_str()).filter(move |name| name.starts_with(folder))
     }
 
+    /// Returns the names of the folders and files directly in `folder`, which ends with a slash.
+    pub fn folders<'a>(&'a self, folder: &'a str) -> BTreeSet<&'a str> {
+        self.below(folder).filter_map(|name| name.split('/').nth(1)).collect()
+    }
+
+    /// Returns the content of modelDescription.xml. If it does not exist or could not be unpacked, the rule that asks
+    /// is skipped.
+    pub fn description_or_skip(&self, findings: &mut Findings) -> Option<&[u8]> {
+        let content = self.file("modelDescription.xml");
+        if content.is_none() {
+            findings.skip(NO_DESCRIPTION);
+        }
+        content
+    }
+
     /// Returns the reason why the other commands of `hubslosh` refuse this archive, or `None` if they open
     /// it.
     pub fn refusal(&self) -> Option<String> {
@@ -126,27 +146,9 @@ impl Archive {
     }
 }
 
-fn name_faults(name: &str) -> Vec<&'static str> {
-    let mut faults = Vec::new();
-    if name.is_empty() {
-        faults.push("is empty");
-    }
-    if name.contains('\\') {
-        faults.push("has a backslash");
-    }
-    if name.starts_with('/') || name.get(1..2) == Some(":") {
-        faults.push("is absolute");
-    }
-    if name.split(['/', '\\']).any(|part| part == "..") {
-        faults.push("leads out of the archive by \"..\"");
-    }
-    // Some tools write an entry for the folder itself, which every unpacker accepts.
-    if name != "./"
-        && name.trim_end_matches('/').split('/').any(|part| part.is_empty() || part == ".")
-    {
-        faults.push("has an empty part or \".\"");
-    }
-    if name.chars().any(char::is_control) || name.contains('\u{fffd}') {
+fn name_faults(entry: &host::archive::Entry) -> Vec<&'static str> {
+    let mut faults = entry.name_faults();
+    if entry.name.contains(|c: char| c.is_control() || c == '\u{fffd}') {
         faults.push("has control characters");
     }
     faults
@@ -190,9 +192,8 @@ pub fn methods(archive: &Archive, findings: &mut Findings) {
 
 pub fn names(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
-        let faults = name_faults(&entry.name);
-        if !faults.is_empty() {
-            let faults = faults.join(", ");
+        if !entry.name_faults.is_empty() {
+            let faults = entry.name_faults.join(", ");
             findings.at(entry.name.escape_debug().to_string()).add(format!(
                 "the name {faults} (allowed: relative names with \"/\" between the parts)"
             ));
@@ -281,18 +282,13 @@ pub fn report_unknown_folders(
     archive: &Archive,
     findings: &mut Findings,
 ) {
-    let mut unknown: Vec<&str> = archive
-        .entries
-        .iter()
-        .filter_map(|entry| entry.name.split(['/', '\\']).next())
-        .filter(|top| !allowed.contains(top) && *top != "..")
-        .collect();
-    unknown.sort_unstable();
-    unknown.dedup();
-    let allowed = allowed.join(", ");
+    let at_the_top: BTreeSet<&str> =
+        archive.entries.iter().filter_map(|entry| entry.name.split(['/', '\\']).next()).collect();
+    let unknown = at_the_top.into_iter().filter(|top| !allowed.contains(top) && *top != "..");
+    let joined = allowed.join(", ");
     for name in unknown {
         findings
             .at(name)
-            .add(format!("FMI {version} has no such file or folder (allowed: {allowed})"));
+            .add(format!("FMI {version} has no such file or folder (allowed: {joined})"));
     }
 }

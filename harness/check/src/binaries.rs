@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use super::archive::Archive;
 use super::description::Description;
 use super::findings::Findings;
@@ -6,16 +8,14 @@ use host::fmi2::{Fmu, PLATFORM};
 use host::fmi3;
 use host::xml::Element;
 
-/// Folders under `binaries/` in FMI 2.0, the file ending of the binary in each, and the format of the binary (`None` if
-/// this check cannot read it). Names with 32 and 64 are for x86; other processors have platform tuples as in FMI 3.0.
-pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
-    ("win32", ".dll", None),
-    ("win64", ".dll", Some(Kind::Windows)),
-    ("linux32", ".so", None),
-    ("linux64", ".so", Some(Kind::Linux)),
-    ("darwin32", ".dylib", None),
-    ("darwin64", ".dylib", Some(Kind::MacOs)),
-    ("aarch64-linux", ".so", Some(Kind::LinuxArm)),
+/// Folders under `binaries/` that only FMI 2.0 defines, and the platform tuple that replaces each in FMI 3.0.
+pub const OF_FMI_2: [(&str, &str); 6] = [
+    ("win32", "x86-windows"),
+    ("win64", "x86_64-windows"),
+    ("linux32", "x86-linux"),
+    ("linux64", "x86_64-linux"),
+    ("darwin32", "x86-darwin"),
+    ("darwin64", "x86_64-darwin"),
 ];
 
 /// Architectures in the platform tuples of FMI 3.0 (section 2.5.1.4.1), such as x86_64-linux. FMI 2.0.4 also allows these
@@ -26,11 +26,11 @@ const ARCHITECTURES: [&str; 8] =
 /// File ending of the binaries in a folder, and their format if this check can read it.
 type Form = (&'static str, Option<Kind>);
 
-/// Returns the file ending of the binary in `folder` and its format, or `None` if the folder has a name that the
-/// standard does not define.
-fn platform(folder: &str) -> Option<Form> {
-    let known = PLATFORMS.iter().find(|(known, ..)| *known == folder);
-    known.map(|(_, ending, kind)| (*ending, *kind)).or_else(|| tuple(folder))
+/// Returns the file ending of the binary in `folder` and its format, or `None` if the folder has a name that FMI 2.0 does
+/// not define.
+pub fn platform(folder: &str) -> Option<Form> {
+    let old = OF_FMI_2.iter().find(|(old, _)| *old == folder);
+    tuple(old.map_or(folder, |(_, new)| new))
 }
 
 pub(crate) fn tuple(folder: &str) -> Option<Form> {
@@ -107,7 +107,7 @@ impl Binaries {
         // Static libraries have other endings, so that they do not count.
         let is_vendors = |name: &&str| {
             let folder = name.split('/').nth(1).unwrap_or_default();
-            let is_old = PLATFORMS[..6].iter().any(|(old, ..)| *old == folder);
+            let is_old = OF_FMI_2.iter().any(|(old, _)| *old == folder);
             !is_old && (tuple(folder).is_none() || name.ends_with(".a") || name.ends_with(".lib"))
         };
         all.of_vendors = archive.below("binaries/").filter(is_vendors).count();
@@ -124,10 +124,8 @@ impl Binaries {
     ) -> Binaries {
         let described = declared.is_some();
         let declared = declared.unwrap_or_default();
-        let mut identifiers: Vec<&str> = declared.iter().map(|d| d.identifier.as_str()).collect();
-        identifiers.sort_unstable();
-        identifiers.dedup();
-        let identifiers: Vec<String> = identifiers.into_iter().map(str::to_string).collect();
+        let identifiers: BTreeSet<_> = declared.iter().map(|d| d.identifier.clone()).collect();
+        let identifiers = Vec::from_iter(identifiers);
         let mut all = Binaries {
             placed: Vec::new(),
             of_vendors: 0,
@@ -199,7 +197,9 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
     }
     if binaries.placed.is_empty() && binaries.of_vendors == 0 && !binaries.has_sources {
         let known = match binaries.own_folder == PLATFORM {
-            true => PLATFORMS.map(|(known, ..)| known).join(", ") + ", other platform tuples",
+            true => {
+                OF_FMI_2.map(|(old, _)| old).join(", ") + ", platform tuples such as aarch64-linux"
+            }
             false => "platform tuples such as x86_64-linux".into(),
         };
         findings.at("binaries/").add(format!(
@@ -210,8 +210,7 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
 }
 
 pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
-    let mut folders: Vec<&str> = binaries.placed.iter().map(|p| p.folder.as_str()).collect();
-    folders.dedup();
+    let folders: BTreeSet<&str> = binaries.placed.iter().map(|p| p.folder.as_str()).collect();
     if folders.is_empty() {
         findings.skip("no platform has a binary of the model's name");
     }

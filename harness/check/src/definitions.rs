@@ -8,17 +8,13 @@ use super::findings::Findings;
 use host::xml::{Element, Fault};
 
 pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
-    match archive.file("modelDescription.xml") {
-        None => findings.skip("there is no modelDescription.xml that can be unpacked"),
-        Some(bytes) => {
-            let read = Element::parse(bytes);
-            if let Err(Fault::TooLarge(_) | Fault::Doctype(_)) = read {
-                // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
-                findings.skip("modelDescription.xml cannot be read to its end");
-            } else if let Err(why) = read {
-                findings.at("modelDescription.xml").add(why.to_string());
-            }
+    match archive.description_or_skip(findings).map(Element::parse) {
+        None | Some(Ok(_)) => {}
+        // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
+        Some(Err(Fault::TooLarge(_) | Fault::Doctype(_))) => {
+            findings.skip("modelDescription.xml cannot be read to its end");
         }
+        Some(Err(why)) => findings.at("modelDescription.xml").add(why.to_string()),
     }
 }
 

@@ -42,6 +42,7 @@ pub mod v3;
 pub mod values;
 pub mod variables;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -101,14 +102,12 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     let known = |name: &str| RULES.iter().chain(fmi3::RULES).any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
     if !unknown.is_empty() {
-        let mut groups: Vec<_> =
-            RULES.iter().chain(fmi3::RULES).filter_map(|rule| rule.id.split('.').next()).collect();
-        groups.sort_unstable();
-        groups.dedup();
+        let all = RULES.iter().chain(fmi3::RULES);
+        let groups: BTreeSet<_> = all.filter_map(|rule| rule.id.split('.').next()).collect();
         bail!(
             "no rule is called {} (groups of rules: {}; `hubslosh check --rules` lists all)",
             unknown.join(", "),
-            groups.join(", ")
+            Vec::from_iter(groups).join(", ")
         );
     }
     let archive = Archive::read(path)?;
@@ -116,7 +115,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     let description = match &description {
         Some(Ok(description)) => Ok(description),
         Some(Err(why)) => Err(format!("modelDescription.xml cannot be read: {why}")),
-        None => Err("there is no modelDescription.xml that can be unpacked".to_string()),
+        None => Err(archive::NO_DESCRIPTION.to_string()),
     };
     // FMI 3.0 has another table of rules. A file of FMI 1.0 breaks one rule, whose finding says so.
     let described = description.as_ref().ok().copied();
@@ -314,8 +313,6 @@ pub fn table(rules: &[Rule]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
 
     #[test]

@@ -1,5 +1,7 @@
 //! Rules about the logger (FMI 2.0.5, section 2.1.5).
 
+use std::collections::BTreeSet;
+
 use anyhow::Result;
 
 use super::findings::Findings;
@@ -50,14 +52,9 @@ pub fn categories<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Res
             .at("a message")
             .add(format!("the category of the message is NULL (declared: {all})"));
     }
-    let mut unknown: Vec<String> = messages
-        .into_iter()
-        .map(|message| message.category)
-        .filter(|category| !category.is_empty() && !declared.contains(&category.as_str()))
-        .collect();
-    unknown.sort();
-    unknown.dedup();
-    for category in unknown {
+    let named: BTreeSet<String> = messages.into_iter().map(|message| message.category).collect();
+    let is_unknown = |c: &String| !c.is_empty() && !declared.contains(&c.as_str());
+    for category in named.into_iter().filter(is_unknown) {
         let all = declared.join(", ");
         findings
             .at("a message")

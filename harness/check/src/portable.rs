@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::archive::Archive;
-use super::binaries::PLATFORMS;
+use super::binaries::platform;
 use super::findings::Findings;
 
 /// Characters that Windows does not allow in names. Slashes separate folders, and another rule reports control characters.
@@ -136,12 +136,12 @@ fn standard_spelling(name: &str) -> Option<String> {
         right[0] = folder;
         differs = true;
     }
-    if first.eq_ignore_ascii_case("binaries")
-        && rest.len() > 1
-        && let Some(folder) = other(rest[0], &PLATFORMS.map(|(folder, ..)| folder))
-    {
-        right[1] = folder;
-        differs = true;
+    if first.eq_ignore_ascii_case("binaries") && rest.len() > 1 && platform(rest[0]).is_none() {
+        let folder = rest[0].to_lowercase();
+        if platform(&folder).is_some() {
+            right[1] = folder;
+            differs = true;
+        }
     }
     differs.then(|| right.join("/"))
 }

@@ -64,9 +64,7 @@ fn encoding(bytes: &[u8]) -> Option<String> {
 }
 
 pub fn utf8(archive: &Archive, findings: &mut Findings) {
-    let Some(bytes) = archive.file(NAME) else {
-        return findings.skip("there is no modelDescription.xml that can be unpacked");
-    };
+    let Some(bytes) = archive.description_or_skip(findings) else { return };
     match encoding(bytes) {
         Some(encoding) if encoding.eq_ignore_ascii_case("UTF-8") => {}
         Some(other) => findings
@@ -79,9 +77,7 @@ pub fn utf8(archive: &Archive, findings: &mut Findings) {
 }
 
 pub fn doctype(archive: &Archive, findings: &mut Findings) {
-    let Some(bytes) = archive.file(NAME) else {
-        return findings.skip("there is no modelDescription.xml that can be unpacked");
-    };
+    let Some(bytes) = archive.description_or_skip(findings) else { return };
     if let Some(doctype) = Doctype::find(bytes) {
         let start: String = doctype.text.chars().take(80).collect();
         let danger = doctype.parser_reaction();
@@ -94,9 +90,7 @@ pub fn doctype(archive: &Archive, findings: &mut Findings) {
 }
 
 pub fn size(archive: &Archive, findings: &mut Findings) {
-    let Some(bytes) = archive.file(NAME) else {
-        return findings.skip("there is no modelDescription.xml that can be unpacked");
-    };
+    let Some(bytes) = archive.description_or_skip(findings) else { return };
     if let Err(Fault::TooLarge(why)) = Element::parse(bytes) {
         findings.at(NAME).add(why);
     }

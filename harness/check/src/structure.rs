@@ -49,43 +49,24 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
     if d.hides_states() {
         return findings.skip("Co-Simulation alone need not list derivatives");
     }
-    let mut taken = BTreeMap::new();
-    let mut seen = BTreeSet::new();
-    for unknown in d.unknowns(d.words.derivatives) {
-        let Some(v) = d.variable_of(unknown) else { continue };
-        let place = place(d, unknown);
-        let Some(state) = v.derivative_of() else {
-            findings
-                .at(&place)
-                .add("the variable has no attribute derivative, so that its state is unknown");
-            continue;
-        };
-        if !seen.insert(v.key) {
-            findings.at(&place).add("the variable is listed twice");
-        } else if let Some(other) = taken.insert(state, &v.name) {
-            findings.at(&place).add(format!("{other} is the derivative of the same state"));
-        }
-        if let Some(state) =
-            d.at(state).filter(|state| !(v.is_continuous() && state.is_continuous()))
-        {
-            let text =
-                format!("the derivative and its state {} must be continuous Reals", state.name);
-            findings.at(&place).add(text);
-        }
-    }
-}
-
-pub fn derivatives3(d: &Description, findings: &mut Findings) {
     let why = "variables with the attribute derivative, once";
     let allowed = |v: &Variable| v.derivative_of().is_some();
     compare(d, findings, d.words.derivatives, |_| false, allowed, why);
-    let mut taken: BTreeMap<u32, &str> = BTreeMap::new();
+    let mut taken: BTreeMap<u32, &Variable> = BTreeMap::new();
     for unknown in d.unknowns(d.words.derivatives) {
-        if let Some(v) = d.variable_of(unknown)
-            && let Some(state) = v.derivative_of()
-            && let Some(other) = taken.insert(state, &v.name).filter(|other| *other != v.name)
+        let Some(v) = d.variable_of(unknown) else { continue };
+        let Some(state) = v.derivative_of() else { continue };
+        if let Some(other) = taken.insert(state, v).filter(|other| other.key != v.key) {
+            let text = format!("{} is the derivative of the same state", other.name);
+            findings.at(place(d, unknown)).add(text);
+        }
+        // In FMI 3.0 the rule xml.derivatives_of reports this.
+        let is_wrong = |state: &&Variable| !(v.is_continuous() && state.is_continuous());
+        if !d.is_fmi3()
+            && let Some(state) = d.at(state).filter(is_wrong)
         {
-            let text = format!("{other} is the derivative of the same state");
+            let text =
+                format!("the derivative and its state {} must be continuous Reals", state.name);
             findings.at(place(d, unknown)).add(text);
         }
     }

@@ -301,22 +301,32 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
 }
 
 pub fn independent(d: &Description, findings: &mut Findings) {
-    let all: Vec<_> =
-        d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
-    if all.len() > 1 {
-        findings
-            .at(all[1].place())
-            .add(format!("{} independent variables (allowed: one)", all.len()));
+    let all = d.variables.iter().filter(|v| v.causality == Causality::Independent);
+    let count = all.clone().count();
+    if count > 1 || count == 0 && d.is_fmi3() {
+        findings.at("ModelVariables").add(format!("{count} independent variables (allowed: one)"));
     }
-    for v in all.iter().filter(|v| v.kind != Type::Real) {
-        findings.at(v.place()).add("the independent variable is not a Real");
+    for v in all {
+        if !v.is_real() {
+            let reals = d.words.reals;
+            findings
+                .at(v.place())
+                .add(format!("the independent variable has another type (allowed: {reals})"));
+        }
+        for attribute in ["initial", "start", "min", "max"] {
+            if d.is_fmi3() && v.written.get(attribute).is_some() {
+                findings
+                    .at(v.place())
+                    .add(format!("the independent variable has {attribute} (allowed: none)"));
+            }
+        }
     }
 }
 
 pub fn multiple_set(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         v.written.get("canHandleMultipleSetPerTimeInstant")?;
-        if d.interface("ModelExchange").is_none() {
+        if !d.is_fmi3() && d.interface("ModelExchange").is_none() {
             return Some("canHandleMultipleSetPerTimeInstant without ModelExchange".into());
         }
         (v.causality != Causality::Input).then(|| {
@@ -328,19 +338,40 @@ pub fn multiple_set(d: &Description, findings: &mut Findings) {
     });
 }
 
-pub fn states(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        v.typed.get("derivative")?;
-        let index = v.derivative_of().unwrap_or(0);
-        if d.at(index).is_none() {
-            return Some(format!("derivative={index} (allowed: 1 to {})", d.variables.len()));
-        }
-        (index == v.key).then(|| "the variable is declared as its own derivative".to_string())
-    });
+pub fn derivatives_of(d: &Description, findings: &mut Findings) {
     let states = d.states();
     d.each(findings, |v| {
         (v.typed.flag("reinit") && !states.contains(&v.key)).then(|| {
-            "reinit is true, but the variable is not a state, because Derivatives lists no derivative of it".into()
+            format!(
+                "reinit is true, but the variable is not a continuous state, because {} lists no derivative of it",
+                d.words.derivatives
+            )
+        })
+    });
+    d.each(findings, |v| {
+        let text = v.typed.get("derivative")?;
+        let Some(of) = v.derivative_of().and_then(|key| d.at(key)) else {
+            let allowed = match d.is_fmi3() {
+                true => "the valueReference of a variable".into(),
+                false => format!("1 to {}", d.variables.len()),
+            };
+            return Some(format!("derivative=\"{text}\" (allowed: {allowed})"));
+        };
+        if of.key == v.key {
+            return Some("the variable is declared as its own derivative".into());
+        }
+        // In FMI 2.0 the rule xml.derivatives reports the type, and variables have no dimensions.
+        if d.is_fmi3() && !(v.is_continuous() && of.is_continuous()) {
+            return Some(format!(
+                "the variable and {} must be continuous floating-point numbers",
+                of.name
+            ));
+        }
+        (v.dimensions != of.dimensions).then(|| {
+            format!(
+                "the variable has the dimensions {:?}, but {} has {:?} (required: equal dimensions)",
+                v.dimensions, of.name, of.dimensions
+            )
         })
     });
 }

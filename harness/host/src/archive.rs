@@ -44,24 +44,24 @@ impl Entry {
         self.name.ends_with('/')
     }
 
-    /// Returns the reason why the name of this entry is refused, for example because the file would
-    /// be written outside the folder into which the archive is unpacked. Returns `None` if the name
-    /// is acceptable.
-    fn name_fault(&self) -> Option<&'static str> {
+    /// Returns the reasons why this entry could be written outside the folder into which the archive is unpacked, as ends
+    /// of a sentence that begins with "the name".
+    pub fn name_faults(&self) -> Vec<&'static str> {
         let name = &self.name;
-        if name.starts_with('/') || name.get(1..2) == Some(":") {
-            Some("its name is absolute")
-        } else if name.split('/').any(|part| part == "..") {
-            Some("its name leads out of the archive by \"..\"")
-        } else if name.is_empty() || name.contains(['\\', '\0']) {
-            Some("its name is empty, or contains a backslash or a NUL character")
-        } else if name.trim_end_matches('/').split('/').any(|part| matches!(part, "" | ".")) {
-            Some("its name has an empty part or \".\"")
-        } else if self.link {
-            Some("it is a symbolic link")
-        } else {
-            None
-        }
+        let has_part = |wrong: &[&str]| {
+            name.trim_end_matches('/').split(['/', '\\']).any(|part| wrong.contains(&part))
+        };
+        // Some tools write an entry for the folder itself, which every unpacker accepts.
+        let is_whole = name == "./";
+        let faults = [
+            (name.is_empty(), "is empty"),
+            (name.contains('\\'), "has a backslash"),
+            (name.contains('\0'), "has a zero"),
+            (name.starts_with('/') || name.get(1..2) == Some(":"), "is absolute"),
+            (has_part(&[".."]), "leads out of the archive by \"..\""),
+            (has_part(&["", "."]) && !is_whole, "has an empty part or \".\""),
+        ];
+        faults.into_iter().filter_map(|(is_so, fault)| is_so.then_some(fault)).collect()
     }
 }
 
@@ -166,9 +166,10 @@ impl Archive {
         let mut places: BTreeMap<String, &Entry> = BTreeMap::new();
         for entry in &self.entries {
             let name = entry.name.escape_debug();
-            if let Some(why) = entry.name_fault() {
-                bail!("{name}: {why} (allowed: files and folders with relative names)");
-            }
+            let faults = entry.name_faults().join(", ");
+            let allowed = "allowed: files and folders with relative names";
+            ensure!(faults.is_empty(), "{name}: the name {faults} ({allowed})");
+            ensure!(!entry.link, "{name}: it is a symbolic link ({allowed})");
             let Some(other) = places.insert(place(&entry.name), entry) else { continue };
             // Two entries for one folder do no harm, because no file is overwritten.
             if entry.is_folder() && other.is_folder() {
@@ -322,13 +323,13 @@ mod tests {
             (&[(long.as_str(), b"")], 0, "a name in the archive has 1025 bytes (allowed: 1024)"),
             (&[("../out", b"")], 0, "leads out of the archive"),
             (&[("b/../../out", b"")], 0, "leads out of the archive"),
-            (&[("/out", b"")], 0, "its name is absolute"),
-            (&[("c:out", b"")], 0, "its name is absolute"),
+            (&[("/out", b"")], 0, "the name is absolute"),
+            (&[("c:out", b"")], 0, "the name is absolute"),
             (&[("..\\out", b"")], 0, "backslash"),
             (&[("b/../a", b"")], 0, "leads out of the archive"),
-            (&[("./a", b"")], 0, "its name has an empty part or \".\""),
-            (&[("b/./a", b"")], 0, "its name has an empty part or \".\""),
-            (&[("b//a", b"")], 0, "its name has an empty part or \".\""),
+            (&[("./a", b"")], 0, "the name has an empty part or \".\""),
+            (&[("b/./a", b"")], 0, "the name has an empty part or \".\""),
+            (&[("b//a", b"")], 0, "the name has an empty part or \".\""),
             (&[("b/a", b"1"), ("B/A", b"2")], 0, "B/A and b/a would be the same file"),
             (&[("b/a", b"1"), ("b/a.", b"2")], 0, "b/a. and b/a would be the same file"),
             (&[("b/a", b"1"), ("b. /a", b"2")], 0, "b. /a and b/a would be the same file"),

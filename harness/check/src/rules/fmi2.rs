@@ -61,7 +61,7 @@ pub static RULES: &[Rule] = &[
     rule("xml.aliases", Error, "of variables that share a value reference hosts can set at most one, and all have the same type and unit", "2.2.7", Description(variables::aliases)),
     rule("xml.independent", Error, "there is at most one independent variable, and it is a Real", "2.2.7", Description(variables::independent)),
     rule("xml.multiple_set", Error, "only inputs of Model Exchange have canHandleMultipleSetPerTimeInstant", "2.2.7", Description(variables::multiple_set)),
-    rule("xml.states", Error, "the attribute derivative names another variable; only states have reinit", "2.2.7", Description(variables::states)),
+    rule("xml.states", Error, "the attribute derivative names another variable; only states have reinit", "2.2.7", Description(variables::derivatives_of)),
     rule("xml.outputs", Error, "ModelStructure lists every output once", "2.2.8", Description(structure::outputs)),
     rule("xml.derivatives", Error, "Derivatives lists continuous Reals with the attribute derivative, one for each state", "2.2.8", Description(structure::derivatives)),
     rule("xml.initial_unknowns", Error, "InitialUnknowns lists exactly the variables that the standard requires, each once and in ascending order", "2.2.8", Description(structure::initial_unknowns)),

@@ -1,5 +1,6 @@
 use crate::archive::Archive;
 use crate::archive::report_unknown_folders;
+use crate::binaries::OF_FMI_2;
 use crate::findings::Findings;
 use host::xml::Element;
 
@@ -93,33 +94,14 @@ pub fn layered_standards(archive: &Archive, findings: &mut Findings) {
 }
 
 pub fn extra(archive: &Archive, findings: &mut Findings) {
-    let mut folders: Vec<&str> =
-        archive.below("extra/").filter_map(|name| name.split('/').nth(1)).collect();
-    folders.sort_unstable();
-    folders.dedup();
-    for folder in folders.iter().filter(|f| !f.contains('.') || has(archive, &format!("extra/{f}")))
-    {
+    let is_wrong = |f: &&str| !f.contains('.') || has(archive, &format!("extra/{f}"));
+    for folder in archive.folders("extra/").into_iter().filter(is_wrong) {
         findings.at(format!("extra/{folder}")).add("the name of the folder is not in the reverse domain notation of its maker (allowed: like org.example.data)");
     }
 }
 
-// ---------------------------------------------------------------- binaries
-
-/// Folders of FMI 2.0 under `binaries/`, and the platform tuple that replaces each.
-const OF_FMI_2: [(&str, &str); 6] = [
-    ("win32", "x86-windows"),
-    ("win64", "x86_64-windows"),
-    ("linux32", "x86-linux"),
-    ("linux64", "x86_64-linux"),
-    ("darwin32", "x86-darwin"),
-    ("darwin64", "x86_64-darwin"),
-];
-
 pub fn tuples(archive: &Archive, findings: &mut Findings) {
-    let mut folders: Vec<&str> =
-        archive.below("binaries/").filter_map(|name| name.split('/').nth(1)).collect();
-    folders.sort_unstable();
-    folders.dedup();
+    let folders = archive.folders("binaries/");
     for (old, new) in OF_FMI_2.iter().filter(|(old, _)| folders.contains(old)) {
         findings.at(format!("binaries/{old}")).add(format!(
             "the folder belongs to FMI 2.0, where no host of FMI 3.0 looks (allowed: {new})"

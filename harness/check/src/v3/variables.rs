@@ -1,9 +1,10 @@
 //! Rules about variables that only FMI 3.0 has (FMI 3.0.2, section 2.4.7).
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::description::{Description, Variable};
 use crate::findings::Findings;
+use crate::variables::multiple_set;
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
 
@@ -20,38 +21,9 @@ pub fn references(d: &Description, findings: &mut Findings) {
     }
 }
 
-pub fn independent(d: &Description, findings: &mut Findings) {
-    let all: Vec<_> =
-        d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
-    if all.len() != 1 {
-        findings
-            .at("ModelVariables")
-            .add(format!("{} independent variables (allowed: one)", all.len()));
-    }
-    for v in all {
-        if !v.is_real() {
-            findings.at(v.place()).add("the independent variable is not a Float64 or Float32");
-        }
-        for attribute in ["initial", "start", "min", "max"] {
-            if v.written.get(attribute).is_some() {
-                findings
-                    .at(v.place())
-                    .add(format!("the independent variable has {attribute} (allowed: none)"));
-            }
-        }
-    }
-}
-
 pub fn flags(d: &Description, findings: &mut Findings) {
+    multiple_set(d, findings);
     d.each(findings, |v| {
-        if v.written.get("canHandleMultipleSetPerTimeInstant").is_some()
-            && v.causality != Causality::Input
-        {
-            return Some(format!(
-                "canHandleMultipleSetPerTimeInstant on a variable of causality {} (allowed: input)",
-                v.causality
-            ));
-        }
         (v.written.flag("intermediateUpdate") && v.variability != Variability::Continuous).then(
             || {
                 format!(
@@ -145,34 +117,4 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
             }
         }
     }
-}
-
-pub fn derivatives_of(d: &Description, findings: &mut Findings) {
-    let states: BTreeSet<u32> = d.states().into_iter().collect();
-    d.each(findings, |v| {
-        if v.written.flag("reinit") && !states.contains(&v.key) {
-            return Some("reinit is true, but the variable is not a continuous state".to_string());
-        }
-        let text = v.written.get("derivative")?;
-        let Some(of) = v.derivative_of().and_then(|r| d.at(r)) else {
-            return Some(format!(
-                "derivative=\"{text}\" (allowed: the valueReference of a variable)"
-            ));
-        };
-        if of.key == v.key {
-            return Some("the variable is declared as its own derivative".into());
-        }
-        if !(v.is_continuous() && of.is_continuous()) {
-            return Some(format!(
-                "the variable and {} must be continuous floating-point numbers",
-                of.name
-            ));
-        }
-        (v.dimensions != of.dimensions).then(|| {
-            format!(
-                "the variable has the dimensions {:?}, but {} has {:?} (required: equal dimensions)",
-                v.dimensions, of.name, of.dimensions
-            )
-        })
-    });
 }
