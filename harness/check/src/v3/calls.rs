@@ -56,8 +56,6 @@ pub fn deterministic(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
 }
 
-// ---------------------------------------------------------------- values
-
 pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
         let mut session = subject.running(using)?;
@@ -263,8 +261,6 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-// ---------------------------------------------------------------- states
-
 pub fn restore(subject: &Subject, findings: &mut Findings) -> Result<()> {
     states::rollback(subject, findings)?;
     match subject.plain_uses().first().filter(|_| findings.skipped.is_none()) {
@@ -304,8 +300,6 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
     Ok(())
 }
-
-// ---------------------------------------------------------------- log
 
 pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut heard = 0;
@@ -347,8 +341,6 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     }
     Ok(())
 }
-
-// ---------------------------------------------------------------- Model Exchange
 
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = subject.description;

@@ -141,8 +141,6 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-// ---------------------------------------------------------------- events
-
 pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in uses_with_events(subject)? {
         let mut session = subject.session(using)?;
@@ -324,8 +322,6 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-// ---------------------------------------------------------------- intermediate update
-
 fn require_updates(subject: &Subject) -> Result<()> {
     let stepping = Interface::CoSimulation;
     match subject.binary(stepping) {
@@ -492,8 +488,6 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
     }
     Ok(())
 }
-
-// ---------------------------------------------------------------- derivatives
 
 /// Returns the Float64 unknowns for which directional derivatives are checked, each with its declared Float64
 /// dependencies.

@@ -431,8 +431,8 @@ pub struct Record {
     /// torque; `None` if `spa` finds no valid resonance and antiresonance.
     pub snr_db: Option<[f64; 2]>,
     pub snr_over_band: Curve,
-    /// A fitted transfer function. It is computed only if neither `spa` nor H1 nor the estimate of the
-    /// passing sweep is valid.
+    /// A fitted transfer function. It is computed only if the estimate of the passing sweep is not valid, or if there is no
+    /// sweep and `spa` shows no resonance and no antiresonance.
     pub rational: Option<Estimate>,
     /// The thesis's linear model, fitted to the `spa` response, and the coherence of its residual with the torque over the
     /// band; `None` if nothing can be fitted.

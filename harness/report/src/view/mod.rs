@@ -66,8 +66,7 @@ fn kind(description: &ModelDescription) -> Option<Kind> {
     .find_map(|(name, kind)| has(name).then_some(kind))
 }
 
-/// Panels of the bench's plots, each with its title and its columns in the order of importance. A name with `*` means all
-/// names that begin with the part before it.
+/// Panels of the bench's plots, each with its title and its columns in the order of importance.
 const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Torque on the hub", &[TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FRICTION, TAU_FLUID]),
     ("Rate of the hub", &[OMEGA, OMEGA_IMU]),
