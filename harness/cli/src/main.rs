@@ -75,7 +75,6 @@ impl Cli {
             Run(args) => Some(&args.fmu),
             Campaign(args) => Some(&args.runs.fmu),
             Analyse(args) => Some(&args.runs.fmu),
-            Gyro(args) => args.needs_fmu().then_some(&args.fmu),
             Example(args) => Some(&args.fmu),
             Identify(args) => args.fmu(),
             Design(args) => Some(&args.fmu),

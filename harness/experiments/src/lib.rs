@@ -2,7 +2,6 @@
 
 pub mod campaign;
 pub mod example;
-pub mod gyro;
 pub mod plan;
 pub mod profile;
 pub mod progress;

@@ -1,38 +1,27 @@
-//! Charts about a gyro at rest: its Allan deviation, and the noise tests of a recording.
+//! Charts about the recording of a gyro at rest: its Allan deviation and the tests of its noise.
 
-use analysis::allan::{Noise, Point};
+use analysis::allan::Point;
 use analysis::rest::{Chunk, KOLMOGOROV, Rest};
-use experiments::gyro::Characteristics;
 use maud::html;
 
 use crate::page::{document, render_chart, table};
 use crate::svg::{Axis, Chart, Style, series};
 
-pub fn allan_deviations(gyro: &Characteristics) -> String {
-    let names = ["specified white noise, slope −1/2", "estimated", "specified noise"];
-    allan(
-        "Allan deviation of the simulated gyro at rest",
-        &gyro.points,
-        Some(&gyro.specified),
-        names,
-    )
-    .file()
-}
-
-/// Draws the Allan deviations of a gyro and, if `noise` is given, the Allan deviation of this noise and of
-/// its white part. `names` label the white part, the measured deviations and the noise.
-fn allan(title: &str, points: &[Point], noise: Option<&Noise>, names: [&str; 3]) -> Chart {
+fn allan(rest: &Rest) -> Chart {
     let curve = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
-        points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
+        rest.allan.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
     };
+    let noise = rest.noise.as_ref().map(|fit| &fit.noise);
     let measured = curve(&|point| point.variance);
     let white = noise.map(|noise| curve(&|point| noise.arw.powi(2) / point.tau));
     let whole = noise.map(|noise| curve(&|point| noise.variance(point.tau)));
-    let white = white.map(|white| series(white, EXPECTED, Style::Dashed, names[0]));
-    let whole = whole.map(|whole| series(whole, FITTED, Style::Line, names[2]));
+    let white =
+        white.map(|white| series(white, EXPECTED, Style::Dashed, "fitted white noise, slope −1/2"));
+    let whole = whole.map(|whole| series(whole, FITTED, Style::Line, "fitted noise"));
     let x = Axis::decades("averaging time / s", measured.iter().map(|p| p.0));
     let y = Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1));
-    let measured = series(measured, MEASURED, Style::Dots, names[1]);
+    let measured = series(measured, MEASURED, Style::Dots, "recorded");
+    let title = "Allan deviation of the recorded gyro at rest";
     Chart::new(title, x, y, white.into_iter().chain([measured]).chain(whole).collect())
 }
 
@@ -52,12 +41,6 @@ pub fn page(rows: &[(String, String)], found: &Rest) -> String {
 pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
     // frame around the range within ±y in which white noise stays
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
-    let allan = allan(
-        "Allan deviation of the recorded gyro at rest",
-        &rest.allan,
-        rest.noise.as_ref().map(|fit| &fit.noise),
-        ["fitted white noise, slope −1/2", "recorded", "fitted noise"],
-    );
     let end = rest.quantiles.last().map_or(3.0, |(x, _)| *x);
     let mut quantiles = Chart::new(
         "Quantiles of the readings, dashed: of the normal distribution",
@@ -135,7 +118,7 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
         ],
     );
     [
-        ("allan.svg", allan),
+        ("allan.svg", allan(rest)),
         ("histogram.svg", histogram),
         ("quantiles.svg", quantiles),
         ("autocorrelation.svg", autocorrelation),

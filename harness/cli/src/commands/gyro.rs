@@ -3,126 +3,52 @@ use std::path::{Path, PathBuf};
 
 use analysis::allan::{Estimate, Fit, Term};
 use analysis::rest::{Chunk, Rest};
-use anyhow::{Result, ensure};
-use experiments::gyro::Recording;
+use anyhow::{Context, Result, ensure};
 use files::output;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
 
-use super::{DEFAULT_FMU, open, setting};
-use crate::{progress, terminal};
+use crate::terminal;
 
 const DEFAULT_GYRO: &str = "dist/gyro";
 
-/// Simulates the gyro at rest for hours and compares its Allan deviation with the specified noise; or analyses a
-/// recording of a real gyro at rest.
+/// Estimates the noise of a gyro from a recording at rest by its Allan deviation.
 ///
-/// The command writes allan.csv and allan.svg. With --recording it estimates the noise of a real gyro, and tests whether
-/// this noise is normal, white and stationary by quantiles, autocorrelation and statistics of parts of the recording.
+/// The command also tests whether the noise is normal, white and stationary by quantiles, autocorrelation and statistics
+/// of parts of the recording. It writes the tables and figures of these tests.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  hubslosh gyro\n  \
-    hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro\n  \
-    hubslosh gyro --recording rest.csv --columns time=t:ms,omega=gyro_z:deg/s --out dist/our_gyro")]
+#[command(after_help = "Examples:\n  \
+    hubslosh gyro --recording rest.csv --columns time=t:ms,omega=gyro_z:deg/s --out dist/our_gyro\n  \
+    hubslosh run --profile zero:duration=21600 --set imu.enabled=true --set init.slosh_angle=0 --step 0.02 \
+    --out rest.parquet\n  \
+    hubslosh gyro --recording rest.parquet --columns omega=omega_imu")]
 pub struct GyroArgs {
     /// Recording of a gyro at rest: text in columns, Parquet or another kind of recording.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["hours", "records", "settings", "fmu"])]
-    recording: Option<PathBuf>,
+    #[arg(long, value_name = "FILE")]
+    recording: PathBuf,
     /// Columns of the recording that contain the signals time and omega, with units, such as
     /// time=t:ms,omega=gyro_z:deg/s.
-    #[arg(
-        long,
-        value_name = "SIGNAL=COLUMN[:UNIT],…",
-        default_value_t,
-        hide_default_value = true,
-        requires = "recording"
-    )]
+    #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
     columns: Columns,
     /// Sampling rate of a recording without times, Hz.
-    #[arg(long, value_name = "HZ", requires = "recording")]
+    #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Length of the parts into which the recording is divided, to test whether the noise changes with time, s.
     /// Rubaga's thesis uses 15 min.
-    #[arg(long, value_name = "SECONDS", default_value_t = 900.0, requires = "recording")]
+    #[arg(long, value_name = "SECONDS", default_value_t = 900.0)]
     chunk: f64,
     /// File for a report on the recording, .html.
-    #[arg(long, value_name = "FILE", requires = "recording")]
+    #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Length of each simulated record, h.
-    #[arg(long, value_name = "HOURS", default_value_t = 6.0)]
-    hours: f64,
-    /// Number of simulated records, which differ in the seed of their noise (imu.seed is 1, 2, …).
-    #[arg(long, value_name = "NUMBER", default_value_t = 8)]
-    records: usize,
-    /// Sets a parameter by its name in the FMU, such as imu.arw=1e-4.
-    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
-    settings: Vec<(String, String)>,
-    /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
-    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
-    pub fmu: PathBuf,
-    /// Prints the noise that was estimated from the simulated gyro as JSON.
-    #[arg(long, conflicts_with = "recording")]
-    json: bool,
     /// Directory for the tables and pictures.
     #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_GYRO)]
     out: PathBuf,
 }
 
 impl GyroArgs {
-    pub fn needs_fmu(&self) -> bool {
-        self.recording.is_none()
-    }
-
     pub fn run(self) -> Result<()> {
-        if let Some(path) = &self.recording {
-            return self.analyse_recording(path);
-        }
-        let recording =
-            Recording { settings: self.settings, hours: self.hours, records: self.records };
-        let bar = progress::steps_bar()?;
-        let found =
-            recording.characterise(&open(&self.fmu)?, &|news| progress::show(&bar, news))?;
-        bar.finish_and_clear();
-        output::directory(&self.out)?;
-        let [table, picture] = ["allan.csv", "allan.svg"].map(|name| self.out.join(name));
-        found.table().write(&table, &BTreeMap::new())?;
-        output::write(&picture, report::gyro::allan_deviations(&found).as_bytes())?;
-        match self.json {
-            true => terminal::print_json(&found.json())?,
-            false => print!("{}", found.text()),
-        }
-        done!("{}\n{}", table.display(), picture.display());
-        Ok(())
-    }
-}
-
-const LAG: f64 = 10.0;
-const LEAST_CHUNKS: f64 = 3.0;
-
-impl GyroArgs {
-    fn analyse_recording(&self, path: &Path) -> Result<()> {
-        let signals =
-            [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
         let columns = self.columns.clone().with_rate(self.rate)?;
-        let wanted = Wanted { signals: &signals, columns: &columns };
-        let mut say = |line: String| terminal::note(line);
-        let table = recording::read(path, &wanted, &mut say)?;
-        let (step, table) = recording::even(table, &mut say)?;
-        let omega = table.column("omega").unwrap_or_default();
-        let seconds = step * omega.len() as f64;
-        ensure!(
-            self.chunk > 0.0 && seconds > LEAST_CHUNKS * self.chunk && self.chunk > 10.0 * step,
-            "{}: the recording lasts {seconds:.0} s, in chunks of {} s (allowed: at least {LEAST_CHUNKS} chunks of at least 10 rows; \
-             --chunk SECONDS sets their length)",
-            path.display(),
-            self.chunk
-        );
-        ensure!(
-            omega.iter().any(|w| *w != omega[0]),
-            "{}: omega is constant, {} rad/s: the gyro is off, or its resolution is coarser than its noise",
-            path.display(),
-            omega[0]
-        );
-        let rest = Rest::analyse(step, omega, self.chunk, LAG);
+        let rest = analyse_recording(&self.recording, &columns, Some(self.chunk))?;
         output::directory(&self.out)?;
         for (name, table) in tables(&rest) {
             table.write(&self.out.join(name), &BTreeMap::new())?;
@@ -142,6 +68,43 @@ impl GyroArgs {
         done!("{}", self.out.display());
         Ok(())
     }
+}
+
+/// Length, s, up to which autocorrelation is computed.
+const LAG: f64 = 10.0;
+const CHUNK: f64 = 900.0;
+const CHUNKS: f64 = 8.0;
+const LEAST_CHUNKS: f64 = 3.0;
+
+/// Analyses the signal omega of a recording of a gyro at rest in parts of `chunk` seconds. If no length is given, the
+/// parts have 900 s, or an eighth of a shorter recording.
+pub fn analyse_recording(path: &Path, columns: &Columns, chunk: Option<f64>) -> Result<Rest> {
+    let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
+    let mut say = |line: String| terminal::note(line);
+    let table = recording::read(path, &Wanted { signals: &signals, columns }, &mut say)?;
+    let path = path.display();
+    let (step, table) = recording::even(table, &mut say)
+        .with_context(|| format!("the recording {path} cannot be used"))?;
+    let omega = table.column("omega").unwrap_or_default();
+    let seconds = step * omega.len() as f64;
+    match chunk {
+        Some(chunk) => ensure!(
+            chunk > 0.0 && seconds > LEAST_CHUNKS * chunk && chunk > 10.0 * step,
+            "{path}: the recording lasts {seconds:.0} s, in chunks of {chunk} s (allowed: at least {LEAST_CHUNKS} chunks of at \
+             least 10 rows; --chunk SECONDS sets their length)"
+        ),
+        None => ensure!(
+            seconds > 20.0 * LAG,
+            "{path}: the recording lasts {seconds:.0} s (allowed: at least {:.0} s)",
+            20.0 * LAG
+        ),
+    }
+    ensure!(
+        omega.iter().any(|w| *w != omega[0]),
+        "{path}: omega is constant, {} rad/s: the gyro is off, or its resolution is coarser than its noise",
+        omega[0]
+    );
+    Ok(Rest::analyse(step, omega, chunk.unwrap_or(CHUNK.min(seconds / CHUNKS)), LAG))
 }
 
 fn tables(rest: &Rest) -> [(&'static str, Table); 4] {

@@ -173,7 +173,6 @@ fn runs_that_need_more_memory_than_any_machine_has_are_refused() {
             &["torque", "--profile", "zero", "--step", "1e-9", "--out", "x.csv"],
             &["at most 20000000"],
         ),
-        (&["gyro", "--fmu", fmu, "--records", "99999999999", "--out", "g"], &["1 to 10000"]),
         (&["scale", "froude", "--lambda", "1e308"], &["lambda = 1e308"]),
         // A negative number counts as a value, not as a flag.
         (&["scale", "froude", "--lambda", "-1"], &["lambda = -1", "positive"]),
@@ -240,7 +239,6 @@ fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_alloca
             ],
             "needs 8.4e10 values of sines (allowed: at most 2e9)",
         ),
-        (&["gyro", "--fmu", fmu, "--hours", "1e9"], "samples (allowed: 100 to 20000000)"),
         (
             &["campaign", "--fmu", fmu, "--plan", "plan.toml", "--out", "c"],
             "a plan may have at most 100000 runs",
@@ -612,8 +610,6 @@ fn every_command_that_prints_a_table_also_prints_json() {
     assert_eq!(json(&["check", fmu, "--only", "zip", "--json"])["errors"], 0);
     let plan = ["design", "--fmu", fmu, "--profile", "sine:duration=20", "--json"];
     assert_eq!(json(&plan)["parameters"]["hub.I"]["unit"], "kg.m2");
-    let gyro = ["gyro", "--fmu", fmu, "--hours", "0.9", "--records", "1", "--json", "--quiet"];
-    assert!(json(&gyro)["B, rad/s"]["specified"].is_f64());
 }
 
 /// The command is copied to bin/ and an FMU to the folder of the Python package. `hubslosh run`

@@ -119,7 +119,7 @@ fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
 }
 
 const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campaign --plan, campaign --fmu, \
-    design --fmu, example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, \
+    design --fmu, example --fmu, gyro --recording, identify --fmu, run --input, \
     run --parameters, run --fmu, pack --parameters, variables --fmu, view --parameters, view --fmu, book --theme";
 
 /// Each option with FILE or FOLDER in its help must be in one of two lists, so that no output can

@@ -3,8 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use analysis::rest::Rest;
 use anyhow::{Context, Result};
+use experiments::plan::Recorded;
 use experiments::scaling::{OXYGEN, WATER};
 use host::fmu::Fmu;
 use identify::bench::braking::Braking;
@@ -18,10 +18,9 @@ use identify::methods::friction::{self as runs, LEAST_STRETCHES};
 use names::hubslosh::{friction, hub, tank};
 use report::campaign::{Chapter, Illustration};
 use report::svg::{self, Axis, Chart, Series, Style};
-use signals::recording::{self, Between, Signal, Wanted};
 
-use super::super::gyro::noise_rows;
-use super::{Day, Item, Kind};
+use super::super::gyro::{analyse_recording, noise_rows};
+use super::{Day, Kind};
 use crate::terminal;
 
 /// Friction parameters and hub inertia of Table 5.5 in Rubaga's thesis, in SI units, under their
@@ -40,9 +39,6 @@ const POINTS: usize = 1500;
 /// Largest rate in the report's figure of the friction near rest, as a multiple of the Stribeck
 /// speed.
 const NEAR: f64 = 5.0;
-const LAG: f64 = 10.0;
-const CHUNK: f64 = 900.0;
-const CHUNKS: f64 = 8.0;
 
 /// Computes the chapters of the report on a bench day, and the fit of friction and inertia if there
 /// are recordings for it. A message for each recording that cannot be used is added to `problems`.
@@ -438,31 +434,13 @@ fn preferential_direction(
     }
 }
 
-fn analyse_rest_recording(item: &Item) -> Result<Rest> {
-    let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
-    let wanted = Wanted { signals: &signals, columns: &item.recorded.columns };
-    let table = recording::read(&item.recorded.path, &wanted, &mut |line| terminal::note(line))?;
-    let (step, table) =
-        recording::even(table, &mut |line| terminal::note(line)).with_context(|| {
-            format!("the recording {} cannot be used", item.recorded.path.display())
-        })?;
-    let omega = table.column("omega").unwrap_or_default();
-    let seconds = step * omega.len() as f64;
-    anyhow::ensure!(
-        seconds > 20.0 * LAG && omega.iter().any(|w| *w != omega[0]),
-        "{}: it lasts {seconds:.0} s (allowed: at least {:.0} s, in which omega changes)",
-        item.recorded.path.display(),
-        20.0 * LAG
-    );
-    Ok(Rest::analyse(step, omega, CHUNK.min(seconds / CHUNKS), LAG))
-}
-
 fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
     let title = "Gyro at rest (thesis 5.5)";
     let mut found = Vec::new();
     for item in day.items_of_kind(Kind::Rest) {
-        match analyse_rest_recording(item) {
-            Ok(rest) => found.push((item.recorded.path.display().to_string(), rest)),
+        let Recorded { path, columns } = &item.recorded;
+        match analyse_recording(path, columns, None) {
+            Ok(rest) => found.push((path.display().to_string(), rest)),
             Err(error) => problems.push(format!("{error:#}")),
         }
     }
