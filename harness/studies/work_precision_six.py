@@ -49,16 +49,24 @@ ROUNDS = 20
 """Repetitions of the inputs; in every second repetition torque and lateral force change sign."""
 RUNS = 7
 """Number of repetitions of each measurement; the shortest time counts."""
+RESTARTS = (0.02, 0.05, 0.1)
+"""Times after which the inputs change in the measurement of restarts, s."""
 
-Solution = Callable[[list], np.ndarray]
-"""Function from pieces (begin, end, force and torque, times of rows) to the states at all rows."""
+Pieces = list[tuple[float, float, np.ndarray, np.ndarray]]
+"""Pieces of time with constant inputs: begin, end, force and torque, times of rows."""
+
+Solution = Callable[[Pieces], tuple[np.ndarray, float]]
+"""Function from pieces to the states at all rows and the CPU time without set-up, s."""
 
 
-def pieces(rounds: int, every: float) -> list[tuple[float, float, np.ndarray, np.ndarray]]:
-    """Return the pieces of time in which inputs are constant, with the times of their rows.
+OURS, HEYOKA = "Spacecraft.fmu", "heyoka, Taylor"
 
-    Rows are ``every`` s apart; the motion is repeated for ``rounds`` rounds of 20 s.
-    """
+Measured = tuple[str, float, list[float], list[float]]
+"""Method, tolerance, and for each scenario the largest relative error and the CPU time, µs/s."""
+
+
+def pieces(rounds: int, every: float) -> Pieces:
+    """Return the pieces of time in which inputs are constant, with rows every ``every`` s."""
     made = []
     for k in range(rounds):
         turned = np.array([1, 1, 1, 1, 1, 1.0]) if k % 2 == 0 else np.array([-1, -1, 1, -1, -1, -1])
@@ -69,25 +77,48 @@ def pieces(rounds: int, every: float) -> list[tuple[float, float, np.ndarray, np
     return made
 
 
+def restarts(rounds: int, length: float) -> Pieces:
+    """Return pieces of ``length`` s with one row each: inputs that vary by up to 10 %."""
+    made = []
+    for begin, end, wrench, times in pieces(rounds, length):
+        begins = np.hstack([begin, times[:-1]])
+        for k, (first, last) in enumerate(zip(begins.tolist(), times.tolist(), strict=True)):
+            varied = wrench * (1 + 0.1 * np.sin(0.7 * k + begin + np.arange(6)))
+            made.append((first, last, varied, np.array([last])))
+    return made
+
+
 class Heyoka:
     """heyoka's Taylor integrator, with dense output at the rows."""
 
-    def __init__(self, tolerance: float) -> None:
+    def __init__(self, tolerance: float, *, is_empty: bool = False) -> None:
+        """Compile the integrator; if ``is_empty``, for one equation that needs no computation."""
         equations, self.start = heyoka_taylor.craft_system(cases.parameters(CASE))
+        if is_empty:
+            x = hy.make_vars("x")
+            equations, self.start = [(x, sum(hy.par[i] for i in range(6)))], np.zeros(1)
         self.taylor = hy.taylor_adaptive(
             equations, self.start, pars=[0.0] * 6, tol=tolerance, compact_mode=False
         )
 
-    def __call__(self, given: list) -> np.ndarray:
-        """Return the states at all rows of the pieces of time ``given``."""
+    def __call__(self, given: Pieces) -> tuple[np.ndarray, float]:
+        """Return the states at the rows of the given pieces, and the CPU time."""
         ta, found = self.taylor, []
         ta.time = 0.0
         ta.state[:] = self.start
-        for begin, _, wrench, times in given:
-            ta.pars[:] = wrench
-            found.append(ta.propagate_grid(np.hstack([begin, times]))[-1][1:])
-        states = np.vstack(found)
-        return states[:, 4:]
+        pars, until, grid, state = ta.pars, ta.propagate_until, ta.propagate_grid, ta.state
+        grids = [np.hstack([begin, times]) for begin, _, _, times in given]
+        is_single = len(grids[0]) == 2
+        spent = time.process_time()
+        for (_, end, wrench, _), times in zip(given, grids, strict=True):
+            pars[:] = wrench
+            if is_single:
+                until(end)
+                found.append(state.copy())
+            else:
+                found.append(grid(times)[-1][1:])
+        spent = time.process_time() - spent
+        return np.vstack(found)[:, 4:], spent
 
 
 def compiling() -> float:
@@ -118,57 +149,61 @@ class Compiled:
         return written
 
 
+def timed(right: Compiled, solve: Callable[[float, np.ndarray, np.ndarray, Callable], np.ndarray]):
+    """Return a Solution that calls ``solve`` for each piece with begin, rows, state and rates."""
+
+    def solution(given: Pieces) -> tuple[np.ndarray, float]:
+        y, found, spent = np.array(right.start), [], time.process_time()
+        for begin, _, wrench, times in given:
+            found.append(solve(begin, times, y, right.of(wrench)))
+            y = found[-1][-1]
+        return np.vstack(found)[:, 4:], time.process_time() - spent
+
+    return solution
+
+
 def sundials(right: Compiled, tolerance: float) -> Solution:
     """Return a function that solves by CVODE (Adams), restarted where the inputs jump."""
 
-    def solution(given: list) -> np.ndarray:
-        y, found = np.array(right.start), []
-        for begin, _, wrench, times in given:
-            solver = cvode.CVODE(
-                right.of(wrench), method="Adams", rtol=tolerance, atol=tolerance * 1e-2,
-                max_num_steps=100000,
-            )  # fmt: skip
-            states = solver.solve(np.hstack([begin, times]), y).y
-            found.append(states[1:])
-            y = states[-1]
-        return np.vstack(found)[:, 4:]
+    def solve(begin: float, times: np.ndarray, y: np.ndarray, rates: Callable) -> np.ndarray:
+        solver = cvode.CVODE(
+            rates, method="Adams", rtol=tolerance, atol=tolerance * 1e-2, max_num_steps=100000
+        )
+        return solver.solve(np.hstack([begin, times]), y).y[1:]
 
-    return solution
+    return timed(right, solve)
 
 
 def dop853(right: Compiled, tolerance: float) -> Solution:
     """Return a function that solves by SciPy's DOP853, restarted where the inputs jump."""
 
-    def solution(given: list) -> np.ndarray:
-        y, found = np.array(right.start), []
-        for begin, end, wrench, times in given:
-            rates, y_d = right.of(wrench), np.empty(len(y))
-            states = solve_ivp(
-                lambda t, y, rates=rates, y_d=y_d: rates(t, np.ascontiguousarray(y), y_d).copy(),
-                (begin, end), y, "DOP853", np.minimum(times, end), rtol=tolerance, atol=tolerance,
-            ).y.T  # fmt: skip
-            found.append(states)
-            y = states[-1]
-        return np.vstack(found)[:, 4:]
+    def solve(begin: float, times: np.ndarray, y: np.ndarray, rates: Callable) -> np.ndarray:
+        y_d = np.empty(len(y))
+        return solve_ivp(
+            lambda t, y: rates(t, np.ascontiguousarray(y), y_d).copy(),
+            (begin, times[-1]), y, "DOP853", times, rtol=tolerance, atol=tolerance,
+        ).y.T  # fmt: skip
 
-    return solution
+    return timed(right, solve)
 
 
 def fmu(tolerance: float) -> Solution:
-    """Return a function that solves by Spacecraft.fmu, from row to row, including its set-up."""
-    p = cases.parameters(CASE)
-    settings, axes = hubslosh_fmus.with_tanks(p)
+    """Return a function that solves by Spacecraft.fmu, from row to row, in one call of Python."""
+    settings, axes = hubslosh_fmus.with_tanks(cases.parameters(CASE))
     names = hubslosh_fmus.columns_of(len(axes))
 
-    def solution(given: list) -> np.ndarray:
-        wrench = np.array([*(piece[2] for piece in given), given[-1][2]])
-        table = pd.DataFrame(wrench, columns=hubslosh_fmus.WRENCH)
-        table.insert(0, "time", [piece[0] for piece in given] + [given[-1][1]])
-        every = given[0][3][1] - given[0][3][0]
-        run = hubslosh.simulate(
-            FMU, settings, table, given[-1][1], float(every), names, tolerance=tolerance, hold=True
-        )
-        return run[names].to_numpy()[1:]
+    def solution(given: Pieces) -> tuple[np.ndarray, float]:
+        points = np.hstack([[given[0][0]], *(times for _, _, _, times in given)])
+        counts = [len(times) for _, _, _, times in given]
+        wrench = np.repeat([w for _, _, w, _ in given], counts, axis=0)
+        wrench = np.vstack([wrench, wrench[-1]])
+        inputs = dict(zip(hubslosh_fmus.WRENCH, wrench.T.copy(), strict=True))
+        first = {name: float(values[0]) for name, values in inputs.items()}
+        with hubslosh.Plant(FMU, settings, tolerance=tolerance, inputs=first) as plant:
+            spent = time.process_time()
+            run = plant.run(points, inputs, None, names)
+            spent = time.process_time() - spent
+        return np.column_stack([run[name][1:] for name in names]), spent
 
     return solution
 
@@ -191,20 +226,74 @@ def without_rates(found: np.ndarray) -> np.ndarray:
     return np.hstack([found[:, :9], found[:, 12:15]]) if found.shape[1] == 18 else found
 
 
-def cost(solution: Solution, every: float, rounds: int, runs: int) -> float:
-    """Return the CPU time per simulated second, µs, without the time of the first round."""
-    long, short = pieces(rounds, every), pieces(1, every)
-    solution(short)
+def costs(solutions: list[Solution], given: Pieces, runs: int) -> list[float]:
+    """Return the CPU times of solutions, s. Runs alternate, so that all meet the same machine."""
+    least = [math.inf] * len(solutions)
+    for _ in range(runs):
+        for k, solution in enumerate(solutions):
+            least[k] = min(least[k], solution(given)[1])
+    return least
 
-    def least(given: list) -> float:
-        taken = []
-        for _ in range(runs):
-            begin = time.process_time()
-            solution(given)
-            taken.append(time.process_time() - begin)
-        return min(taken)
 
-    return (least(long) - least(short)) / (20.0 * (rounds - 1)) * 1e6
+SCENARIOS: dict[str, tuple[Callable[[int], Pieces], int]] = {
+    "rows every 1 s": (lambda rounds: pieces(rounds, 1.0), ROUNDS),
+    "rows every 50 ms": (lambda rounds: pieces(rounds, 0.05), ROUNDS),
+    **{
+        f"new inputs every {1e3 * length:g} ms": (lambda n, length=length: restarts(n, length), 2)
+        for length in RESTARTS
+    },
+}
+"""Function from the number of rounds to pieces of time, and the number of rounds in a cost."""
+
+
+def beside_heyoka() -> list[Measured]:
+    """Measure Spacecraft.fmu and heyoka in all scenarios, and return their errors and CPU times.
+
+    heyoka is called from Python for each piece. The time of the same calls for an equation that
+    needs no computation is subtracted.
+    """
+    methods = [(OURS, t, fmu(t)) for t in (1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12)]
+    methods += [
+        (HEYOKA, t, Heyoka(t)) for t in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12)
+    ]
+    empty, exact = Heyoka(1e-9, is_empty=True), Heyoka(1e-16)
+    rows: list[Measured] = [(name, t, [], []) for name, t, _ in methods]
+    for scenario, (given, rounds) in SCENARIOS.items():
+        wanted = without_rates(exact(given(1))[0])
+        scale = abs(wanted).max(axis=0)
+        long = given(rounds)
+        least = costs([empty, *(solution for _, _, solution in methods)], long, RUNS)
+        for row, (name, _, solution), spent in zip(rows, methods, least[1:], strict=True):
+            found = without_rates(solution(given(1))[0])
+            own = spent - least[0] if name == HEYOKA else spent
+            row[2].append(float((abs(found - wanted).max(axis=0) / scale).max()))
+            row[3].append(own / long[-1][1] * 1e6)
+            print(f"{scenario}: {name} {row[1]:.0e} {row[2][-1]:.1e} {row[3][-1]:.4g}", flush=True)
+    return rows
+
+
+def least_cost(rows: list[Measured], method: str, scenario: int, allowed: float) -> float:
+    """Return the smallest CPU time of a method in a scenario with an error of at most `allowed`."""
+    return min(
+        (cost[scenario] for name, _, wrong, cost in rows if name == method
+         and wrong[scenario] <= allowed),
+        default=math.nan,
+    )  # fmt: skip
+
+
+def compare(rows: list[Measured]) -> str:
+    """Return a table in Markdown: for each scenario both times and their ratio at equal errors."""
+    lines = [
+        "| scenario | largest error | Spacecraft.fmu, µs/s | heyoka, µs/s | ratio |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for k, scenario in enumerate(SCENARIOS):
+        for allowed in (1e-8, 1e-10):
+            ours, theirs = (least_cost(rows, name, k, allowed) for name in (OURS, HEYOKA))
+            lines.append(
+                f"| {scenario} | {allowed:.0e} | {ours:.3g} | {theirs:.3g} | {ours / theirs:.2f} |"
+            )
+    return "\n".join(lines)
 
 
 def basilisk_row(step: float) -> tuple[float, float]:
@@ -310,6 +399,10 @@ def with_section(text: str, written: str) -> str:
 
 
 def main() -> None:
+    """Measure all methods and write the section; with --heyoka compare only with heyoka."""
+    if sys.argv[1:] == ["--heyoka"]:
+        print(compare(beside_heyoka()))
+        return
     written = section(measure(), compiling())
     text = with_section(PAGE.read_text(encoding="utf-8"), written)
     PAGE.write_text(text, encoding="utf-8")

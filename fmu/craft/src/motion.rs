@@ -169,9 +169,12 @@ pub struct CraftMotion {
     longest: f64,
     expansion: Expansion,
     start: Start,
-    /// Continuous states at the start of the step.
+    /// Number of the first states that include all states which a step may change. Only these states are copied, because a
+    /// small craft has constants in three quarters of the places.
+    pub changing: usize,
+    /// Continuous states at the start of the step, of which only the first [`CraftMotion::changing`] are valid.
     pub before: [f64; STATES],
-    /// States at the start of the expansion if it starts within a step ([`Start::Within`]).
+    /// The same states at the start of the expansion if it starts within a step ([`Start::Within`]).
     begin: [f64; STATES],
     /// Derivatives of w and V at the end of the expansion, body axes.
     slopes: [Vec3; 2],
@@ -256,11 +259,16 @@ impl CraftMotion {
             spins_allowed: 0.0,
             expansion: Expansion::default(),
             start: Start::Step,
+            changing: modes().map(|(_, i, n)| index::bob(i, n + 1)).fold(index::BOBS, usize::max),
             before: [0.0; STATES],
             begin: [0.0; STATES],
             slopes: [[0.0; 3]; 2],
         };
         motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
+        let only_bobs = motion.lumps.is_empty() && motion.spins.is_empty();
+        if !only_bobs || motion.flexing.is_some() {
+            motion.changing = STATES;
+        }
         motion.freeze();
         motion.arrange();
         motion
@@ -483,10 +491,11 @@ impl CraftMotion {
     #[inline(never)]
     pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
         let (begin, mut steps) = (self.state.time, limits.steps());
-        let (are_held, State { x, kept, .. }) = (self.inputs.are_held(), &mut self.state);
+        let (are_held, changing) = (self.inputs.are_held(), self.changing);
+        let State { x, kept, .. } = &mut self.state;
         let (mut clock, mut start) = ([0.0; 2], [0.0; 2]);
         if are_held && !has_jumped && kept.is_continued(&self.inputs) {
-            *x = kept.x;
+            x[..changing].copy_from_slice(&kept.x[..changing]);
             (clock, start) = (kept.clock, kept.start);
             self.start = Start::Kept;
         } else {
@@ -499,15 +508,18 @@ impl CraftMotion {
         clock = add_time(clock, h);
         let (times, tolerance) = ((clock[0], &mut start), limits.tolerance);
         integrator::advance_kept(self, times, begin, tolerance, &mut steps)?;
-        let kept = &mut self.state.kept;
+        let State { x, kept, .. } = &mut self.state;
         if !are_held {
             kept.end();
             return Ok(());
         }
+        if !kept.is_used() {
+            kept.x = *x;
+        }
         match self.start {
             Start::Kept => {}
-            Start::Step => kept.renew(&self.before, &self.inputs),
-            Start::Within => kept.renew(&self.begin, &self.inputs),
+            Start::Step => kept.renew(&self.before[..changing], &self.inputs),
+            Start::Within => kept.renew(&self.begin[..changing], &self.inputs),
         }
         (kept.clock, kept.start) = (clock, start);
         Ok(())
@@ -872,16 +884,17 @@ impl KeptMotion for CraftMotion {
 
     #[inline(always)]
     fn return_to_start(&mut self) {
-        self.state.x = match self.start {
-            Start::Kept => self.state.kept.x,
-            Start::Step => self.before,
-            Start::Within => self.begin,
+        let start = match self.start {
+            Start::Kept => &self.state.kept.x,
+            Start::Step => &self.before,
+            Start::Within => &self.begin,
         };
+        self.state.x[..self.changing].copy_from_slice(&start[..self.changing]);
     }
 
     #[inline(always)]
     fn keep(&mut self) {
-        self.begin = self.state.x;
+        self.begin[..self.changing].copy_from_slice(&self.state.x[..self.changing]);
         self.start = Start::Within;
     }
 }

@@ -94,7 +94,10 @@ impl Spacecraft {
         let draining = Draining::new(p).map(Box::new);
         let limits = Limits { tolerance, max_steps: p.max_steps };
         let tanks = p.tank[..p.tanks].iter().map(|tank| ranges::Bounds::new(&tank.resolve()));
-        let motion = Box::new(CraftMotion::new(p, *state));
+        let mut motion = Box::new(CraftMotion::new(p, *state));
+        if draining.is_some() {
+            motion.changing = STATES;
+        }
         Spacecraft { motion, draining, limits, bounds: tanks.collect() }
     }
 
@@ -125,8 +128,14 @@ impl Spacecraft {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
         }
-        let State { time, h_wheels, flow, ball, .. } = self.motion.state;
-        self.motion.before = self.motion.state.x;
+        let CraftMotion {
+            state: State { time, h_wheels, flow, ball, x, .. },
+            before,
+            changing,
+            ..
+        } = &mut *self.motion;
+        let (time, h_wheels, flow, ball, changing) = (*time, *h_wheels, *flow, *ball, *changing);
+        before[..changing].copy_from_slice(&x[..changing]);
         self.motion.inputs = *inputs;
         let has_jumped = self.may_jump(inputs) && self.take_jumps(inputs);
         let done = match &self.draining {
@@ -142,7 +151,7 @@ impl Spacecraft {
             state.h_wheels = inputs.h_wheels.value_at(h);
             state.flow = inputs.mass_flow.map(|flow| flow.value_at(h));
         } else {
-            state.x = *before;
+            state.x[..changing].copy_from_slice(&before[..changing]);
             (state.h_wheels, state.flow, state.ball) = (h_wheels, flow, ball);
             self.motion.expansion().clear();
         }

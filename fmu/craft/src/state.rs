@@ -180,7 +180,7 @@ impl Kept {
         Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
 
     #[inline(always)]
-    fn is_used(&self) -> bool {
+    pub fn is_used(&self) -> bool {
         self.clock[0] > 0.0
     }
 
@@ -193,10 +193,11 @@ impl Kept {
         self.is_used() && self.inputs.iter().zip(&inputs.values()).fold(true, same)
     }
 
-    /// Replaces the expansion by one that starts at the states `x`.
+    /// Replaces the expansion by one with these `inputs` that starts at the states `x`: the first states, because the
+    /// others are the same as before.
     #[inline(always)]
-    pub fn renew(&mut self, x: &[f64; STATES], inputs: &Inputs) {
-        self.x = *x;
+    pub fn renew(&mut self, x: &[f64], inputs: &Inputs) {
+        self.x[..x.len()].copy_from_slice(x);
         self.inputs = inputs.values();
     }
 

@@ -969,9 +969,9 @@ impl<M: Model, V: Version> Instance<M, V> {
             hold_inputs::<M>(&mut inputs);
         }
         let sloped = M::set_dependent_slopes(&mut inputs, h) || self.sloped;
-        let mut after = inputs;
+        let mut after = None;
         if sloped {
-            follow_slopes::<M>(call, &mut after, h, now.resolution)?;
+            follow_slopes::<M>(call, after.insert(inputs), h, now.resolution)?;
         }
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
@@ -994,13 +994,16 @@ impl<M: Model, V: Version> Instance<M, V> {
         };
         let length = match ended {
             StepEnd::Event(length) => {
-                after = inputs;
-                follow_slopes::<M>(call, &mut after, length, now.resolution)?;
+                follow_slopes::<M>(call, after.insert(inputs), length, now.resolution)?;
                 length
             }
             _ => h,
         };
-        self.inputs = after;
+        if let Some(after) = after {
+            self.inputs = after;
+        } else if self.past_slopes {
+            self.inputs = inputs;
+        }
         self.past_slopes = M::OUTPUTS_USE_SLOPES && sloped;
         self.sloped = false;
         self.clock.time = at + length;

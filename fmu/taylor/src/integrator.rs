@@ -427,23 +427,20 @@ struct Search {
 }
 
 impl Search {
-    /// Adds the term of order n + 1 to the search; the norm of its coefficient is in `expansion`. If the search ends,
-    /// returns `Break` with the order up to which the series is exact.
+    /// Adds the term of order 2. Returns false if the series is not valid at the time `t`.
     #[inline(always)]
-    fn add_term(&mut self, expansion: &Expansion, n: usize) -> ControlFlow<Option<usize>> {
-        if n < 2 {
-            return ControlFlow::Continue(());
-        }
-        let Expansion { radius, norms, .. } = expansion;
-        if n == 2 {
-            if self.t > *radius {
-                return ControlFlow::Break(None);
-            }
-            self.terms[0] = norms[2] * self.power;
-        }
+    fn add_first_term(&mut self, expansion: &Expansion) -> bool {
+        self.terms[0] = expansion.norms[2] * self.power;
+        self.t <= expansion.radius
+    }
+
+    /// Adds the term of order n + 1, n >= 2, whose coefficient has the norm `norm`. If the search ends, returns `Break`
+    /// with the order up to which the series is exact.
+    #[inline(always)]
+    fn add_term(&mut self, n: usize, norm: f64) -> ControlFlow<Option<usize>> {
         self.power *= self.t;
         let [now, one, two, _] = self.terms;
-        self.terms = [norms[n + 1] * self.power, now, one, two];
+        self.terms = [norm * self.power, now, one, two];
         let is_exact = match self.convergence {
             Convergence::Decay => n + 1 >= MIN_ORDER && are_negligible(self.terms),
             Convergence::Terms(count) => {
@@ -458,14 +455,30 @@ impl Search {
         }
     }
 
+    /// Computes coefficient n + 1 of the states' series, and adds its term.
+    #[inline(always)]
+    fn compute_term<M: KeptMotion>(
+        &mut self,
+        motion: &mut M,
+        n: usize,
+    ) -> ControlFlow<Option<usize>> {
+        compute_order(motion, n, self.tolerance);
+        if n < 2 {
+            return ControlFlow::Continue(());
+        }
+        if n == 2 && !self.add_first_term(motion.expansion()) {
+            return ControlFlow::Break(None);
+        }
+        self.add_term(n, motion.expansion().norms[n + 1])
+    }
+
     #[inline(never)]
     fn extend<M: KeptMotion>(mut self, motion: &mut M) -> Option<usize> {
         let known = motion.expansion().orders;
         if M::UNROLLED {
             for_each_order!(N => {
                 if N + 1 > known {
-                    compute_order(motion, N, self.tolerance);
-                    if let ControlFlow::Break(end) = self.add_term(motion.expansion(), N) {
+                    if let ControlFlow::Break(end) = self.compute_term(motion, N) {
                         return end;
                     }
                 }
@@ -473,10 +486,7 @@ impl Search {
             return None;
         }
         let mut orders = known..self.highest;
-        let end = orders.find_map(|n| {
-            compute_order(motion, n, self.tolerance);
-            self.add_term(motion.expansion(), n).break_value()
-        });
+        let end = orders.find_map(|n| self.compute_term(motion, n).break_value());
         end.flatten()
     }
 }
@@ -497,9 +507,15 @@ fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usi
         negligible: 0,
     };
     // The loop is separate, because the functions of the single orders are far apart in memory.
-    for n in 0..motion.expansion().orders {
-        if let ControlFlow::Break(end) = search.add_term(motion.expansion(), n) {
-            return end;
+    let expansion = motion.expansion();
+    if expansion.orders > 2 {
+        if !search.add_first_term(expansion) {
+            return None;
+        }
+        for (n, norm) in (2..).zip(&expansion.norms[3..=expansion.orders.min(ORDER)]) {
+            if let ControlFlow::Break(end) = search.add_term(n, *norm) {
+                return end;
+            }
         }
     }
     search.extend(motion)

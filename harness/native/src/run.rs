@@ -65,11 +65,14 @@ impl<'fmu> Columns<'fmu> {
         if self.others.is_empty() { &self.reals } else { &self.row }
     }
 
-    fn set(&mut self, to: &mut Instance, row: &[f64]) -> Called {
+    /// Sets inputs to the values of `row`. If `are_held`, Reals that have not changed since the last row are not set again.
+    fn set(&mut self, to: &mut Instance, row: &[f64], are_held: bool) -> Called {
+        let mut is_new = !are_held;
         for (place, real) in self.places.iter().zip(&mut self.reals) {
+            is_new |= real.to_bits() != row[*place].to_bits();
             *real = row[*place];
         }
-        if !self.references.is_empty() {
+        if is_new && !self.references.is_empty() {
             to.set_real(&self.references, &self.reals)?;
         }
         for (variable, place) in &self.others {
@@ -188,7 +191,7 @@ impl<'fmu> Run<'fmu> {
             feedback.act(instance, row, time)?;
         }
         let (columns, given) = &mut self.inputs;
-        columns.set(instance, given.row(i))?;
+        columns.set(instance, given.row(i), self.slopes.is_none() && row > 0)?;
         let Lines { references, values, slopes } = &mut self.lines;
         let mut begin = time;
         // one step, or several steps if wheels reach their largest speeds before the next row
