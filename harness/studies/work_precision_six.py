@@ -4,8 +4,9 @@
 
 It needs dist/Spacecraft.fmu (``cargo run --release -- pack --model Spacecraft --out
 dist/Spacecraft.fmu``) and Python 3.11 or newer. The first run creates a virtual environment in the
-target directory and needs the network. It writes its section of book/work_precision.md in some
-minutes. Use the machine for nothing else meanwhile, because CPU times are compared.
+target directory and needs the network. It writes its section of book/work_precision.md in ten
+minutes; with --heyoka only the comparison with heyoka, in four. Use the machine for nothing else
+meanwhile, because CPU times are compared.
 
 The spacecraft is taken from [a case of the slosh
 benchmark](../harness/benchmark/thrust/page.md). It has two pendulums, under

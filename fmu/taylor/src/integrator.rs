@@ -477,10 +477,10 @@ impl Search {
         let known = motion.expansion().orders;
         if M::UNROLLED {
             for_each_order!(N => {
-                if N + 1 > known {
-                    if let ControlFlow::Break(end) = self.compute_term(motion, N) {
-                        return end;
-                    }
+                if N + 1 > known
+                    && let ControlFlow::Break(end) = self.compute_term(motion, N)
+                {
+                    return end;
                 }
             });
             return None;
