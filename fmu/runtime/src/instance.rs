@@ -969,9 +969,9 @@ impl<M: Model, V: Version> Instance<M, V> {
             hold_inputs::<M>(&mut inputs);
         }
         let sloped = M::set_dependent_slopes(&mut inputs, h) || self.sloped;
-        let mut after = None;
+        let mut after = inputs;
         if sloped {
-            follow_slopes::<M>(call, after.insert(inputs), h, now.resolution)?;
+            follow_slopes::<M>(call, &mut after, h, now.resolution)?;
         }
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
@@ -994,16 +994,13 @@ impl<M: Model, V: Version> Instance<M, V> {
         };
         let length = match ended {
             StepEnd::Event(length) => {
-                follow_slopes::<M>(call, after.insert(inputs), length, now.resolution)?;
+                after = inputs;
+                follow_slopes::<M>(call, &mut after, length, now.resolution)?;
                 length
             }
             _ => h,
         };
-        if let Some(after) = after {
-            self.inputs = after;
-        } else if self.past_slopes {
-            self.inputs = inputs;
-        }
+        self.inputs = after;
         self.past_slopes = M::OUTPUTS_USE_SLOPES && sloped;
         self.sloped = false;
         self.clock.time = at + length;
