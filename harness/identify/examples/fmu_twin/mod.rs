@@ -2,8 +2,7 @@
 //! what a planned experiment would record.
 
 use analysis::random::Random;
-use analysis::statistics::peak;
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 use experiments::profile::{Profile, Torque};
 use experiments::run::{Run, TORQUE};
 use host::drive::Inputs;
@@ -32,20 +31,14 @@ impl Default for SensorErrors {
 /// Effects of a simulated bench that no fitted model contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unmodelled {
-    /// The bearing's axis is tilted by 1°, so that gravity turns hub and liquid back to their initial angle.
-    Tilt,
     /// The hub nutates at [`ROCKING`] under the wheel's torque, and the gyro measures a part of this motion.
     Nutation,
     /// The bearing warms up: its friction falls by [`WARM`] with a time constant of 600 s.
     Warming,
-    /// The wheel's torque saturates at nine tenths of the largest command.
-    Clipping,
     /// Air brakes the hub with the torque [`AIR`] ω|ω|, N·m, at the rate ω, rad/s.
     Drag,
     /// The wheel's torque follows its command with the time constant [`LAG`].
     ActuatorLag,
-    /// The gyro has a filter with the time constant [`LAG`].
-    GyroLag,
 }
 
 const ROCKING: f64 = 4.1;
@@ -56,28 +49,11 @@ const ROCKING_SEEN: f64 = 0.01;
 const WARM: f64 = 0.3;
 /// Coefficient of the aerodynamic drag torque, which is quadratic in the rate, N·m·s².
 const AIR: f64 = 0.02;
-/// Time constant of the actuator's lag or of the gyro's filter, s.
+/// Time constant of the actuator's lag, s.
 const LAG: f64 = 0.03;
 /// Number of substeps in each row of the recording in which the torque of an actuator with a lag is computed.
 const LAG_PARTS: usize = 8;
 const WARMING: f64 = 600.0;
-
-impl Unmodelled {
-    pub fn named(name: &str) -> Result<Self> {
-        Ok(match name {
-            "tilt" => Unmodelled::Tilt,
-            "nutation" => Unmodelled::Nutation,
-            "warming" => Unmodelled::Warming,
-            "clipping" => Unmodelled::Clipping,
-            "drag" => Unmodelled::Drag,
-            "actuator-lag" => Unmodelled::ActuatorLag,
-            "gyro-lag" => Unmodelled::GyroLag,
-            _ => bail!(
-                "{name} is none of tilt, nutation, warming, clipping, drag, actuator-lag, gyro-lag"
-            ),
-        })
-    }
-}
 
 /// Returns a torque by name: `multisine:PEAK,SECONDS` (1.25 to 3.5 Hz, periods of 100 s) or a profile of `hubslosh run`.
 pub fn torque(text: &str) -> Result<Torque> {
@@ -93,14 +69,13 @@ pub fn torque(text: &str) -> Result<Torque> {
     Torque::rows(&time, &tau, None, false)
 }
 
-/// A bench that the FMU simulates (twin): its settings, the rows per second (`rate`), the values of the gyro per second if they
-/// are fewer (`gyro`), the intersample behaviour of the torque, errors of sensors, the standard deviation of an encoder's angle
-/// (rad, `None` without encoder), and effects that no fitted model contains.
+/// A bench that the FMU simulates (twin): its settings, the rows per second (`rate`), the intersample behaviour of the torque,
+/// errors of sensors, the standard deviation of an encoder's angle (rad, `None` without encoder), and effects that no fitted
+/// model contains.
 #[derive(Clone, Debug)]
 pub struct Twin {
     pub settings: Vec<(String, String)>,
     pub rate: f64,
-    pub gyro: Option<f64>,
     pub intersample: Hold,
     pub sensor_errors: SensorErrors,
     pub encoder: Option<f64>,
@@ -112,7 +87,6 @@ impl Default for Twin {
         Twin {
             settings: Vec::new(),
             rate: 50.0,
-            gyro: None,
             intersample: Hold::FirstOrderHold,
             sensor_errors: SensorErrors::default(),
             encoder: None,
@@ -122,23 +96,13 @@ impl Default for Twin {
 }
 
 impl Twin {
-    /// Returns the settings of the FMU, including those that cause the unmodelled effects.
-    fn settings(&self, torque: &[f64], seed: Option<u32>) -> Vec<(String, String)> {
-        let mut all = self.settings.clone();
-        let mut set = |name: &str, value: String| all.push((name.into(), value));
-        if let Some(seed) = seed {
-            set("imu.enabled", "true".into());
-            set("imu.rate", self.gyro.unwrap_or(self.rate).to_string());
-            set("imu.seed", seed.to_string());
-        }
-        if self.unmodelled.contains(&Unmodelled::Tilt) {
-            set("bench.tilt", 1f64.to_radians().to_string());
-        }
-        if self.unmodelled.contains(&Unmodelled::Clipping) {
-            set("wheel.enabled", "true".into());
-            set("wheel.tau_max", (0.9 * peak(torque)).to_string());
-        }
-        all
+    fn settings(&self, seed: Option<u32>) -> Vec<(String, String)> {
+        let imu = seed.map(|seed| {
+            let (rate, seed) = (self.rate.to_string(), seed.to_string());
+            [("imu.enabled", "true".into()), ("imu.rate", rate), ("imu.seed", seed)]
+        });
+        let imu = imu.into_iter().flatten().map(|(name, value)| (name.to_string(), value));
+        self.settings.iter().cloned().chain(imu).collect()
     }
 
     /// Records the simulated bench under a torque. `seed` is the seed of the gyro's noise; `None` switches the noise off.
@@ -161,8 +125,8 @@ impl Twin {
             Torque::rows(&knots, &values, None, held)?
         };
         let is = |effect: Unmodelled| self.unmodelled.contains(&effect);
-        let lags = is(Unmodelled::ActuatorLag) || is(Unmodelled::GyroLag);
-        let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time)? } else { heard };
+        let lags = is(Unmodelled::ActuatorLag);
+        let heard = if lags { behind(&heard, &time)? } else { heard };
         // substeps from one row to the next, which end at the knots of the torque, or are short against the period
         // of a smooth torque
         let parts = match (self.intersample, late == 0.0) {
@@ -170,12 +134,12 @@ impl Twin {
             (_, true) => 1,
             (_, false) => 4,
         };
-        let drags = self.unmodelled.contains(&Unmodelled::Drag);
+        let drags = is(Unmodelled::Drag);
         // the drag torque is held for 1 ms, which delays it by 0.4° at 2.4 Hz
         let parts = if lags { LAG_PARTS } else { parts };
         let parts = if drags { parts.max((step / 1e-3).ceil() as usize) } else { parts };
         let run = Run {
-            settings: self.settings(&tau, seed),
+            settings: self.settings(seed),
             input: Some(TORQUE.into()),
             torque: heard.clone(),
             others: Vec::new(),
@@ -196,7 +160,6 @@ impl Twin {
         let omega = reference("omega")?;
         let (mut angle, mut random) = (Vec::new(), Random::new(seed.unwrap_or(0).into(), 1));
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
-        let mut filter = Lag::default();
         let names = [TORQUE, ADDITIONAL_TORQUE];
         let names = if drags { &names[..] } else { &names[..1] };
         let inputs = Inputs::new(fmu.description(), names, held)?;
@@ -205,7 +168,6 @@ impl Twin {
             let (row, part) = (steps / parts, steps % parts);
             let mut true_rate = [0.0];
             instance.get_real(&[omega], &mut true_rate)?;
-            let passed = filter.step(true_rate[0], run.step);
             if part == 0 {
                 let mut now = [0.0; 3];
                 instance.get_real(&read, &mut now)?;
@@ -213,9 +175,8 @@ impl Twin {
                     true => ROCKING_SEEN * rocking.step(now[1], step),
                     false => 0.0,
                 };
-                let late = if is(Unmodelled::GyroLag) { passed - true_rate[0] } else { 0.0 };
                 let SensorErrors { gyro_scale, gyro_bias, .. } = self.sensor_errors;
-                rate.push(gyro_scale * (now[0] + seen + late) + gyro_bias);
+                rate.push(gyro_scale * (now[0] + seen) + gyro_bias);
                 angle.extend(self.encoder.map(|std| now[2] + std * random.normal()));
                 if row == rows {
                     return Ok(None);
