@@ -176,11 +176,6 @@ pub const SPREAD_POWER: f64 = 0.25;
 /// Number of bisections in the search for the largest torque that keeps the slosh angle within its limit.
 pub const ANGLE_ROUNDS: usize = 12;
 
-// Verdict: `bench/verdict.rs`.
-// Tests: `a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result`.
-/// Newton decrement, in standard deviations, above which the verdict says that the search ended before the minimum.
-pub const REPORTED_DECREMENT: f64 = 0.1;
-
 // Page: `words/page.rs`.
 // Tests: `the_report_of_a_fit_is_a_complete_page`.
 /// Number of points of a curve on a page. More points than a screen has pixels cannot be seen.

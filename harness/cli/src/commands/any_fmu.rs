@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use experiments::sensors::Sensor;
+use identify::any_fmu;
 use identify::any_fmu::foresee::{Bound, foresee};
 use identify::any_fmu::likelihood::deviances;
-use identify::any_fmu::{self, Identification};
 use identify::input::names::list;
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
@@ -242,10 +242,8 @@ impl AnyFmuArgs {
             let deviances = deviances(&model, &question, &records, &result, &rows)?;
             return out.save(&(serde_json::to_string(&deviances)? + "\n"));
         }
-        let mut found = out.search(|news| any_fmu::identify(&model, &question, &records, news))?;
-        found.done.splice(0..0, notes);
-        let is_trusted = found.fits == Some(true) && found.converged;
-        out.finish(&found.json()?, is_trusted, || print_result(&found), || any_fmu::page(&found))
+        let found = out.search(|news| any_fmu::identify(&model, &question, &records, news))?;
+        out.finish(found, notes)
     }
 
     /// Predicts the standard deviations that a fit to recordings with these inputs would have
@@ -293,13 +291,6 @@ impl AnyFmuArgs {
             print_predicted(&bounds);
         }
         Ok(())
-    }
-}
-
-fn print_result(found: &Identification) {
-    print_estimates(&[&found.parameters, &found.measurement]);
-    for line in any_fmu::lines(found).iter().chain(&found.verdict) {
-        println!("{line}");
     }
 }
 

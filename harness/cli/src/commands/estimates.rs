@@ -7,6 +7,7 @@ use anyhow::Result;
 use files::output;
 use identify::estimate::Estimated;
 use identify::news::News;
+use identify::words::identified::{Identified, Report};
 
 use crate::{progress, terminal};
 
@@ -48,29 +49,28 @@ impl Out<'_> {
         }
     }
 
-    /// Saves the JSON text `text` of a result, calls `tables` to print its tables, and writes the
-    /// report that `page` returns. If the result cannot be trusted, a warning is printed, which the
-    /// option `--strict` makes an error.
+    /// Saves a result, to whose steps `notes` are added at the beginning, prints its tables, and writes its report. If the
+    /// result cannot be trusted, prints a warning, which `--strict` makes an error.
     ///
     /// # Errors
     ///
     /// If a file cannot be written.
-    pub fn finish(
-        &self,
-        text: &str,
-        is_trusted: bool,
-        tables: impl FnOnce(),
-        page: impl FnOnce() -> String,
-    ) -> Result<()> {
-        self.save(text)?;
+    pub fn finish<D: Report>(&self, mut found: Identified<D>, notes: Vec<String>) -> Result<()> {
+        found.done.splice(0..0, notes);
+        self.save(&found.json()?)?;
         if !terminal::has_reader() {
-            tables();
+            if !(found.parameters.is_empty() && found.measurement.is_empty()) {
+                print_estimates(&[&found.parameters, &found.measurement]);
+            }
+            for line in found.lines().iter().chain(&found.verdict) {
+                println!("{line}");
+            }
         }
-        if !is_trusted {
+        if !(found.fits == Some(true) && found.converged) {
             terminal::warn("the result cannot be trusted; the verdict in the result says why");
         }
         if let Some(path) = self.report {
-            output::write(path, page().as_bytes())?;
+            output::write(path, found.page().as_bytes())?;
             done!("{}", path.display());
         }
         if let Some(path) = self.result {

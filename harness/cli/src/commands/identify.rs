@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use host::fmu::Fmu;
+use identify::bench::identification::Identification;
 use identify::bench::nominal::{self, Nominal};
 use identify::bench::options::Options;
 use identify::bench::system::Target;
@@ -12,15 +13,12 @@ use identify::engine::Hold;
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
 use identify::input::tolerance::{self, Tolerances};
-use identify::methods::free_decay::FreeDecay;
-use identify::methods::friction::Friction;
-use identify::methods::output_error::OutputError;
-use identify::methods::{Method, Task};
-use identify::words::identified::Identified;
+use identify::methods::{free_decay, friction, output_error};
+use identify::news::News;
 use signals::recording::Columns;
 
 use super::any_fmu::{AnyFmuArgs, PointsArgs, Request};
-use super::estimates::{Out, print_estimates};
+use super::estimates::Out;
 use super::{DEFAULT_FMU, open, setting};
 use crate::terminal;
 
@@ -348,18 +346,13 @@ impl BenchArgs {
             breaking: self.has("breaking"),
             ..self.known.options()?
         };
-        self.known.identify_and_print(
-            OutputError { options: options.clone() },
-            &options,
-            &self.data,
-        )
+        self.known.identify_and_print(output_error::identify, options, &self.data)
     }
 }
 
 impl FrictionArgs {
     fn run(&self) -> Result<()> {
-        let options = self.known.options()?;
-        self.known.identify_and_print(Friction { options: options.clone() }, &options, &self.data)
+        self.known.identify_and_print(friction::identify, self.known.options()?, &self.data)
     }
 }
 
@@ -383,8 +376,11 @@ impl DecayArgs {
             "the recordings have different signals: {} (allowed: one signal in all recordings of a fit)",
             signals.join(", ")
         );
-        let task = Task { fmu: None, recordings: &recordings, validation: &[] };
-        self.data.find(FreeDecay { signal, clock }, &task, notes)
+        let found = self
+            .data
+            .outputs()
+            .search(|news| free_decay::identify(signal, clock, &recordings, news))?;
+        self.data.outputs().finish(found, notes)
     }
 }
 
@@ -411,10 +407,10 @@ impl KnownArgs {
         })
     }
 
-    fn identify_and_print<M: Method>(
+    fn identify_and_print(
         &self,
-        method: M,
-        options: &Options,
+        identify: fn(&Fmu, &[Recording], &Options, &mut dyn FnMut(&News)) -> Result<Identification>,
+        options: Options,
         data: &DataArgs,
     ) -> Result<()> {
         data.check()?;
@@ -436,9 +432,10 @@ impl KnownArgs {
             }
             Ok(all)
         };
-        let (recordings, validation) = (read(&data.data)?, read(&self.validate)?);
-        let task = Task { fmu: Some(&fmu), recordings: &recordings, validation: &validation };
-        data.find(method, &task, notes)
+        let recordings = read(&data.data)?;
+        let options = Options { validation: read(&self.validate)?, ..options };
+        let found = data.outputs().search(|news| identify(&fmu, &recordings, &options, news))?;
+        data.outputs().finish(found, notes)
     }
 }
 
@@ -479,25 +476,8 @@ impl DataArgs {
         Ok(Source { columns: columns.with_rate(rate)?, trim })
     }
 
-    fn find<M: Method>(&self, method: M, task: &Task, notes: Vec<String>) -> Result<()> {
-        let out = self.outputs();
-        let mut found = out.search(|news| method.identify(task, news))?;
-        found.done.splice(0..0, notes);
-        let is_trusted = found.fits != Some(false) && found.converged;
-        out.finish(&found.json()?, is_trusted, || print_result::<M>(&found), || M::page(&found))
-    }
-
     fn outputs(&self) -> Out<'_> {
         let (result, report) = (self.out.as_deref(), self.report.as_deref());
         Out { result, report }
-    }
-}
-
-fn print_result<M: Method>(found: &Identified<M::Details>) {
-    if !(found.parameters.is_empty() && found.measurement.is_empty()) {
-        print_estimates(&[&found.parameters, &found.measurement]);
-    }
-    for line in M::lines(found).iter().chain(&found.verdict) {
-        println!("{line}");
     }
 }

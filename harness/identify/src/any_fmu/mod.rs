@@ -6,7 +6,6 @@
 
 pub mod foresee;
 pub mod likelihood;
-mod page;
 pub mod system;
 
 use std::collections::BTreeMap;
@@ -15,7 +14,9 @@ use analysis::gauss_markov::Noise;
 use analysis::innovations::{LIMIT, Tests};
 use analysis::statistics::{mean, median};
 use anyhow::{Context, Result, ensure};
+use maud::html;
 use nalgebra::DMatrix;
+use report::page::table;
 use serde::Serialize;
 
 use crate::engine::knowledge::Inseparable;
@@ -30,7 +31,8 @@ use crate::input::record::Record;
 use crate::input::tolerance::{self, Share};
 use crate::model::simulate::Model;
 use crate::news::News;
-use crate::words::identified::{Identified, Residual};
+use crate::words::identified::{Identified, Report, residuals};
+use crate::words::page::Sections;
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
@@ -83,6 +85,10 @@ impl Output {
     /// Returns true if the residual is noise with zero mean.
     pub fn passed(&self) -> bool {
         self.tests.passed() && self.mean.abs() < LIMIT
+    }
+
+    fn worst_test(&self) -> f64 {
+        self.tests.worst().max(self.mean.abs())
     }
 }
 
@@ -475,18 +481,13 @@ fn conclude(
     found.correlations = (names.clone(), (0..n).map(row).collect());
     found.verdict = words;
     found.settings = question.settings.iter().map(Setting::named).collect();
-    let residuals = solution.fit.residuals(&minimum.point.z, &minimum.point.motion);
-    let residual = |((signal, residual), output): ((&Signal, &Vec<f64>), &Output)| Residual {
-        name: format!("{}, {}", output.recording, output.name),
-        label: prose(if output.unit.is_empty() { "1" } else { &output.unit }),
-        time: signal.picked(&problem.recordings[signal.recording].time),
-        measured: signal.picked(&signal.measured),
-        residual: signal.picked(residual),
-        noise: Some(output.noise_white),
-        torque: None,
-    };
-    let signals = problem.signals.iter().zip(&residuals).zip(&found.details.outputs);
-    found.residuals = signals.map(residual).collect();
+    found.residuals = residuals(solution, |signal| {
+        let (recording, name) = (signal.recording, &question.outputs[signal.output]);
+        let unit = system.model.description().variable(name);
+        let unit = unit.map_or("", |v| system.model.description().unit(v));
+        let label = prose(if unit.is_empty() { "1" } else { unit });
+        (format!("{}, {name}", system.records[recording].name), label)
+    });
     Ok(found)
 }
 
@@ -564,10 +565,8 @@ fn say(
 
 fn fit_in_words(outputs: &[Output]) -> String {
     let is_bad = |o: &&Output| !o.passed();
-    let worst = outputs.iter().filter(is_bad).max_by(|a, b| {
-        a.tests.worst().max(a.mean.abs()).total_cmp(&b.tests.worst().max(b.mean.abs()))
-    });
-    let Some(o) = worst else {
+    let all = outputs.iter().filter(is_bad);
+    let Some(o) = all.max_by(|a, b| a.worst_test().total_cmp(&b.worst_test())) else {
         return "The model fits: the residual of every output is noise.".into();
     };
     let mut why = failed(&o.tests, "an input");
@@ -584,30 +583,42 @@ fn fit_in_words(outputs: &[Output]) -> String {
     )
 }
 
-/// Returns the lines that a terminal shows below the table of estimates: noise, fit and worst test of each output.
-pub fn lines(found: &Identification) -> Vec<String> {
-    let mut lines = vec![format!(
-        "{:24} {:>8} {:>12} {:>8} {:>10}",
-        "output", "rows", "noise", "fit %", "worst test"
-    )];
-    for o in &found.details.outputs {
-        // a constant output has no variance that a model could explain
-        let fit = match o.fit_percent.is_finite() {
-            true => format!("{:.2}", o.fit_percent),
-            false => "–".into(),
-        };
-        lines.push(format!(
-            "{:24} {:>8} {:>12.3e} {fit:>8} {:>10.1}  {}",
-            o.name,
-            o.rows,
-            o.noise_white,
-            o.tests.worst().max(o.mean.abs()),
-            o.recording
-        ));
+impl Report for Details {
+    fn lines(found: &Identification) -> Vec<String> {
+        let head = ["output", "rows", "noise", "fit %", "worst test"];
+        let [output, rows, noise, fit, test] = head;
+        let mut lines = vec![format!("{output:24} {rows:>8} {noise:>12} {fit:>8} {test:>10}")];
+        for o in &found.details.outputs {
+            // a constant output has no variance that a model could explain
+            let fit = match o.fit_percent.is_finite() {
+                true => format!("{:.2}", o.fit_percent),
+                false => "–".into(),
+            };
+            let Output { name, rows, noise_white, recording, .. } = o;
+            let test = o.worst_test();
+            lines.push(format!(
+                "{name:24} {rows:>8} {noise_white:>12.3e} {fit:>8} {test:>10.1}  {recording}"
+            ));
+        }
+        lines
     }
-    lines
-}
 
-pub fn page(found: &Identification) -> String {
-    page::write(found)
+    fn sections(found: &Identification) -> Sections {
+        let outputs = found.details.outputs.iter().map(|o| {
+            vec![
+                format!("{}, {}", o.recording, o.name),
+                o.rows.to_string(),
+                format!("{:.3e} {}", o.noise_white, prose(&o.unit)),
+                format!("{:.2}", o.fit_percent),
+                format!("{:.1}", o.worst_test()),
+            ]
+        });
+        let figures = html! {
+            h2 { "Outputs" }
+            p { "Noise of a row, how much of the output the model explains, and the worst test of the residual in standard \
+                 deviations of chance; 5 is the limit." }
+            (table(["output", "rows", "noise", "fit, %", "worst test"], outputs))
+        };
+        Sections { figures, ..Sections::default() }
+    }
 }

@@ -8,7 +8,7 @@ use crate::engine::{Drift, Hold, Motion, Part, Problem, Recorded, Role, Signal, 
 use crate::input::question::Question;
 use crate::input::record::Record;
 use crate::model::overridden::{near, refuse};
-use crate::model::simulate::{Finer, Model, Setup, Value};
+use crate::model::simulate::{Model, Setup, Value};
 use crate::model::unknown::Target;
 
 /// Smallest noise of an output before the first residual is known, relative to the output's standard deviation. It is needed
@@ -67,18 +67,11 @@ impl<'a> FmuSystem<'a> {
             inputs: record.inputs.clone(),
             step: 0.0,
         };
-        Problem {
-            system: self,
-            recordings: self.records.iter().map(recorded).collect(),
-            signals,
-            starts: vec![unknowns.iter().map(|unknown| unknown.start).collect()],
-            unknowns,
-            // the question states the intersample behaviour of each input, so that none has to be estimated
-            holds: vec![Hold::FirstOrderHold],
-            acausal: true,
-            drawn: question.starts.saturating_sub(1),
-            rough: true,
-        }
+        let recordings = self.records.iter().map(recorded).collect();
+        let start = unknowns.iter().map(|unknown| unknown.start).collect();
+        // the question states the intersample behaviour of each input, so that none has to be estimated
+        let plain = Problem::new(self, recordings, signals, unknowns, vec![start]);
+        Problem { drawn: question.starts.saturating_sub(1), rough: true, ..plain }
     }
 
     /// Returns the FMU's warnings at the start values of the unknowns, each only once.
@@ -120,7 +113,7 @@ impl<'a> FmuSystem<'a> {
     pub fn with_finer<T>(&self, use_them: impl FnOnce(&[&dyn System]) -> T) -> T {
         let finer = self.setup.finer(self.model);
         let mut systems: Vec<FmuSystem> = Vec::new();
-        for Finer { setup, model } in &finer {
+        for (setup, model) in &finer {
             let (model, setup) = (model.as_ref().unwrap_or(self.model), setup.clone());
             let (targets, names) = (self.targets.clone(), self.names.clone());
             systems.push(FmuSystem { model, setup, records: self.records, targets, names });

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use analysis::innovations::LIMIT;
+use analysis::innovations::{LIMIT, Tests};
 use analysis::statistics::{about_mean, correlation, deviation, peak};
 use anyhow::Result;
 use formulas::cylinder::XI;
@@ -11,7 +11,7 @@ use formulas::regime::Regime;
 use names::hubslosh::{SloshModel, friction};
 
 use super::causes::{self, Cause, Missing};
-use super::combination::{self, ONE_WAY};
+use super::combination::{self, Combination, ONE_WAY};
 use super::problem::LEAST_FRICTION;
 use super::system::{BenchSystem, Target};
 use crate::bench::identification::{Details, Identification, ModelFit};
@@ -20,13 +20,12 @@ use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
 use crate::engine::minimum::{Curvature, places};
-use crate::engine::{ENDS, Fit, Part, Solution, Z};
+use crate::engine::{ENDS, Fit, Part, Signal, Solution, Z};
 use crate::estimate::{Estimated, fit_percent, mean_square, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
 use crate::news::News;
-use crate::words::combination::Combination;
-use crate::words::identified::{Identified, Residual};
+use crate::words::identified::{Identified, Residual, residuals};
 use crate::words::page::RATE;
 
 /// Fit of the rates, %, below which the search is assumed to have ended in a local minimum far from the true values.
@@ -36,8 +35,6 @@ pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
     let fit = &solution.fit;
     let point = &solution.minimum.point;
     let deviance = fit.deviance(point);
-    let rows: usize =
-        fit.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum();
     let count = places(&fit.free).len();
     let residuals = fit.residuals(&point.z, &point.motion);
     let rates = fit.problem.signals.iter().zip(&residuals).filter(|(signal, _)| signal.output == 0);
@@ -49,7 +46,7 @@ pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
         model: model.into(),
         friction: law.into(),
         deviance,
-        bic: deviance + count as f64 * (rows as f64).ln(),
+        bic: deviance + count as f64 * (fit.sampled() as f64).ln(),
         fit_pct,
         converged: solution.minimum.decrement < ENDS.0,
         newton_decrement: solution.minimum.decrement,
@@ -183,7 +180,7 @@ pub fn conclude(
         converged,
         fits: Some(fits),
         verdict,
-        residuals: residuals(system, solution),
+        residuals: rate_residuals(system, solution),
         ..Identified::new(Details { fit, ..details })
     })
 }
@@ -197,11 +194,7 @@ fn estimated(
 ) -> Estimated {
     let name = &full.names[k];
     let unknown = &solution.fit.problem.unknowns[k];
-    let (mut std, mut interval) = match full.has_enough_draws() {
-        true => (full.std(k), full.interval(k)),
-        false => (f64::NAN, [f64::NAN; 2]),
-    };
-    let std_noise = if own.has_enough_draws() { own.std(k) } else { f64::NAN };
+    let (mut std, mut interval, std_noise) = (full.std(k), full.interval(k), own.std(k));
     let positive = unknown.log || unknown.bounds.0 >= 0.0;
     if let Some((_, open)) = full.open.as_ref().filter(|(open, _)| open == name) {
         let ends = [0.0, f64::INFINITY];
@@ -282,7 +275,7 @@ fn findings(
     let alike = found.iter().filter(|e| e.fits).map(|e| causes::words(&system.targets[e.unknown]));
     Findings {
         torque: torque_words(solution),
-        tests: solution.tests.clone(),
+        is_noise: solution.tests.iter().all(Tests::passed),
         asks: !found.is_empty(),
         alike: alike.collect(),
         missing,
@@ -337,9 +330,6 @@ fn shares<'a>(
     own: &Derived,
     known: impl Iterator<Item = (&'a str, f64)>,
 ) -> Option<String> {
-    if !full.has_enough_draws() || !own.has_enough_draws() {
-        return None;
-    }
     let mut all = Vec::new();
     for (k, name) in full.names.iter().enumerate() {
         let share = 1.0 - (own.std(k) / full.std(k)).powi(2);
@@ -407,24 +397,14 @@ fn shown(
     sentences
 }
 
-fn residuals(system: &BenchSystem, solution: &Solution) -> Vec<Residual> {
-    let fit = &solution.fit;
-    let point = &solution.minimum.point;
-    let all = fit.residuals(&point.z, &point.motion);
-    let rates = fit.problem.signals.iter().zip(&all).zip(&fit.noise);
-    rates
-        .filter(|((signal, _), _)| signal.output == 0)
-        .map(|((signal, residual), noise)| {
-            let recording = &system.recordings[signal.recording];
-            Residual {
-                name: recording.name.clone(),
-                label: RATE.into(),
-                time: recording.time.clone(),
-                measured: recording.rate.clone(),
-                residual: residual.clone(),
-                noise: Some(noise.white),
-                torque: Some(recording.torque.clone()),
-            }
-        })
-        .collect()
+fn rate_residuals(system: &BenchSystem, solution: &Solution) -> Vec<Residual> {
+    let name = |signal: &Signal| system.recordings[signal.recording].name.clone();
+    let all = residuals(solution, |signal| (name(signal), RATE.into()));
+    let signals = solution.fit.problem.signals.iter();
+    let rates = signals.zip(all).filter(|(signal, _)| signal.output == 0);
+    let with_torque = |(signal, residual): (&Signal, Residual)| Residual {
+        torque: Some(signal.picked(&system.recordings[signal.recording].torque)),
+        ..residual
+    };
+    rates.map(with_torque).collect()
 }

@@ -292,9 +292,9 @@ pub fn cramer_rao(
         ..Options::default()
     };
     let nominal = Nominal::of(fmu, settings, &[])?;
-    let pair = (SloshModel::Linear.name(), FrictionModel::Stribeck.name());
     let model = settings.iter().find(|(name, _)| name == slosh::MODEL);
-    let pair = (model.map_or(pair.0, |(_, model)| model.as_str()), pair.1);
+    let model = model.map_or(SloshModel::Linear.name(), |(_, model)| model.as_str());
+    let pair = (model, FrictionModel::Stribeck.name());
     let (system, unknowns, starts) =
         problem::system(fmu, &recordings, &options, pair, &[nominal.start])?;
     let mut problem = problem::problem(&system, unknowns, starts, &options);
@@ -322,17 +322,7 @@ pub fn cramer_rao(
     if let Some(j) = blind {
         bail!("{} has no influence on the rate under this torque", problem.unknowns[j].name);
     }
-    let mut solution = Solution {
-        fit,
-        minimum,
-        profile: None,
-        rivals: Vec::new(),
-        tests: Vec::new(),
-        at_bound: Vec::new(),
-        sides: Vec::new(),
-        starts: 1,
-    };
-    let found = solution.draw(false)?;
+    let found = Solution::at(fit, minimum).draw(false)?;
     let row = |k: usize| {
         let name = found.names[k].clone();
         let value = match PARAMETERS.contains(&name.as_str()) {

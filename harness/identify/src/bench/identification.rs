@@ -1,11 +1,15 @@
+use maud::{Markup, html};
+use report::page::table;
 use serde::Serialize;
 
 use super::braking::{Braking, FrictionPoint};
+use super::combination::Combination;
 use crate::bench::causes::{Cause, Missing};
 use crate::bench::nominal::Start;
 use crate::bench::start::Response;
-use crate::words::combination::Combination;
-use crate::words::identified::Identified;
+use crate::methods::friction::{braking_chart, friction_curve};
+use crate::words::identified::{Identified, Report};
+use crate::words::page::Sections;
 use analysis::innovations::Tests;
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -34,6 +38,10 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
+    fn worst_test(&self) -> f64 {
+        self.tests.iter().map(Tests::worst).fold(0.0, f64::max)
+    }
+
     pub fn line(&self) -> String {
         format!(
             "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {:.0} \
@@ -42,13 +50,13 @@ impl ModelFit {
             self.friction,
             self.fit_pct,
             self.bic,
-            self.tests.iter().map(Tests::worst).fold(0.0, f64::max),
+            self.worst_test(),
             self.simulations
         )
     }
 }
 
-/// Results that only the output-error method has.
+/// Results of a fit of the bench that other methods do not have.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
     pub fit: ModelFit,
@@ -74,3 +82,61 @@ pub struct Details {
 }
 
 pub type Identification = Identified<Details>;
+
+impl Report for Details {
+    fn lines(found: &Identification) -> Vec<String> {
+        let Details { fit, condition, seconds, .. } = &found.details;
+        vec![format!(
+            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {:.0} simulations in {seconds:.1} s",
+            fit.fit_pct, fit.noise_white, fit.simulations
+        )]
+    }
+
+    fn sections(found: &Identification) -> Sections {
+        let details = &found.details;
+        let fit = &details.fit;
+        Sections {
+            first: html! {
+                @if found.fits == Some(true) && found.converged {
+                    p {
+                        (format!("The model {} with {} friction fits: its residual is the gyro's noise, {:.2e} rad/s a row.",
+                            fit.model, fit.friction, fit.noise_white))
+                    }
+                }
+            },
+            figures: html! {
+                @if !details.friction_points.is_empty() { (friction_curve(found)) }
+                @if !details.braking.is_empty() { (braking_chart(&details.braking)) }
+            },
+            combinations: details.combinations.clone(),
+            condition: Some(details.condition),
+            last: models(&details.models),
+        }
+    }
+}
+
+fn models(models: &[ModelFit]) -> Markup {
+    let best = models.iter().map(|m| m.bic).fold(f64::INFINITY, f64::min);
+    let row = |m: &ModelFit| {
+        let held: Vec<String> = m.validation_pct.iter().map(|v| format!("{v:.3}")).collect();
+        vec![
+            m.model.clone(),
+            m.friction.clone(),
+            format!("{:.3}", m.fit_pct),
+            format!("{:.1}", m.bic - best),
+            format!("{:.1}", m.worst_test()),
+            held.join(", "),
+            format!("{:.0}", m.simulations),
+        ]
+    };
+    let head = [
+        "slosh",
+        "friction",
+        "fit, %",
+        "BIC less the best",
+        "worst residual test",
+        "of recordings held back, %",
+        "simulations",
+    ];
+    html! { h2 { "Models" } (table(head, models.iter().map(row))) }
+}

@@ -473,18 +473,8 @@ pub fn problem<'a>(
         Some(hold) => vec![hold],
         None => guessed(system.recordings),
     };
-    let acausal = options.acausal;
-    Problem {
-        system,
-        recordings,
-        signals,
-        unknowns,
-        starts,
-        holds,
-        acausal,
-        drawn: 2,
-        rough: false,
-    }
+    let plain = Problem::new(system, recordings, signals, unknowns, starts);
+    Problem { holds, acausal: options.acausal, drawn: 2, ..plain }
 }
 
 /// Returns the possible intersample behaviours of the torque, the likeliest first: a torque that changes seldom is probably held.

@@ -59,12 +59,6 @@ pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
     (found.slosh_mass > 0.0 && within).then_some(found)
 }
 
-/// Returns diameter and filling height (m) of the tank whose first mode has this frequency (Hz) and mass (kg).
-pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
-    let length = bench.gravity / (TAU * frequency).powi(2);
-    tank_of_first_mode(length, mass, bench.density)
-}
-
 /// Estimates the bench from the frequency response of the recordings, and returns it with start values, the likeliest first. If
 /// the response shows no slosh, the bench is `None`, and there is one start. The further starts are used if the first leads to no
 /// minimum. They come from the antiresonance and resonance of the response, from the torque balance in parts of the band (because
@@ -152,7 +146,8 @@ impl Response {
     }
 
     fn start(&self, bench: Bench, friction: Start) -> Start {
-        let (d, h) = tank(self.slosh_frequency, self.slosh_mass, bench);
+        let length = bench.gravity / (TAU * self.slosh_frequency).powi(2);
+        let (d, h) = tank_of_first_mode(length, self.slosh_mass, bench.density);
         let fixed = bench.liquid(d, h) - self.slosh_mass;
         let hub_inertia = self.inertia - bench.inertia(fixed.max(0.0));
         Start {
@@ -160,7 +155,7 @@ impl Response {
             h,
             zeta: self.slosh_damping.clamp(1e-3, 0.1),
             hub_inertia: hub_inertia.max(0.2 * self.inertia),
-            length: bench.gravity / (TAU * self.slosh_frequency).powi(2),
+            length,
             mass_ratio: bench.inertia(self.slosh_mass) / self.inertia,
             inertia: self.inertia,
             ..friction
@@ -347,7 +342,7 @@ mod tests {
         assert!((found.slosh_frequency / 2.343_618_143_1 - 1.0).abs() < 1e-6, "{found:?}");
         assert!((found.slosh_mass / 0.756_293_271_9 - 1.0).abs() < 1e-4, "{found:?}");
         assert!((found.slosh_damping / 0.002_975_7 - 1.0).abs() < 1e-4, "{found:?}");
-        let (d, h) = tank(found.slosh_frequency, found.slosh_mass, BENCH);
+        let Start { d, h, .. } = found.start(BENCH, Start::default());
         assert!((d / 0.163 - 1.0).abs() < 1e-4 && (h / 0.1 - 1.0).abs() < 1e-3, "{d} {h}");
     }
 }

@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::bench::causes::{Cause, Missing};
+use crate::bench::combination::Combination;
 use crate::bench::identification::ModelFit;
 use crate::engine::DECIDES;
 use crate::estimate::{Estimated, prose};
-use crate::tuning::REPORTED_DECREMENT;
-use crate::words::combination::Combination;
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, failed};
 use analysis::innovations::Tests;
 use names::hubslosh::{SloshModel, hub};
@@ -21,7 +20,8 @@ pub struct Question<'a> {
 
 pub struct Findings {
     pub torque: Option<String>,
-    pub tests: Vec<Tests>,
+    /// True if the residual passes the tests for noise.
+    pub is_noise: bool,
     /// True if the residual shows an effect that was not estimated.
     pub asks: bool,
     pub alike: Vec<String>,
@@ -34,7 +34,7 @@ pub struct Findings {
 impl Findings {
     /// Returns true if the model explains the recordings.
     pub fn fits(&self) -> bool {
-        self.tests.iter().all(Tests::passed) && !self.asks && self.doubts.is_empty()
+        self.is_noise && !self.asks && self.doubts.is_empty()
     }
 }
 
@@ -74,12 +74,6 @@ pub fn words(
         lines.push(format!(
             "{NO_MINIMUM} (it is {:.2} standard deviations away): values and standard deviations cannot be trusted. More torque, \
              a longer recording or --start may help.",
-            fit.newton_decrement
-        ));
-    }
-    if fit.converged && fit.newton_decrement > REPORTED_DECREMENT {
-        lines.push(format!(
-            "The search ended {:.2} standard deviations from the minimum; the stated standard deviations include this.",
             fit.newton_decrement
         ));
     }

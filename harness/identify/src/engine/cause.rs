@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::Part;
 use super::search::{ABOVE, OWN};
-use super::{ALIKE, DECIDES, ENDS, Fit, SEEN, Solution, Unknown, Z};
+use super::{ALIKE, DECIDES, ENDS, Fit, SEEN, SETS, Solution, Unknown, Z};
 use crate::news::News;
 
 /// Largest number of candidates that are fitted. They are the candidates with the largest scores.
@@ -136,7 +136,7 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
             size = size.copysign(score.size);
         }
         z[j] = (z[j] + size).clamp(fit.ends[j].0, fit.ends[j].1);
-        let end = End { gain: ALIKE, above: least + chance, ..End::new(8, ENDS.0) };
+        let end = End { gain: ALIKE, above: least + chance, ..End::new(SETS, ENDS.0) };
         let Ok(first) = fit.minimise(&z, &free, None, end) else { continue };
         news(&News::Detail(format!(
             "with {} the sum of squares is {:.1}, {:.0} simulations",

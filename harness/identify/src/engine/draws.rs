@@ -184,7 +184,7 @@ impl Solution<'_> {
             let mut values = fit.values(&z);
             for (j, s) in &biases {
                 let moved: f64 = (0..n).filter(|i| i != j).map(|i| step[i] * means[(*s, i)]).sum();
-                let rows = problem.signals[*s].sampled.iter().filter(|r| **r).count() as f64;
+                let rows = problem.signals[*s].count() as f64;
                 let own = fit.noise[*s].white / rows.sqrt() * random.normal();
                 values[*j] = middle[*j].at(place) + residual[*s].at(place) - moved + own;
                 if let Some(shift) = shift {
@@ -254,12 +254,17 @@ impl Derived {
         self.names.iter().position(|other| other == name)
     }
 
+    /// Returns the standard deviation of quantity `k`, NaN if there are too few draws.
     pub fn std(&self, k: usize) -> f64 {
-        analysis::statistics::deviation(&self.columns[k])
+        let std = analysis::statistics::deviation(&self.columns[k]);
+        if self.has_enough_draws() { std } else { f64::NAN }
     }
 
-    /// Returns the 95 % interval of quantity `k`.
+    /// Returns the 95 % interval of quantity `k`, NaN if there are too few draws.
     pub fn interval(&self, k: usize) -> [f64; 2] {
+        if !self.has_enough_draws() {
+            return [f64::NAN; 2];
+        }
         let mut sorted = self.columns[k].clone();
         sorted.sort_by(f64::total_cmp);
         let at = |part: f64| {

@@ -1,5 +1,6 @@
 //! The sum of squares of a problem, and its derivatives.
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use analysis::gauss_markov::{Noise, Whitening};
@@ -147,8 +148,8 @@ impl<'p> Fit<'p> {
                     continue;
                 }
                 let Some(shape) = reading(unknown, signal, motion) else { continue };
-                let rows = residual.iter_mut().enumerate();
-                rows.filter(|(k, _)| signal.sampled[*k]).for_each(|(k, r)| *r -= value * shape(k));
+                let rows = residual.iter_mut().zip(shape.iter()).zip(&signal.sampled);
+                rows.filter(|(_, s)| **s).for_each(|((r, shape), _)| *r -= value * shape);
             }
             residual
         };
@@ -251,7 +252,7 @@ impl<'p> Fit<'p> {
                         let scale = self.scale(&at.z, output);
                         motion.slopes[output].iter().map(|slope| scale * slope).collect()
                     }
-                    (_, Some(shape)) => (0..rows).map(|k| -shape(k) * slope_of(at.z[j])).collect(),
+                    (_, Some(shape)) => shape.iter().map(|s| -s * slope_of(at.z[j])).collect(),
                     _ => vec![0.0; rows],
                 }
             };
@@ -400,13 +401,6 @@ impl<'p> Fit<'p> {
     }
 }
 
-impl Signal {
-    pub fn picked(&self, values: &[f64]) -> Vec<f64> {
-        let there = values.iter().zip(&self.sampled).filter(|(_, sampled)| **sampled);
-        there.map(|(value, _)| *value).collect()
-    }
-}
-
 struct Column {
     values: Vec<f64>,
     means: Vec<f64>,
@@ -432,21 +426,14 @@ fn masked(mut piece: Vec<f64>, signal: &Signal) -> Vec<f64> {
     piece
 }
 
-/// Returns, row by row, the change of a signal per unit of an unknown of its sensor; `None` if the unknown does
-/// not affect the signal.
-fn reading<'m>(
-    unknown: &Unknown,
-    signal: &Signal,
-    motion: &'m Motion,
-) -> Option<Box<dyn Fn(usize) -> f64 + 'm>> {
+/// Returns the change of a signal per unit of an unknown of its sensor, in each row; `None` if the unknown does not affect the
+/// signal.
+fn reading<'m>(unknown: &Unknown, signal: &Signal, motion: &'m Motion) -> Option<Cow<'m, [f64]>> {
     match unknown.role {
-        Role::Bias(output, of) if output == signal.output => {
-            of.is_none_or(|of| of == signal.recording).then(|| Box::new(|_| 1.0) as _)
+        Role::Bias(output, _) if output == signal.output && unknown.is_of(signal.recording) => {
+            Some(vec![1.0; motion.outputs[output].len()].into())
         }
-        Role::Gain(output, of) if output == signal.output => {
-            let other = &motion.outputs[of];
-            Some(Box::new(move |k| other[k]))
-        }
+        Role::Gain(output, of) if output == signal.output => Some((&motion.outputs[of]).into()),
         _ => None,
     }
 }

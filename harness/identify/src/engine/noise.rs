@@ -35,15 +35,14 @@ impl Signal {
     }
 
     pub fn noise_of(&self, time: &[f64], residual: &[f64]) -> Noise {
-        let count = self.sampled.iter().filter(|sampled| **sampled).count().max(1) as f64;
+        let count = self.count().max(1) as f64;
         let least = self.least_noise();
         let sized = |drift: f64, time_constant: f64| {
             let unit = Noise { white: 1.0, drift, time: time_constant };
             let filter = unit.whitening(time, Some(&self.sampled));
             let mut e = residual.to_vec();
             filter.apply(&mut e);
-            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
-            let white = white.max(least);
+            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt().max(least);
             (2.0 * count * white.ln() + filter.log_variance(), Noise { white, ..unit })
         };
         let Some(Drift { size: drift, time: usual, width }) = self.drift else {

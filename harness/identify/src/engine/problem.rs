@@ -218,3 +218,32 @@ pub struct Problem<'a> {
     pub drawn: usize,
     pub rough: bool,
 }
+
+impl<'a> Problem<'a> {
+    /// Creates a problem with one intersample behaviour, without random starts, and with a system without solver errors.
+    /// Outputs may precede their inputs.
+    pub fn new(
+        system: &'a dyn System,
+        recordings: Vec<Recorded>,
+        signals: Vec<Signal>,
+        unknowns: Vec<Unknown>,
+        starts: Vec<Vec<f64>>,
+    ) -> Self {
+        let holds = vec![Hold::FirstOrderHold];
+        let (acausal, drawn, rough) = (true, 0, false);
+        Problem { system, recordings, signals, unknowns, starts, holds, acausal, drawn, rough }
+    }
+}
+
+impl Signal {
+    /// Returns the values of the rows in which the signal was measured.
+    pub fn picked(&self, values: &[f64]) -> Vec<f64> {
+        let there = values.iter().zip(&self.sampled).filter(|(_, sampled)| **sampled);
+        there.map(|(value, _)| *value).collect()
+    }
+
+    /// Returns the number of rows in which the signal was measured.
+    pub fn count(&self) -> usize {
+        self.sampled.iter().filter(|sampled| **sampled).count()
+    }
+}

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::Part;
-use super::{DECIDES, ENDS, Fit, GAIN, SETS, VAGUE, Z};
+use super::{ALIKE, DECIDES, ENDS, Fit, GAIN, SETS, VAGUE, Z};
 
 /// Rise of the sum of squares, 1.96², that closes a 95 % interval. If the sum of squares rises less up to the end of the
 /// profile's range, the interval is open on that side.
@@ -116,13 +116,13 @@ impl Fit<'_> {
             let mut z = minimum.point.z.clone();
             z[j] = at;
             let above = minimum.point.cost + 3.0 * DECIDES;
-            let end = End { above, trusts: true, gain: 2.0, ..End::new(5, ENDS.0) };
+            let end = End { above, trusts: true, gain: ALIKE, ..End::new(5, ENDS.0) };
             let Ok(found) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
             points.push(Point { at, minimum: found });
         }
         let lower = |low: &&Point| low.minimum.point.cost < minimum.point.cost - GAIN;
         if let Some(low) = lowest(&points).filter(lower) {
-            let end = End { gain: 2.0, ..End::new(6, ENDS.0) };
+            let end = End { gain: ALIKE, ..End::new(6, ENDS.0) };
             *minimum = self.minimise_from(&low.minimum.point, end)?;
         }
         Ok(points)

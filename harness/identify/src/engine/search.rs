@@ -56,7 +56,13 @@ pub struct Solution<'p> {
     pub starts: usize,
 }
 
-impl Solution<'_> {
+impl<'p> Solution<'p> {
+    /// Creates the solution at a minimum that needs no search, for example of a planned recording.
+    pub fn at(fit: Fit<'p>, minimum: Minimum) -> Self {
+        let (rivals, tests, at_bound, sides) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Solution { fit, minimum, profile: None, rivals, tests, at_bound, sides, starts: 1 }
+    }
+
     /// Returns true if the residual of every signal passes the tests for noise, and is not clearly larger than the
     /// noise between neighbouring rows.
     pub fn is_noise(&self) -> bool {
@@ -236,7 +242,7 @@ impl Found {
         let (minimum, rivals) = fit.compare_holds(self.minimum.clone())?;
         (self.minimum, self.rivals) = (minimum, rivals);
         fit.renew_noise(&self.minimum.point);
-        let end = End { gain: ALIKE, ..End::new(4, ENDS.0) };
+        let end = End { gain: ALIKE, ..End::new(SETS / 2, ENDS.0) };
         self.minimum = fit.minimise_from(&self.minimum.point, end)?;
         (self.noise, self.hold, self.is_judged) = (fit.noise.clone(), fit.hold, true);
         self.deviance = fit.deviance(&self.minimum.point);
@@ -273,8 +279,8 @@ impl Fit<'_> {
     }
 
     /// Returns the number of measured values, over all signals.
-    fn sampled(&self) -> usize {
-        self.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum()
+    pub fn sampled(&self) -> usize {
+        self.problem.signals.iter().map(Signal::count).sum()
     }
 
     pub fn stuck(&self, z: &[f64]) -> Vec<usize> {
@@ -573,7 +579,7 @@ impl Fit<'_> {
             self.set(noise, 1.0);
             for inflation in INFLATIONS {
                 self.inflation = inflation;
-                let sets = if inflation > 1.0 { 8 } else { 4 };
+                let sets = if inflation > 1.0 { SETS } else { SETS / 2 };
                 let end = End { gain: ALIKE, ..End::new(sets, ENDS.0) };
                 let searched = self.minimise(&z, &free, None, end);
                 self.inflation = 1.0;

@@ -50,7 +50,7 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
             continue;
         }
         let error = *tried.entry(lost).or_insert_with(|| trial_error(&values, &gaps, lost) * step);
-        match fill(before(&values, &gaps, n), after(&values, &gaps, n), lost) {
+        match fill(sides(&values, &gaps, n + 1, n + 1), lost) {
             Some(values) if error < kick => filled.push((n, values)),
             _ => left.push(n),
         }
@@ -91,16 +91,12 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     with_rows(all, &knots, filled, cuts)
 }
 
-/// Returns at most [`GAP_SIDE`] samples of the torque before gap `n`, and no sample from before the preceding gap. The function
-/// `after` returns the samples behind the gap.
-fn before<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
-    let from = gaps.iter().filter(|gap| **gap < n).max().map_or(0, |gap| gap + 1);
-    &values[from.max((n + 1).saturating_sub(GAP_SIDE))..=n]
-}
-
-fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
-    let to = gaps.iter().filter(|gap| **gap > n).min().map_or(values.len(), |gap| gap + 1);
-    &values[n + 1..to.min(n + 1 + GAP_SIDE)]
+/// Returns up to [`GAP_SIDE`] samples of the torque before and behind the samples `from..to`, as far as the next gap on each side.
+/// Gap g lies between the samples g and g + 1.
+fn sides<'v>(values: &'v [f64], gaps: &[usize], from: usize, to: usize) -> [&'v [f64]; 2] {
+    let first = gaps.iter().rev().find(|g| **g + 1 < from).map_or(0, |g| g + 1);
+    let last = gaps.iter().find(|g| **g + 1 > to).map_or(values.len(), |g| g + 1);
+    [&values[first.max(from.saturating_sub(GAP_SIDE))..from], &values[to..last.min(to + GAP_SIDE)]]
 }
 
 /// Estimates the error of filling a gap of `lost` samples by trials: known samples in other places are removed and predicted.
@@ -111,24 +107,13 @@ fn trial_error(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     let mut squares = Vec::new();
     for trial in 0..4 * GAP_TRIALS {
         let from = side + (trial * 2 + 1) * room / (8 * GAP_TRIALS);
-        let (first, to) =
-            (from.saturating_sub(GAP_SIDE), (from + lost + GAP_SIDE).min(values.len()));
-        // gap g is between the samples g and g + 1
-        if squares.len() >= GAP_TRIALS && trial % 4 != 0 {
+        let to = from + lost;
+        let is_broken = to > values.len() || gaps.iter().any(|g| (from - 1..to).contains(g));
+        if is_broken || squares.len() >= GAP_TRIALS && trial % 4 != 0 {
             continue;
         }
-        let lower = gaps.iter().filter(|g| **g < from).max().map_or(first, |g| first.max(g + 1));
-        let upper = gaps.iter().filter(|g| **g + 1 >= from + lost).min();
-        let upper = upper.map_or(to, |g| to.min(g + 1));
-        let broken = gaps.iter().any(|g| (from.saturating_sub(1)..from + lost).contains(g));
-        if broken || from < lower || upper < from + lost {
-            continue;
-        }
-        let truth = &values[from..from + lost];
-        let Some(found) = fill(&values[lower..from], &values[from + lost..upper], lost) else {
-            return f64::INFINITY;
-        };
-        let off: Vec<f64> = found.iter().zip(truth).map(|(a, b)| a - b).collect();
+        let Some(found) = fill(sides(values, gaps, from, to), lost) else { return f64::INFINITY };
+        let off: Vec<f64> = found.iter().zip(&values[from..to]).map(|(a, b)| a - b).collect();
         let sum: f64 = off.iter().sum();
         squares.push(off.iter().map(|e| e * e).sum::<f64>().max(sum * sum));
     }
@@ -137,7 +122,7 @@ fn trial_error(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
 
 /// Predicts the `lost` samples of the torque between the samples on the `left` and on the `right`; `None` if these
 /// samples are too few.
-fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
+fn fill([left, right]: [&[f64]; 2], lost: usize) -> Option<Vec<f64>> {
     let order = GAP_ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
     if order < 4 {
         return None;
@@ -229,7 +214,8 @@ mod tests {
     fn lost_samples_of_a_sweep_are_predicted_and_those_of_noise_are_not() {
         let values: Vec<f64> = (0..4000).map(|k| sweep(100.0 + 0.02 * f64::from(k))).collect();
         for lost in [1, 10, 50] {
-            let found = fill(&values[1000..1250], &values[1250 + lost..1500 + lost], lost).unwrap();
+            let found =
+                fill([&values[1000..1250], &values[1250 + lost..1500 + lost]], lost).unwrap();
             let off = found.iter().zip(&values[1250..]).map(|(a, b)| (a - b).abs());
             let worst = off.fold(0.0, f64::max);
             assert!(worst < 1e-3 * 0.1, "{lost}: {worst:e}");

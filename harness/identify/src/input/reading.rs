@@ -79,7 +79,6 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
                 rows.len(),
                 clocks::usual(&held),
                 match name {
-                    "tau_cmd" => "in the other rows it is interpolated",
                     "omega" | "theta" =>
                         "the other rows drive the model, but are not compared with this signal",
                     _ => "in the other rows it is interpolated",

@@ -12,7 +12,7 @@
 //! The largest spike is removed first, because a spike also changes r of its neighbours. The rows of spikes are left out of the
 //! fit, because such a value should have no weight (a robust loss such as Hampel's has the same effect).
 
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use analysis::innovations::LIMIT;
 use analysis::statistics::{median, noise_level, peak};
@@ -73,22 +73,17 @@ pub fn find(
     }
     let mut sound: BTreeSet<usize> = (0..y.len()).collect();
     let off_sound = |sound: &BTreeSet<usize>, k: usize| off((&t, &y), &near(sound, k), k);
-    // Sorted by |r| and row; the bits of non-negative numbers sort like the numbers. An entry is outdated if |r| of its
-    // row has changed since.
-    let mut by_size: BinaryHeap<(u64, usize)> =
-        suspects.iter().map(|&k| (residuals[k - 2].to_bits(), k)).collect();
+    let mut sizes: BTreeMap<usize, f64> = suspects.iter().map(|&k| (k, residuals[k - 2])).collect();
     let mut taken: Vec<usize> = Vec::new();
-    while let Some((bits, k)) = by_size.pop() {
-        if f64::from_bits(bits) <= limit(k) {
-            continue;
-        }
-        if !sound.contains(&k) || off_sound(&sound, k).0.abs().to_bits() != bits {
-            continue;
-        }
+    loop {
+        let large = sizes.iter().filter(|(k, r)| **r > limit(**k));
+        let Some((&k, _)) = large.max_by(|a, b| a.1.total_cmp(b.1)) else { break };
+        sizes.remove(&k);
         sound.remove(&k);
         taken.push(k);
-        let suspected = near(&sound, k).into_iter().filter(|j| suspects.binary_search(j).is_ok());
-        by_size.extend(suspected.map(|j| (off_sound(&sound, j).0.abs().to_bits(), j)));
+        for j in near(&sound, k) {
+            sizes.entry(j).and_modify(|r| *r = off_sound(&sound, j).0.abs());
+        }
     }
     // neighbours of spikes that were removed by mistake are restored
     for k in taken.iter().copied() {

@@ -7,7 +7,6 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use signals::recording::{Quantity, quantity};
 
-use super::{Method, Task};
 use crate::engine::minimum::{Curvature, places};
 use crate::engine::search::solve;
 use crate::engine::{
@@ -16,7 +15,7 @@ use crate::engine::{
 use crate::estimate::{Estimated, mean_square};
 use crate::input::recording::Recording;
 use crate::news::News;
-use crate::words::identified::{Identified, Residual};
+use crate::words::identified::{self, Identified, Report};
 use crate::words::verdict::failed;
 
 /// Amplitude of another oscillation in the residual, relative to the decaying oscillation, above which
@@ -42,20 +41,12 @@ pub struct Details {
     pub noise: f64,
 }
 
-pub struct FreeDecay {
-    /// Name of the recorded signal.
-    pub signal: &'static str,
-    pub clock: f64,
-}
-
-impl FreeDecay {
-    fn units(&self) -> [&'static str; 3] {
-        match quantity(self.signal) {
-            Ok(Quantity::Length) => ["m", "1/m", "1/m2"],
-            Ok(Quantity::Force) => ["N", "1/N", "1/N2"],
-            Ok(Quantity::Angle) => ["rad", "1/rad", "1/rad2"],
-            _ => ["rad/s", "s/rad", "s2/rad2"],
-        }
+fn units(signal: &str) -> [&'static str; 3] {
+    match quantity(signal) {
+        Ok(Quantity::Length) => ["m", "1/m", "1/m2"],
+        Ok(Quantity::Force) => ["N", "1/N", "1/N2"],
+        Ok(Quantity::Angle) => ["rad", "1/rad", "1/rad2"],
+        _ => ["rad/s", "s/rad", "s2/rad2"],
     }
 }
 
@@ -139,17 +130,9 @@ fn problem<'a>(
     let mut constant = first.clone();
     // a second start, whose damping does not depend on the amplitude
     constant[2] = 0.0;
-    Problem {
-        system,
-        recordings: system.0.iter().map(recorded).collect(),
-        signals: system.0.iter().enumerate().map(signal).collect(),
-        unknowns,
-        starts: vec![first, constant],
-        holds: vec![Hold::FirstOrderHold],
-        acausal: true,
-        drawn: 0,
-        rough: false,
-    }
+    let recordings = system.0.iter().map(recorded).collect();
+    let signals = system.0.iter().enumerate().map(signal).collect();
+    Problem::new(system, recordings, signals, unknowns, vec![first, constant])
 }
 
 fn residuals(solution: &Solution) -> (f64, Vec<Vec<f64>>) {
@@ -158,125 +141,125 @@ fn residuals(solution: &Solution) -> (f64, Vec<Vec<f64>>) {
     (mean_square(&residuals.concat()).sqrt(), residuals)
 }
 
-impl Method for FreeDecay {
-    type Details = Details;
-
-    fn identify(&self, task: &Task, news: &mut dyn FnMut(&News)) -> Result<Found> {
-        let [unit, inverse, squared] = self.units();
-        for recording in task.recordings {
-            recording.check()?;
-        }
-        let start = |r: &Recording| Start::fit(&Record { time: &r.time, signal: &r.rate });
-        let starts: Option<Vec<Start>> = task.recordings.iter().map(start).collect();
-        let starts = starts.filter(|starts| !starts.is_empty()).with_context(|| {
-            format!(
-                "{}: no decaying oscillation of at least {LEAST_PERIODS} periods is seen in {}",
-                task.recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", "),
-                self.signal
-            )
-        })?;
-        let system = Oscillation(task.recordings);
-        let free = problem(&system, &starts, [unit, inverse, squared]);
-        let mut constant = free.clone();
-        constant.unknowns[2].part = Part::Candidate;
-        constant.starts.remove(0);
-        let constant = solve(&constant, None, f64::INFINITY, news)?;
-        let from = constant.fit.values(&constant.minimum.point.z);
-        let (residual_constant, zeta_constant) = (residuals(&constant).0, from[1]);
-        let from = (from, constant.fit.hold);
-        let mut found = solve(&free, Some(from), f64::INFINITY, news)?;
-        let z = found.fit.values(&found.minimum.point.z);
-        let jacobian = found.fit.derivatives_at(&mut found.minimum)?.matrix;
-        let covariance = Curvature::new(&jacobian, places(&found.fit.free)).covariance(z.len());
-        let std = |k: usize| covariance[(k, k)].sqrt();
-        let own = z[COMMON.len()..].chunks(OWN.len());
-        let ends = |(r, own): (&Recording, &[f64])| {
-            [own[0], free_decay::amplitude(r.duration(), own[0], [z[0], z[1], z[2]])]
-        };
-        let amplitudes: Vec<[f64; 2]> = task.recordings.iter().zip(own).map(ends).collect();
-        let (residual, parts) = residuals(&found);
-        let noise = found.fit.noise.iter().map(|noise| noise.white).fold(0.0, f64::max);
-        let mut answer = Found::new(Details {
-            signal: self.signal.into(),
-            amplitudes: amplitudes.clone(),
-            periods: starts.iter().map(|start| start.periods).collect(),
-            zeta_constant,
-            residual,
-            residual_constant,
-            noise,
-        });
-        for (k, unit) in [(1, "1"), (2, inverse), (3, squared)] {
-            answer.measurement.insert(COMMON[k].into(), Estimated::normal(z[k], std(k), unit));
-        }
-        // an error of the clock changes f, but not the damping ratio
-        let estimated = Estimated::normal(z[0], std(0).hypot(self.clock * z[0]), "Hz");
-        let frequency = Estimated { std_noise: std(0), ..estimated };
-        let plus = |e: &Estimated| format!("{:.5} ± {:.5}", e.value, 1.96 * e.std);
-        let (f, zeta) = (plus(&frequency), plus(&answer.measurement["zeta"]));
-        answer.measurement.insert("frequency".into(), frequency);
-        answer.converged = found.minimum.decrement < ENDS.0;
-        let residual_of = |(recording, residual): (&Recording, &Vec<f64>)| Residual {
-            name: recording.name.clone(),
-            label: format!("{}, {unit}", self.signal),
-            time: recording.time.clone(),
-            measured: recording.rate.clone(),
-            residual: residual.clone(),
-            noise: Some(noise),
-            torque: None,
-        };
-        answer.residuals = task.recordings.iter().zip(&parts).map(residual_of).collect();
-        let fits = found.is_noise();
-        answer.fits = Some(fits);
-        let all = amplitudes.iter().flatten();
-        let (least, most) = all.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
-        let growth = [z[2], 1.96 * std(2)];
-        answer.verdict = vec![
-            format!("f = {f} Hz, ζ = {zeta} at vanishing amplitude (95 % intervals)."),
-            format!(
-                "The interval of f includes the clock's tolerance, {} % (--tolerance clock=…).",
-                100.0 * self.clock
-            ),
-            if growth[0].abs() > growth[1] {
-                format!(
-                    "Damping depends on the amplitude: ζ_A = {:.4} ± {:.4} {inverse}, so ζ is {:.5} at {least:.3} {unit} and \
-                     {:.5} at {most:.3} {unit}, the ends of what was recorded.",
-                    growth[0],
-                    growth[1],
-                    z[1] + growth[0] * least,
-                    z[1] + growth[0] * most
-                )
-            } else {
-                format!(
-                    "No dependence of the damping on the amplitude is seen: ζ_A = {:.4} ± {:.4} {inverse}; with ζ_A = 0, ζ = \
-                     {:.5}.",
-                    growth[0], growth[1], zeta_constant
-                )
-            },
-            if fits {
-                "One decaying oscillation fits the record: the residual is its noise.".to_string()
-            } else {
-                let why = found.tests.iter().max_by(|a, b| a.worst().total_cmp(&b.worst()));
-                let why = why.map_or(Vec::new(), |tests| failed(tests, "an input")).join(", ");
-                format!(
-                    "One decaying oscillation does not fit the record: the residual is {:.2} times the white noise in it{}.",
-                    residual / noise,
-                    if why.is_empty() { why } else { format!("; {why}") }
-                )
-            },
-        ];
-        let other =
-            |(r, part): (&Recording, &Vec<f64>)| free_decay::largest_other(&r.time, part, z[0]);
-        let others = task.recordings.iter().zip(&parts).map(other);
-        let (at, size) = others.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-        if size > NAMED * most && !fits {
-            answer.verdict.push(format!(
-                "The residual has an oscillation of {:.0} % at {at:.3} Hz: another mode, or a beat with it.",
-                100.0 * size / most
-            ));
-        }
-        Ok(answer)
+/// Fits one decaying oscillation to recordings of `signal`, which [`Recording::rate`] holds. `clock` is the relative standard
+/// deviation of the recorder's clock.
+///
+/// # Errors
+/// If a recording cannot be used, or shows no decaying oscillation.
+pub fn identify(
+    signal: &str,
+    clock: f64,
+    recordings: &[Recording],
+    news: &mut dyn FnMut(&News),
+) -> Result<Found> {
+    let [unit, inverse, squared] = units(signal);
+    for recording in recordings {
+        recording.check()?;
     }
+    let start = |r: &Recording| Start::fit(&Record { time: &r.time, signal: &r.rate });
+    let starts: Option<Vec<Start>> = recordings.iter().map(start).collect();
+    let starts = starts.filter(|starts| !starts.is_empty()).with_context(|| {
+        format!(
+            "{}: no decaying oscillation of at least {LEAST_PERIODS} periods is seen in {}",
+            recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", "),
+            signal
+        )
+    })?;
+    let system = Oscillation(recordings);
+    let free = problem(&system, &starts, [unit, inverse, squared]);
+    let mut constant = free.clone();
+    constant.unknowns[2].part = Part::Candidate;
+    constant.starts.remove(0);
+    let constant = solve(&constant, None, f64::INFINITY, news)?;
+    let from = constant.fit.values(&constant.minimum.point.z);
+    let (residual_constant, zeta_constant) = (residuals(&constant).0, from[1]);
+    let from = (from, constant.fit.hold);
+    let mut found = solve(&free, Some(from), f64::INFINITY, news)?;
+    let z = found.fit.values(&found.minimum.point.z);
+    let jacobian = found.fit.derivatives_at(&mut found.minimum)?.matrix;
+    let covariance = Curvature::new(&jacobian, places(&found.fit.free)).covariance(z.len());
+    let std = |k: usize| covariance[(k, k)].sqrt();
+    let own = z[COMMON.len()..].chunks(OWN.len());
+    let ends = |(r, own): (&Recording, &[f64])| {
+        [own[0], free_decay::amplitude(r.duration(), own[0], [z[0], z[1], z[2]])]
+    };
+    let amplitudes: Vec<[f64; 2]> = recordings.iter().zip(own).map(ends).collect();
+    let (residual, parts) = residuals(&found);
+    let noise = found.fit.noise.iter().map(|noise| noise.white).fold(0.0, f64::max);
+    let mut answer = Found::new(Details {
+        signal: signal.into(),
+        amplitudes: amplitudes.clone(),
+        periods: starts.iter().map(|start| start.periods).collect(),
+        zeta_constant,
+        residual,
+        residual_constant,
+        noise,
+    });
+    for (k, unit) in [(1, "1"), (2, inverse), (3, squared)] {
+        answer.measurement.insert(COMMON[k].into(), Estimated::normal(z[k], std(k), unit));
+    }
+    // an error of the clock changes f, but not the damping ratio
+    let estimated = Estimated::normal(z[0], std(0).hypot(clock * z[0]), "Hz");
+    let frequency = Estimated { std_noise: std(0), ..estimated };
+    let plus = |e: &Estimated| format!("{:.5} ± {:.5}", e.value, 1.96 * e.std);
+    let (f, zeta) = (plus(&frequency), plus(&answer.measurement["zeta"]));
+    answer.measurement.insert("frequency".into(), frequency);
+    answer.converged = found.minimum.decrement < ENDS.0;
+    answer.residuals = identified::residuals(&found, |signal: &Signal| {
+        (recordings[signal.recording].name.clone(), format!("{}, {unit}", answer.details.signal))
+    });
+    let fits = found.is_noise();
+    answer.fits = Some(fits);
+    let all = amplitudes.iter().flatten();
+    let (least, most) = all.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
+    let growth = [z[2], 1.96 * std(2)];
+    answer.verdict = vec![
+        format!("f = {f} Hz, ζ = {zeta} at vanishing amplitude (95 % intervals)."),
+        format!(
+            "The interval of f includes the clock's tolerance, {} % (--tolerance clock=…).",
+            100.0 * clock
+        ),
+        if growth[0].abs() > growth[1] {
+            format!(
+                "Damping depends on the amplitude: ζ_A = {:.4} ± {:.4} {inverse}, so ζ is {:.5} at {least:.3} {unit} and \
+                 {:.5} at {most:.3} {unit}, the ends of what was recorded.",
+                growth[0],
+                growth[1],
+                z[1] + growth[0] * least,
+                z[1] + growth[0] * most
+            )
+        } else {
+            format!(
+                "No dependence of the damping on the amplitude is seen: ζ_A = {:.4} ± {:.4} {inverse}; with ζ_A = 0, ζ = \
+                 {:.5}.",
+                growth[0], growth[1], zeta_constant
+            )
+        },
+        if fits {
+            "One decaying oscillation fits the record: the residual is its noise.".to_string()
+        } else {
+            let why = found.tests.iter().max_by(|a, b| a.worst().total_cmp(&b.worst()));
+            let why = why.map_or(Vec::new(), |tests| failed(tests, "an input")).join(", ");
+            format!(
+                "One decaying oscillation does not fit the record: the residual is {:.2} times the white noise in it{}.",
+                residual / noise,
+                if why.is_empty() { why } else { format!("; {why}") }
+            )
+        },
+    ];
+    let other = |(r, part): (&Recording, &Vec<f64>)| free_decay::largest_other(&r.time, part, z[0]);
+    let others = recordings.iter().zip(&parts).map(other);
+    let (at, size) = others.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+    if size > NAMED * most && !fits {
+        answer.verdict.push(format!(
+            "The residual has an oscillation of {:.0} % at {at:.3} Hz: another mode, or a beat with it.",
+            100.0 * size / most
+        ));
+    }
+    Ok(answer)
+}
 
+impl Report for Details {
     fn lines(found: &Found) -> Vec<String> {
         let Details { signal, amplitudes, periods, residual, noise, .. } = &found.details;
         let mut lines: Vec<String> = amplitudes
@@ -302,9 +285,7 @@ mod tests {
     fn found(time: Vec<f64>, signal: Vec<f64>) -> Found {
         let torque = vec![0.0; time.len()];
         let recordings = [Recording::of("decay", time, torque, signal)];
-        let task = Task { fmu: None, recordings: &recordings, validation: &[] };
-        let method = FreeDecay { signal: "wave_height", clock: 0.0 };
-        method.identify(&task, &mut |_| {}).unwrap()
+        identify("wave_height", 0.0, &recordings, &mut |_| {}).unwrap()
     }
 
     /// Integrates an oscillator with linear and quadratic damping and a cubic spring by a Runge–Kutta method, independently of

@@ -14,10 +14,9 @@ use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, tank};
 use report::page::{axis_chart, render_chart, series};
 use report::svg::{Axis, Style};
 
-use super::output_error::{self, OutputError};
-use super::{Method, Task};
+use super::output_error;
 use crate::bench::braking::{Braking, FrictionPoint, harmonics_at};
-use crate::bench::identification::{Details, Identification};
+use crate::bench::identification::Identification;
 use crate::bench::nominal::{self, Nominal};
 use crate::bench::options::Options;
 use crate::input::plausible;
@@ -26,36 +25,6 @@ use crate::news::News;
 use crate::tuning::{
     BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, MOVING_SPEED, MOVING_SPREAD, PAGE_POINTS,
 };
-use crate::words::page::Sections;
-
-pub struct Friction {
-    /// Options of the fit. Their slosh models and friction laws are not used.
-    pub options: Options,
-}
-
-impl Method for Friction {
-    type Details = Details;
-
-    fn identify(&self, task: &Task, progress: &mut dyn FnMut(&News)) -> Result<Identification> {
-        let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
-        identify(task.fmu()?, task.recordings, &options, progress)
-    }
-
-    fn lines(found: &Identification) -> Vec<String> {
-        OutputError::lines(found)
-    }
-
-    fn sections(found: &Identification) -> Sections {
-        let braking_over_angle = &found.details.braking;
-        Sections {
-            figures: html! {
-                (friction_curve(found))
-                @if !braking_over_angle.is_empty() { (braking_chart(braking_over_angle)) }
-            },
-            ..OutputError::sections(found)
-        }
-    }
-}
 
 /// Fits friction and inertia. Unless the settings state the fill of the tank, the tank is assumed to be empty, and
 /// the verdict says so.
@@ -285,7 +254,7 @@ fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Brak
     })
 }
 
-fn friction_curve(found: &Identification) -> Markup {
+pub(crate) fn friction_curve(found: &Identification) -> Markup {
     let points = &found.details.friction_points;
     let value = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
     let [b, c, d] = [friction::B, friction::C, friction::D].map(value);
@@ -325,7 +294,7 @@ fn friction_curve(found: &Identification) -> Markup {
     }
 }
 
-fn braking_chart(all: &[Braking]) -> Markup {
+pub(crate) fn braking_chart(all: &[Braking]) -> Markup {
     let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
         let angle = |k: usize| PI * (2.0 * k as f64 / PAGE_POINTS as f64 - 1.0);
         let points = (0..=PAGE_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();

@@ -1,7 +1,5 @@
 //! Output-error fit of the FMU in the time domain: from recordings to parameters with their uncertainty and a verdict.
 
-mod page;
-
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
@@ -10,10 +8,9 @@ use names::hubslosh::FrictionModel;
 use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 use names::hubslosh::{self};
 
-use super::{Method, Task};
 use crate::bench::answer::{self, Fitted, conclude};
 use crate::bench::breaking;
-use crate::bench::identification::{Details, Identification, ModelFit};
+use crate::bench::identification::{Identification, ModelFit};
 use crate::bench::options::Options;
 use crate::bench::problem;
 use crate::bench::start::{self, Response};
@@ -25,32 +22,6 @@ use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::news::News;
 use crate::tuning::{BEGINNINGS, LONG_RECORDING};
-use crate::words::page::Sections;
-
-pub struct OutputError {
-    pub options: Options,
-}
-
-impl Method for OutputError {
-    type Details = Details;
-
-    fn identify(&self, task: &Task, progress: &mut dyn FnMut(&News)) -> Result<Identification> {
-        let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
-        identify(task.fmu()?, task.recordings, &options, progress)
-    }
-
-    fn lines(found: &Identification) -> Vec<String> {
-        let Details { fit, condition, seconds, .. } = &found.details;
-        vec![format!(
-            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {:.0} simulations in {seconds:.1} s",
-            fit.fit_pct, fit.noise_white, fit.simulations
-        )]
-    }
-
-    fn sections(found: &Identification) -> Sections {
-        page::sections(found)
-    }
-}
 
 const ORDER: [&str; 4] = [Linear.name(), Planar.name(), Spherical.name(), Frozen.name()];
 
@@ -205,9 +176,10 @@ fn identify_whole(
         fitted.extend(found);
     }
     let mut others = Vec::new();
-    let (mut near, mut slosh) = (0, 0);
-    if !fitted.is_empty() {
-        (near, slosh) = sort(&mut fitted);
+    let mut near = 0;
+    let slosh = fitted.len();
+    if slosh > 0 {
+        near = sort(&mut fitted);
         let model = fitted[0].fit.model.clone();
         for pair in pairs.iter().filter(|(other, law)| *law != first && *other == model) {
             let found = fit(*pair, fitted.first(), &mut tell);
@@ -264,11 +236,11 @@ fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
 }
 
 /// Sorts the models by the Bayesian information criterion; among equal ones the simplest comes first. Returns the number of
-/// models that are not clearly worse than the first, and the number of all models.
-fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
+/// models that are not clearly worse than the first.
+fn sort(fitted: &mut [Fitted]) -> usize {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
     let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();
     let (near, alike) = (within(DECIDES), within(ALIKE));
     fitted[..alike].sort_by_key(|f| SIMPLEST.iter().position(|model| *model == f.fit.model));
-    (near, fitted.len())
+    near
 }

@@ -10,6 +10,7 @@ use host::causality::Causality;
 use host::description::{ModelDescription, Type};
 use host::exchange;
 use host::fmu::{Fmu, Instance, Interface};
+use host::schedule::interpolates;
 use names::hubslosh::solver::{self, MAX_STEPS};
 
 use crate::input::question::{Question, Setting, Solver, real};
@@ -71,10 +72,6 @@ impl Model {
     }
 }
 
-fn interpolates(description: &ModelDescription) -> bool {
-    description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs)
-}
-
 #[derive(Clone, Debug)]
 pub struct Setup {
     settings: Vec<Setting>,
@@ -88,12 +85,6 @@ pub struct Setup {
     substeps: usize,
     /// Largest number of steps that the host's solver may take from one row to the next.
     most_steps: usize,
-}
-
-pub struct Finer {
-    pub setup: Setup,
-    /// The FMU, opened again for another solver; `None` if the solver does not change.
-    pub model: Option<Model>,
 }
 
 #[derive(Clone, Debug)]
@@ -181,33 +172,27 @@ impl Setup {
     }
 
     /// Returns setups for the same simulations with smaller errors of the solver: with a smaller tolerance, with shorter
-    /// communication steps, and with the host's solver if it can integrate the FMU ([`Setup::can_exchange`]). The FMU may refuse
-    /// or ignore a smaller tolerance and shorter steps. The host's solver refuses simulations that would take long.
-    pub fn finer(&self, model: &Model) -> Vec<Finer> {
-        let setup = |setup: Setup| Finer { setup, model: None };
+    /// communication steps, and with the host's solver if it can integrate the FMU ([`Setup::can_exchange`]), for which the FMU
+    /// is opened again. The FMU may refuse or ignore a smaller tolerance and shorter steps. The host's solver refuses
+    /// simulations that would take long.
+    pub fn finer(&self, model: &Model) -> Vec<(Setup, Option<Model>)> {
+        let with = |tolerance| Setup { tolerance: Some(tolerance), ..self.clone() };
         let Model::Own(fmu) = model else {
-            let tolerance = (COMPARED_FACTOR * self.tolerance.unwrap_or(COMPARED_TOLERANCE))
-                .max(1e3 * f64::EPSILON);
-            return vec![setup(Setup { tolerance: Some(tolerance), ..self.clone() })];
+            let tolerance = COMPARED_FACTOR * self.tolerance.unwrap_or(COMPARED_TOLERANCE);
+            return vec![(with(tolerance.max(1e3 * f64::EPSILON)), None)];
         };
         let suggested = fmu.description().default_experiment.tolerance.filter(|t| *t > 0.0);
-        let tolerance = self
-            .tolerance
-            .or(suggested)
-            .map_or(COMPARED_TOLERANCE, |tolerance| COMPARED_FACTOR * tolerance);
+        let tolerance = self.tolerance.or(suggested);
+        let tolerance = tolerance.map_or(COMPARED_TOLERANCE, |t| COMPARED_FACTOR * t);
         let mut all = vec![
-            setup(Setup { tolerance: Some(tolerance), ..self.clone() }),
-            setup(Setup { substeps: 2 * self.substeps, ..self.clone() }),
+            (with(tolerance), None),
+            (Setup { substeps: 2 * self.substeps, ..self.clone() }, None),
         ];
         if self.can_exchange(model)
             && let Ok(model) = Model::open(fmu.path(), Solver::Host(COMPARED_TOLERANCE))
         {
-            let setup = Setup {
-                tolerance: Some(COMPARED_TOLERANCE),
-                most_steps: COMPARED_STEPS,
-                ..self.clone()
-            };
-            all.push(Finer { setup, model: Some(model) });
+            let setup = Setup { most_steps: COMPARED_STEPS, ..with(COMPARED_TOLERANCE) };
+            all.push((setup, Some(model)));
         }
         all
     }

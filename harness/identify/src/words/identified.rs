@@ -1,9 +1,12 @@
 use std::collections::BTreeMap;
 
+use analysis::gauss_markov::Noise;
 use anyhow::Result;
 use serde::Serialize;
 
+use crate::engine::{Signal, Solution};
 use crate::estimate::Estimated;
+use crate::words::page::{self, Sections};
 
 /// Result of every method of identification; `D` contains the results that only one method has.
 #[derive(Clone, Debug, Serialize)]
@@ -33,13 +36,54 @@ pub struct Residual {
     pub time: Vec<f64>,
     pub measured: Vec<f64>,
     pub residual: Vec<f64>,
-    /// Standard deviation of the signal's white noise, if known.
-    pub noise: Option<f64>,
+    /// Standard deviation of the signal's white noise.
+    pub noise: f64,
     /// Torque at the times of the signal, N·m, if the signal is the hub's rate under this torque.
     pub torque: Option<Vec<f64>>,
 }
 
-impl<D: Serialize> Identified<D> {
+/// Returns the residual of each signal in the rows in which the signal was measured. `words` returns the name and the axis label
+/// of a signal.
+pub(crate) fn residuals(
+    solution: &Solution,
+    words: impl Fn(&Signal) -> (String, String),
+) -> Vec<Residual> {
+    let (fit, point) = (&solution.fit, &solution.minimum.point);
+    let all = fit.residuals(&point.z, &point.motion);
+    let one = |((signal, residual), noise): ((&Signal, &Vec<f64>), &Noise)| {
+        let (name, label) = words(signal);
+        Residual {
+            name,
+            label,
+            time: signal.picked(&fit.problem.recordings[signal.recording].time),
+            measured: signal.picked(&signal.measured),
+            residual: signal.picked(residual),
+            noise: noise.white,
+            torque: None,
+        }
+    };
+    fit.problem.signals.iter().zip(&all).zip(&fit.noise).map(one).collect()
+}
+
+/// The part of a report that differs from method to method.
+pub trait Report: Serialize + Sized {
+    /// Returns the lines that a terminal shows below the table of estimates.
+    fn lines(found: &Identified<Self>) -> Vec<String>;
+
+    fn sections(_found: &Identified<Self>) -> Sections {
+        Sections::default()
+    }
+}
+
+impl<D: Report> Identified<D> {
+    pub fn lines(&self) -> Vec<String> {
+        D::lines(self)
+    }
+
+    pub fn page(&self) -> String {
+        page::of(self, &D::sections(self))
+    }
+
     pub(crate) fn new(details: D) -> Self {
         Identified {
             parameters: BTreeMap::new(),

@@ -1,6 +1,5 @@
 //! Writes the results of an identification: sentences of the verdict, an HTML page and JSON.
 
-pub mod combination;
 pub mod identified;
 pub mod page;
 pub mod verdict;

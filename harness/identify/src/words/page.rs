@@ -8,11 +8,11 @@ use maud::{Markup, html};
 use report::page::{axis_chart, document, render_chart, series, table};
 use report::svg::{Chart, Style};
 
+use crate::bench::combination::Combination;
 use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::response;
 use crate::tuning::PAGE_POINTS;
-use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::DOUBTS;
 
@@ -170,10 +170,8 @@ fn spectrum(signals: &Residual) -> Chart {
         ),
         series(density(&spectra.input, variance(&signals.residual)), "b", Style::Line, "residual"),
     ];
-    if let Some(white) = signals.noise {
-        let level = white / half.sqrt();
-        lines.push(series(vec![(0.0, level), (half, level)], "a", Style::Dashed, "white noise"));
-    }
+    let level = signals.noise / half.sqrt();
+    lines.push(series(vec![(0.0, level), (half, level)], "a", Style::Dashed, "white noise"));
     axis_chart("Amplitude density", "frequency, Hz", &format!("{}/√Hz", signals.label), lines, true)
 }
 

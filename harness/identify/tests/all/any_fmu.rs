@@ -8,7 +8,7 @@ use host::fmu::Fmu;
 use identify::any_fmu::foresee::foresee;
 use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::system::FmuSystem;
-use identify::any_fmu::{Identification, identify, page};
+use identify::any_fmu::{Identification, identify};
 use identify::bench::options::Options;
 use identify::engine::minimum::End;
 use identify::engine::{Fit, Hold};
@@ -304,8 +304,7 @@ fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
 /// If the environment variable HUBSLOSH_PAGE is set, for example to page.html, the test writes the page to this file.
 #[test]
 fn the_report_of_a_fit_is_a_complete_page() {
-    let found = found(&question(&FREE));
-    let page = page(&found);
+    let page = found(&question(&FREE)).page();
     for words in ["hub.I", "bias(omega)@2", "The model fits", "<svg", "</html>"] {
         assert!(page.contains(words), "{words}");
     }

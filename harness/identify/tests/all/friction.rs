@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use analysis::random::Random;
 use experiments::profile::Torque;
 use host::fmu::Fmu;
+use identify::bench::combination::Combination;
 use identify::bench::identification::Identification;
 use identify::bench::options::Options;
 use identify::bench::simulate::Setup;
@@ -13,7 +14,6 @@ use identify::estimate::Estimated;
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
 use identify::methods::friction;
-use identify::words::combination::Combination;
 use identify::words::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 

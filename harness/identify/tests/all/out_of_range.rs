@@ -7,10 +7,7 @@ use identify::any_fmu::identify;
 use identify::bench::options::Options;
 use identify::input::question::{Question, Solver};
 use identify::input::recording::Recording;
-use identify::methods::free_decay::FreeDecay;
-use identify::methods::friction;
-use identify::methods::output_error::OutputError;
-use identify::methods::{Method, Task};
+use identify::methods::{free_decay, friction, output_error};
 use identify::model::simulate::Model;
 use pack::packed_for_tests;
 
@@ -19,17 +16,13 @@ use crate::solver_noise::{Adaptive, question, record};
 
 fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>)> {
     let recordings = std::slice::from_ref(recording);
-    let task = Task { fmu: Some(fmu), recordings, validation: &[] };
     let said = |error: Option<anyhow::Error>| error.map(|error| format!("{error:#}"));
     vec![
         (
             "friction",
             said(friction::identify(fmu, recordings, &Options::default(), &mut |_| {}).err()),
         ),
-        (
-            "free decay",
-            said(FreeDecay { signal: "omega", clock: 1e-4 }.identify(&task, &mut |_| {}).err()),
-        ),
+        ("free decay", said(free_decay::identify("omega", 1e-4, recordings, &mut |_| {}).err())),
     ]
 }
 
@@ -66,9 +59,8 @@ fn no_method_hangs_or_panics_on_values_out_of_range() {
             let error = error.unwrap_or_else(|| panic!("{method} takes {words}"));
             assert!(error.contains(words), "{method}: {error}");
         }
-        let task = Task { fmu: Some(&fmu), recordings: &[bad], validation: &[] };
-        let method = OutputError { options: Options::default() };
-        assert!(method.identify(&task, &mut |_| {}).is_err(), "{words}");
+        let found = output_error::identify(&fmu, &[bad], &Options::default(), &mut |_| {});
+        assert!(found.is_err(), "{words}");
     }
     // the methods accept values of these sizes: some results are strange, but each method returns
     let sizes: [Change; 6] = [
