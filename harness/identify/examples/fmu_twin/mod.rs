@@ -9,7 +9,6 @@ use host::drive::Inputs;
 use host::fmu::Fmu;
 
 use identify::bench::design::Multisine;
-use identify::bench::simulate::ADDITIONAL_TORQUE;
 use identify::engine::Hold;
 use identify::input::recording::Recording;
 
@@ -160,7 +159,7 @@ impl Twin {
         let omega = reference("omega")?;
         let (mut angle, mut random) = (Vec::new(), Random::new(seed.unwrap_or(0).into(), 1));
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
-        let names = [TORQUE, ADDITIONAL_TORQUE];
+        let names = [TORQUE, names::hubslosh::TAU_EXT];
         let names = if drags { &names[..] } else { &names[..1] };
         let inputs = Inputs::new(fmu.description(), names, held)?;
         let mut steps = 0;

@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use serde::Serialize;
 
 use super::finite;
-use super::system::{FmuSystem, is_known};
+use super::system::FmuSystem;
 use crate::engine::{Fit, PRIOR_ALONE};
 use crate::input::question::Question;
 use crate::input::record::Record;
@@ -103,7 +103,7 @@ pub fn foresee(
             prior,
             unit: unknown.unit.clone(),
             with: with.map(|(k, r)| (problem.unknowns[k].name.clone(), r)),
-            is_parameter: !is_known(unknown) && system.is_parameter(j),
+            is_parameter: !unknown.is_known() && system.is_parameter(j),
         }
     };
     Ok((0..x.len()).map(bound).collect())

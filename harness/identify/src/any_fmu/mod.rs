@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use report::page::table;
 use serde::Serialize;
 
-use crate::engine::knowledge::Inseparable;
+use crate::engine::knowledge::{Inseparable, Knowledge};
 use crate::engine::minimum::{Curvature, places};
 use crate::engine::profile::PARABOLIC;
 use crate::engine::search::{solve, solve_near};
@@ -34,7 +34,7 @@ use crate::news::News;
 use crate::words::identified::{Identified, Report, residuals};
 use crate::words::page::Sections;
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
-use system::{FmuSystem, is_known};
+use system::FmuSystem;
 
 /// Largest distance of the unconstrained minimum beyond a bound, in standard deviations, that chance may explain.
 const PRESSED: f64 = 3.0;
@@ -199,24 +199,26 @@ fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     }
 }
 
-/// A 95 % interval of an estimate. `ended` is true for an end that follows from the likelihood, and false for an end at a bound
-/// of the unknown. `is_quadratic` is true if the likelihood is a parabola within the interval.
-struct Interval {
+/// Uncertainty of one unknown.
+struct Number {
+    std: f64,
+    std_noise: f64,
+    /// 95 % interval. `ended` is true for an end that follows from the likelihood, and false for an end at a bound.
     ends: [f64; 2],
     ended: [bool; 2],
+    /// True if the likelihood is a parabola within the interval.
     is_quadratic: bool,
+    /// True if the estimate is not at a bound.
+    is_inner: bool,
+    is_decided_by_solver: bool,
 }
 
 struct Numbers {
+    each: Vec<Number>,
     covariance: DMatrix<f64>,
-    std: Vec<f64>,
-    std_noise: Vec<f64>,
-    intervals: Vec<Interval>,
     inseparable: Vec<Inseparable>,
-    decided: Vec<bool>,
-    /// Indices of the unknowns at a bound. `pressed` is the subset of them whose unconstrained minimum lies beyond the bound by
-    /// more than [`PRESSED`] standard deviations.
-    held: Vec<usize>,
+    /// Indices of the unknowns at a bound whose unconstrained minimum lies beyond the bound by more than [`PRESSED`] standard
+    /// deviations.
     pressed: Vec<usize>,
     solver: SolverError,
 }
@@ -226,7 +228,7 @@ impl Numbers {
         let unknowns = &solution.fit.problem.unknowns;
         let n = unknowns.len();
         let own = solution.fit.derivatives_at(&mut solution.minimum)?.matrix;
-        let known: Vec<bool> = (0..n).map(|j| is_known(&unknowns[j])).collect();
+        let known: Vec<bool> = (0..n).map(|j| unknowns[j].is_known()).collect();
         let mut jacobian = own.clone();
         let tolerances = solution.fit.derivatives(&solution.minimum.point, &known)?.matrix;
         for j in places(&known) {
@@ -250,75 +252,72 @@ impl Numbers {
             let crossed = jacobian.tr_mul(&jacobian.column(j));
             jacobian.column(j).norm_squared() - crossed.dot(&(&inverse * &crossed))
         };
-        let held: Vec<usize> = (0..n).filter(|j| !is_inner[*j]).collect();
-        let beyond = |j: &&usize| gradient[**j].abs() / curvature(**j).max(0.0).sqrt() > PRESSED;
-        let pressed = held.iter().filter(beyond).copied().collect();
-        let mut std: Vec<f64> = (0..n)
-            .map(|j| match (knowledge.decided_by_solver[j], is_inner[j]) {
-                (true, _) => f64::NAN,
-                (_, true) => (widened * knowledge.covariance[(j, j)].sqrt()).hypot(solver.shift[j]),
-                _ => 1.0 / jacobian.column(j).norm(),
-            })
-            .collect();
-        let std_noise = match known.contains(&true) {
-            true => (0..n).map(|j| alone[(j, j)].sqrt()).collect(),
-            false => std.clone(),
+        let is_pressed = |j: &usize| {
+            !is_inner[*j] && gradient[*j].abs() / curvature(*j).max(0.0).sqrt() > PRESSED
         };
+        let pressed = (0..n).filter(is_pressed).collect();
         let draws = match solution.profile {
             Some(_) => Some(solution.draw(true)?).filter(|draws| draws.has_enough_draws()),
             None => None,
         };
         let z = &solution.minimum.point.z;
-        let mut intervals = Vec::with_capacity(n);
+        let mut each = Vec::with_capacity(n);
         for j in 0..n {
             let (low, high) = unknowns[j].bounds;
-            let parabola = [-1.0, 1.0].map(|sign| z[j] + sign * Z * std[j]);
-            let mut found = Interval { ends: parabola, ended: [true; 2], is_quadratic: true };
-            if !std[j].is_finite() {
-                let ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
-                found = Interval { ends, ended: [false; 2], is_quadratic: false };
-            } else if !is_inner[j] {
+            let (own, is_inner) = (knowledge.covariance[(j, j)].sqrt(), is_inner[j]);
+            let is_decided_by_solver = knowledge.decided_by_solver[j];
+            let std = match (is_decided_by_solver, is_inner) {
+                (true, _) => f64::NAN,
+                (_, true) => (widened * own).hypot(solver.shift[j]),
+                _ => 1.0 / jacobian.column(j).norm(),
+            };
+            let std_noise = if known.contains(&true) { alone[(j, j)].sqrt() } else { std };
+            let parabola = [-1.0, 1.0].map(|sign| z[j] + sign * Z * std);
+            let (ends, ended, is_quadratic) = (parabola, [true; 2], true);
+            let mut found = Number {
+                std,
+                std_noise,
+                ends,
+                ended,
+                is_quadratic,
+                is_inner,
+                is_decided_by_solver,
+            };
+            if !std.is_finite() {
+                found.ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
+                (found.ended, found.is_quadratic) = ([false; 2], false);
+            } else if !is_inner {
                 // from the bound the sum of squares rises by c x² + 2 g x
                 let (c, g) = (curvature(j).max(1e-300), gradient[j].abs());
                 let far = ((g * g + Z * Z * c).sqrt() - g) / c;
                 let is_upper = z[j] >= high;
-                let ends = if is_upper { [z[j] - far, high] } else { [low, z[j] + far] };
-                found = Interval { ends, ended: [is_upper, !is_upper], is_quadratic: false };
+                found.ends = if is_upper { [z[j] - far, high] } else { [low, z[j] + far] };
+                (found.ended, found.is_quadratic) = ([is_upper, !is_upper], false);
             } else if let (Some(draws), false) = (&draws, known[j]) {
                 // errors of the solver and of the search widen the interval
-                let wider = std[j] / knowledge.covariance[(j, j)].sqrt();
-                found.ends = draws.interval(j).map(|end| z[j] + wider * (end - z[j]));
+                found.ends = draws.interval(j).map(|end| z[j] + std / own * (end - z[j]));
                 if let Some((_, open)) =
                     draws.open.as_ref().filter(|(of, _)| *of == unknowns[j].name)
                 {
                     found.ended = open.map(|open| !open);
                 }
-                let off = (0..2).map(|k| (found.ends[k] - parabola[k]).abs() / (Z * std[j]));
+                let off = (0..2).map(|k| (found.ends[k] - parabola[k]).abs() / (Z * std));
                 found.is_quadratic =
                     off.fold(0.0, f64::max) < PARABOLIC && found.ended == [true; 2];
                 let reach = found.ends.map(|end| (end - z[j]).abs() / Z);
-                std[j] = std[j].max(reach[0]).max(reach[1]);
+                found.std = std.max(reach[0]).max(reach[1]);
             }
             for (k, bound) in [low, high].into_iter().enumerate() {
                 let is_beyond = if k == 0 { found.ends[k] < bound } else { found.ends[k] > bound };
-                if is_inner[j] && (is_beyond || !found.ended[k]) && std[j].is_finite() {
+                if is_inner && (is_beyond || !found.ended[k]) && std.is_finite() {
                     let end = if bound.is_finite() { bound } else { found.ends[k] };
                     (found.ends[k], found.ended[k], found.is_quadratic) = (end, false, false);
                 }
             }
-            intervals.push(found);
+            each.push(found);
         }
-        Ok(Numbers {
-            covariance: knowledge.covariance,
-            std,
-            std_noise,
-            intervals,
-            inseparable: knowledge.inseparable,
-            decided: knowledge.decided_by_solver,
-            held,
-            pressed,
-            solver,
-        })
+        let Knowledge { covariance, inseparable, .. } = knowledge;
+        Ok(Numbers { each, covariance, inseparable, pressed, solver })
     }
 }
 
@@ -359,7 +358,7 @@ fn conclude(
     question: &Question,
 ) -> Result<Identification> {
     let numbers = Numbers::from_solution(system, solution)?;
-    let Numbers { covariance, std, solver, .. } = &numbers;
+    let Numbers { each, covariance, solver, .. } = &numbers;
     let problem = solution.fit.problem;
     let unknowns = &problem.unknowns;
     let n = unknowns.len();
@@ -371,7 +370,10 @@ fn conclude(
     let mut found = Identified::new(Details {
         outputs,
         cannot_tell_apart: numbers.inseparable.clone(),
-        decided_by_solver: named(&places(&numbers.decided)),
+        decided_by_solver: (0..n)
+            .filter(|j| each[*j].is_decided_by_solver)
+            .map(|j| names[j].clone())
+            .collect(),
         solver_shift: shifts.collect(),
         deviance: solution.fit.deviance(&minimum.point),
         decrement: minimum.decrement,
@@ -421,23 +423,22 @@ fn conclude(
         ));
     }
     for (j, unknown) in unknowns.iter().enumerate() {
-        let interval = &numbers.intervals[j];
+        let number = &each[j];
         let mut e = Estimated {
             value: minimum.point.z[j],
-            std: finite(std[j]),
-            std_noise: finite(numbers.std_noise[j]),
-            interval: interval.ends.map(finite),
+            std: finite(number.std),
+            std_noise: finite(number.std_noise),
+            interval: number.ends.map(finite),
             determined: false,
             unit: unknown.unit.clone(),
         };
-        if numbers.decided[j] {
+        if number.is_decided_by_solver {
             e.interval = [f64::NAN; 2];
-        } else if is_known(unknown) {
+        } else if unknown.is_known() {
             e.determined = true;
         } else {
-            let is_inner = !numbers.held.contains(&j);
-            say(unknown, &e, interval, is_inner, std[j], &mut found.details, &mut words);
-            e.determined = interval.ends.iter().all(|end| end.is_finite())
+            say(unknown, e.value, number, &mut found.details, &mut words);
+            e.determined = number.ends.iter().all(|end| end.is_finite())
                 && !found.details.not_determined.contains(&unknown.name);
         }
         match system.is_parameter(j) {
@@ -452,14 +453,14 @@ fn conclude(
             false => f64::from(i == j),
         }
     };
-    let (known, asked): (Vec<usize>, Vec<usize>) = (0..n).partition(|j| is_known(&unknowns[*j]));
+    let (known, asked): (Vec<usize>, Vec<usize>) = (0..n).partition(|j| unknowns[*j].is_known());
     let share = |j: usize| {
         let size = |i: &&usize| correlation(**i, j).abs();
         let most = known.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
-        let share = 1.0 - (numbers.std_noise[j] / std[j]).powi(2);
+        let share = 1.0 - (each[j].std_noise / each[j].std).powi(2);
         Some(Share { name: names[j].clone(), share, most: names[*most].clone() })
     };
-    let known_spread = asked.iter().copied().filter(|j| std[*j].is_finite());
+    let known_spread = asked.iter().copied().filter(|j| each[*j].std.is_finite());
     let shares: Vec<Share> = known_spread.filter_map(share).collect();
     let sizes: Vec<String> = known.iter().map(|&j| size(system, unknowns, j)).collect();
     match known.is_empty() {
@@ -506,24 +507,23 @@ const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs a
 
 fn say(
     unknown: &Unknown,
-    e: &Estimated,
-    interval: &Interval,
-    is_inner: bool,
-    std: f64,
+    value: f64,
+    number: &Number,
     details: &mut Details,
     words: &mut Vec<String>,
 ) {
+    let &Number { std, ends, ended, is_quadratic, is_inner, .. } = number;
     let name = &unknown.name;
     let unit = prose(&unknown.unit);
     let unit = if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") };
-    if !std.is_finite() || interval.ended == [false, false] && is_inner {
+    if !std.is_finite() || ended == [false, false] && is_inner {
         details.not_determined.push(name.clone());
         let is_of_a_set =
             |set: &Inseparable| set.direction.len() > 1 && set.direction.contains_key(name);
         if std.is_finite() {
             words.push(format!(
                 "{name} is not determined: any value from {:.4e} to {:.4e}{unit} fits equally well",
-                interval.ends[0], interval.ends[1]
+                ends[0], ends[1]
             ));
         } else if !details.cannot_tell_apart.iter().any(is_of_a_set) {
             words.push(format!("{name} is not determined: no output depends on it by itself"));
@@ -536,29 +536,29 @@ fn say(
         details.not_determined.push(name.clone());
         words.push(format!(
             "{name} is not determined by the recordings: {:.4e} ± {std:.1e}{unit} is the prior ({mean:.4e} ± {beforehand:.1e})",
-            e.value
+            value
         ));
         return;
     }
     if !is_inner {
-        let upper = e.value >= unknown.bounds.1;
+        let upper = value >= unknown.bounds.1;
         let (which, other) = if upper { ("upper", 0) } else { ("lower", 1) };
         details.at_bound.push(name.clone());
         words.push(format!(
             "{name} is at its {which} bound, {}{unit}: the minimum lies beyond it; its 95 % interval reaches from there to \
              {:.4e}{unit}",
-            e.value, interval.ends[other]
+            value, ends[other]
         ));
-    } else if !interval.is_quadratic {
+    } else if !is_quadratic {
         details.not_quadratic.push(name.clone());
-        let open = match interval.ended {
+        let open = match ended {
             [true, true] => String::new(),
             [false, _] => "; its lower end is the bound".into(),
             [_, false] => "; its upper end is the bound".into(),
         };
         words.push(format!(
             "{name}: the likelihood is not a parabola; its 95 % interval is {:.5e} to {:.5e}{unit}{open}",
-            interval.ends[0], interval.ends[1]
+            ends[0], ends[1]
         ));
     }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use anyhow::Result;
 
-use crate::engine::{Drift, Hold, Motion, Part, Problem, Recorded, Role, Signal, System, Unknown};
+use crate::engine::{Drift, Hold, Motion, Problem, Recorded, Role, Signal, System, Unknown};
 use crate::input::question::Question;
 use crate::input::record::Record;
 use crate::model::overridden::{near, refuse};
@@ -22,7 +22,6 @@ pub struct FmuSystem<'a> {
     pub setup: Setup,
     pub records: &'a [Record],
     targets: Vec<(Target, Role)>,
-    names: Vec<(String, String)>,
 }
 
 impl<'a> FmuSystem<'a> {
@@ -39,8 +38,7 @@ impl<'a> FmuSystem<'a> {
         let found = question.unknowns(model.description(), records)?;
         let targets = found.iter().map(|(unknown, target)| (*target, unknown.role)).collect();
         let (unknowns, _): (Vec<Unknown>, Vec<Target>) = found.into_iter().unzip();
-        let names = unknowns.iter().map(|u| (u.name.clone(), u.unit.clone())).collect();
-        Ok((FmuSystem { model, setup, records, targets, names }, unknowns))
+        Ok((FmuSystem { model, setup, records, targets }, unknowns))
     }
 
     pub fn is_parameter(&self, j: usize) -> bool {
@@ -115,8 +113,8 @@ impl<'a> FmuSystem<'a> {
         let mut systems: Vec<FmuSystem> = Vec::new();
         for (setup, model) in &finer {
             let (model, setup) = (model.as_ref().unwrap_or(self.model), setup.clone());
-            let (targets, names) = (self.targets.clone(), self.names.clone());
-            systems.push(FmuSystem { model, setup, records: self.records, targets, names });
+            let targets = self.targets.clone();
+            systems.push(FmuSystem { model, setup, records: self.records, targets });
         }
         let systems: Vec<&dyn System> = systems.iter().map(|s| s as &dyn System).collect();
         use_them(&systems)
@@ -173,16 +171,4 @@ impl System for FmuSystem<'_> {
         let outputs = self.setup.run(self.model, &reals, recording, &record)?;
         Ok(Motion { outputs, ..Motion::default() })
     }
-
-    fn derived(&self) -> Vec<(String, String)> {
-        self.names.clone()
-    }
-
-    fn derive(&self, values: &[f64]) -> Option<Vec<f64>> {
-        Some(values.to_vec())
-    }
-}
-
-pub fn is_known(unknown: &Unknown) -> bool {
-    unknown.part == Part::Tolerance
 }

@@ -20,7 +20,7 @@ use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
 use crate::engine::minimum::{Curvature, places};
-use crate::engine::{ENDS, Fit, Part, Signal, Solution, Z};
+use crate::engine::{ENDS, Fit, Signal, Solution, Z};
 use crate::estimate::{Estimated, fit_percent, mean_square, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
@@ -74,7 +74,6 @@ pub fn validate(
             recordings: std::slice::from_ref(recording),
             settings: system.settings.clone(),
             targets: system.targets.clone(),
-            derived: system.derived.clone(),
             base: std::sync::OnceLock::new(),
             ..*system
         };
@@ -145,7 +144,7 @@ pub fn conclude(
     let mut verdict = verdict::words(question, &findings, &fit, &combinations, &parameters);
     let unknowns = &solution.fit.problem.unknowns;
     let held = unknowns.iter().zip(&solution.fit.free);
-    let held = held.filter(|(u, free)| u.part == Part::Tolerance && !**free);
+    let held = held.filter(|(u, free)| u.is_known() && !**free);
     let known = held.filter_map(|(u, _)| Some((u.name.as_str(), u.prior?.1)));
     verdict.extend(shares(&full, &own, known));
     verdict.extend(shown(system, solution, &full, &mut parameters));
@@ -376,7 +375,7 @@ fn shown(
         let (Some((_, prior)), Some((name, draws))) = (unknown.prior, found) else { continue };
         let relative = deviation(draws);
         // the recordings contain at least as much information as the tolerance
-        if !free[j] || unknown.part != Part::Tolerance || relative > FRAC_1_SQRT_2 * prior {
+        if !free[j] || !unknown.is_known() || relative > FRAC_1_SQRT_2 * prior {
             continue;
         }
         let (nominal, unit) = match &system.targets[j] {

@@ -74,8 +74,7 @@ pub fn words(target: &Target) -> String {
             return format!("a wrong value of {name}");
         }
         Target::ProportionalTorque(kind) => {
-            let follows = ADDITIONAL_TORQUES.get(*kind).map_or("the motion", |one| one.follows);
-            return format!("a torque that follows {follows}");
+            return format!("a torque that follows {}", ADDITIONAL_TORQUES[*kind].0);
         }
         _ => "an effect",
     }
@@ -122,13 +121,13 @@ pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
 /// quantity of the motion.
 pub fn missing(system: &BenchSystem, effect: &Effect) -> Option<Missing> {
     let Target::ProportionalTorque(kind) = &system.targets[effect.unknown] else { return None };
-    let one = ADDITIONAL_TORQUES.get(*kind)?;
+    let (follows, unit, _) = ADDITIONAL_TORQUES[*kind];
     let (factor, std) = effect.size;
     Some(Missing {
-        follows: one.follows.into(),
+        follows: follows.into(),
         factor,
         std,
-        unit: one.unit.into(),
+        unit: unit.into(),
         deviations: (factor / std).abs(),
     })
 }

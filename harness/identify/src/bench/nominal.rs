@@ -88,7 +88,9 @@ impl Start {
 pub struct Nominal {
     pub bench: Bench,
     pub start: Start,
+    /// Inertia of the hub with all liquid as a rigid body, kg·m².
     pub inertia: f64,
+    /// Period of the first slosh mode, s.
     pub period: f64,
 }
 
@@ -115,11 +117,6 @@ pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>>
     let mut instance = initialised(fmu, settings)?;
     instance.exit_initialization_mode()?;
     Ok(instance.take_warnings())
-}
-
-/// Returns true if the settings state the amount of liquid in the tank, or that the tank is empty.
-pub fn states_liquid(settings: &[(String, String)]) -> bool {
-    settings.iter().any(|(name, _)| [tank::H, fluid::RHO].contains(&name.as_str()))
 }
 
 /// Adds `slosh.zeta_from_correlation = false` to settings that have `slosh.zeta`, because the damping ratio has no effect

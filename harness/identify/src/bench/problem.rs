@@ -8,14 +8,15 @@ use anyhow::{Result, ensure};
 use host::causality::Causality;
 use host::description::Type;
 use host::fmu::Fmu;
-use names::hubslosh::{FrictionModel, SloshModel, friction, hub, init, slosh, tank, wheel};
+use names::hubslosh::{
+    FrictionModel, SloshModel, TAU_EXT, friction, hub, init, slosh, tank, wheel,
+};
 
 use super::combination;
-use super::system::{ADDITIONAL_TORQUES, BenchSystem, ProportionalTorque, Target};
+use super::system::{ADDITIONAL_TORQUES, BenchSystem, Target};
 use crate::bench::breaking;
 use crate::bench::nominal::{self, Nominal, PARAMETERS, Start};
 use crate::bench::options::Options;
-use crate::bench::simulate::ADDITIONAL_TORQUE;
 use crate::engine::{Drift, Hold, Part, Problem, Recorded, Role, Signal, Unknown};
 use crate::input::recording::Recording;
 use crate::input::tolerance;
@@ -259,8 +260,7 @@ pub fn system<'a>(
         let part = if nonlinear || has_encoder { Part::Free } else { Part::Tolerance };
         list.add(Target::GyroScale, Unknown { part, ..scale.with_prior(0.0, std) });
     }
-    let derived: Vec<(String, String)> =
-        list.unknowns.iter().map(|u| (u.name.clone(), u.unit.clone())).collect();
+    let derived = list.unknowns.len();
     let targets = [Target::Torque, Target::Clock, Target::Gravity, Target::Arm, Target::Density];
     let is_recorded = recordings.iter().any(|r| r.gravity.is_some());
     for ((target, name), std) in
@@ -358,7 +358,7 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
         Target::Compliance => ("compliance", "rad/(N.m)", 1e-2, (0.0, 10.0)),
         Target::SecondMode => ("second mode", "1", 1.0, (0.0, 3.0)),
         Target::ProportionalTorque(kind) => {
-            let ProportionalTorque { follows, unit, .. } = ADDITIONAL_TORQUES[*kind];
+            let (follows, unit, _) = ADDITIONAL_TORQUES[*kind];
             (follows, unit, 1e-4, (f64::NEG_INFINITY, f64::INFINITY))
         }
         _ => ("effect", "1", 1.0, (0.0, 1.0)),
@@ -401,7 +401,7 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
         let unknown = Unknown { part: Part::Candidate, ..unknown };
         all.push((Target::Stated(name.clone()), unknown));
     }
-    if list.fmu.description().variable(ADDITIONAL_TORQUE).is_ok() {
+    if list.fmu.description().variable(TAU_EXT).is_ok() {
         let torques = (0..ADDITIONAL_TORQUES.len()).map(Target::ProportionalTorque);
         all.extend(torques.map(|target| (target.clone(), effect(&target, Part::Candidate))));
     }

@@ -15,9 +15,6 @@ use crate::input::recording::{Recording, masked};
 use crate::model::simulate::most_steps;
 use crate::tuning::SAME_INSTANT;
 
-/// The FMU's input for a torque on the hub in addition to the actuator's.
-pub const ADDITIONAL_TORQUE: &str = TAU_EXT;
-
 /// The FMU's parameters that are multiplied by a drift of the friction.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
@@ -27,14 +24,6 @@ pub struct Motion {
     pub rate: Vec<f64>,
     pub acceleration: Vec<f64>,
     pub slosh_angle: Vec<f64>,
-}
-
-/// The quantities of a [`Motion`] that a run reads from the FMU in every row; all others stay empty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Read {
-    All,
-    /// Only angle and rate, for finite differences. Both are states, so that the FMU does not have to compute its outputs.
-    States,
 }
 
 /// Returns corrected samples of a smooth signal, so that linear interpolation between them has the same effect as the
@@ -105,11 +94,12 @@ impl Setup {
         recording: &Recording,
         delay: f64,
     ) -> Result<Motion> {
-        self.run_under(fmu, values, recording, delay, &Effects::default(), Read::All)
+        self.run_under(fmu, values, recording, delay, &Effects::default(), true)
     }
 
-    /// Simulates the FMU as [`Setup::run`] does, with effects that the FMU does not model, and returns the quantities `read` of
-    /// the motion. If the gyro has a filter, the returned rate is the output of this filter.
+    /// Simulates the FMU as [`Setup::run`] does, with effects that the FMU does not model. If the gyro has a filter, the returned
+    /// rate is the output of this filter. Unless `whole` is true, only angle and rate are returned, as finite differences need
+    /// them: both are states, so that the FMU does not have to compute its outputs.
     pub fn run_under(
         &self,
         fmu: &Fmu,
@@ -117,7 +107,7 @@ impl Setup {
         recording: &Recording,
         delay: f64,
         effects: &Effects,
-        read: Read,
+        whole: bool,
     ) -> Result<Motion> {
         let time = &recording.time;
         let span = time[time.len() - 1] - time[0];
@@ -156,7 +146,7 @@ impl Setup {
         let additional = effects.torque.map(at_knots);
         let mut driven = vec![(TAU_CMD, torque.as_slice())];
         driven.extend(gravity.as_ref().map(|gravity| (G_AXIAL, gravity.as_slice())));
-        driven.extend(additional.as_ref().map(|torque| (ADDITIONAL_TORQUE, torque.as_slice())));
+        driven.extend(additional.as_ref().map(|torque| (TAU_EXT, torque.as_slice())));
         let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let inputs = Inputs::new(fmu.description(), &names, held)?;
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
@@ -170,10 +160,7 @@ impl Setup {
 
         let outputs =
             [reference(THETA)?, reference(OMEGA)?, reference(OMEGA_DOT)?, reference(SLOSH_ANGLE)?];
-        let outputs = match read {
-            Read::All => &outputs[..],
-            Read::States => &outputs[..2],
-        };
+        let outputs = if whole { &outputs[..] } else { &outputs[..2] };
         let mut motion = Motion::default();
         // `row` is the next row to be read; the signals are linear from `knot` to the next knot
         let (mut row, mut knot) = (0, 0);
@@ -188,7 +175,7 @@ impl Setup {
                 instance.get_real(outputs, &mut values[..outputs.len()])?;
                 motion.angle.push(values[0]);
                 motion.rate.push(values[1]);
-                if read == Read::All {
+                if whole {
                     motion.acceleration.push(values[2]);
                     motion.slosh_angle.push(values[3]);
                 }

@@ -23,7 +23,7 @@ use names::hubslosh::{FrictionModel, SloshSource, friction, hub, slosh, tank, wh
 
 use crate::bench::effect::Effects;
 use crate::bench::nominal::Bench;
-use crate::bench::simulate::{self, Read, Setup};
+use crate::bench::simulate::{self, Setup};
 use crate::engine::{Hold, Motion, System};
 use crate::input::recording::Recording;
 
@@ -77,39 +77,19 @@ pub struct Row {
     pub slosh_angle: f64,
 }
 
-/// An additional torque that is proportional to a quantity of the motion, with the unit of its factor.
-pub struct ProportionalTorque {
-    pub follows: &'static str,
-    pub unit: &'static str,
-    /// The torque in one row of the recording for a factor of 1.
-    pub torque: fn(&Row) -> f64,
-}
+/// An additional torque: the quantity of the motion that it follows, the unit of its factor, and the torque in one row of the
+/// recording for a factor of 1.
+pub type ProportionalTorque = (&'static str, &'static str, fn(&Row) -> f64);
 
 /// Additional torques that may act on a bench and that the FMU does not model.
 pub const ADDITIONAL_TORQUES: [ProportionalTorque; 7] = [
-    ProportionalTorque { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
-    ProportionalTorque {
-        follows: "the rate's square against the motion",
-        unit: "N.m.s2/rad2",
-        torque: |row| row.rate * row.rate.abs(),
-    },
-    ProportionalTorque { follows: "the angle", unit: "N.m/rad", torque: |row| row.angle },
-    ProportionalTorque {
-        follows: "the angle's square",
-        unit: "N.m/rad2",
-        torque: |row| row.angle * row.angle,
-    },
-    ProportionalTorque {
-        follows: "the slosh angle",
-        unit: "N.m/rad",
-        torque: |row| row.slosh_angle,
-    },
-    ProportionalTorque { follows: "time", unit: "N.m/s", torque: |row| row.time },
-    ProportionalTorque {
-        follows: "the commanded torque's square with its sign",
-        unit: "1/(N.m)",
-        torque: |row| row.torque * row.torque.abs(),
-    },
+    ("the rate", "N.m.s/rad", |row| row.rate),
+    ("the rate's square against the motion", "N.m.s2/rad2", |row| row.rate * row.rate.abs()),
+    ("the angle", "N.m/rad", |row| row.angle),
+    ("the angle's square", "N.m/rad2", |row| row.angle * row.angle),
+    ("the slosh angle", "N.m/rad", |row| row.slosh_angle),
+    ("time", "N.m/s", |row| row.time),
+    ("the commanded torque's square with its sign", "1/(N.m)", |row| row.torque * row.torque.abs()),
 ];
 
 pub struct BenchSystem<'a> {
@@ -118,10 +98,13 @@ pub struct BenchSystem<'a> {
     pub settings: Vec<(String, String)>,
     pub bench: Bench,
     pub targets: Vec<Target>,
-    pub derived: Vec<(String, String)>,
+    /// Number of unknowns that users see; known values and candidate effects follow them.
+    pub derived: usize,
     /// Direction of rotation of a hub that turns in one direction only, 1 or −1; 0 if it turns in both.
     pub way: f64,
+    /// Largest absolute torque of the recordings, N·m.
     pub largest: f64,
+    /// Motion at the minimum of each recording, from which additional torques are computed.
     pub base: OnceLock<Vec<Motion>>,
 }
 
@@ -184,7 +167,7 @@ impl BenchSystem<'_> {
                 rate: motion.outputs[0][k],
                 slosh_angle: motion.others[0][k],
             };
-            sizes.iter().map(|(kind, size)| size * (ADDITIONAL_TORQUES[*kind].torque)(&row)).sum()
+            sizes.iter().map(|(kind, size)| size * (ADDITIONAL_TORQUES[*kind].2)(&row)).sum()
         };
         Some((0..recorded.time.len()).map(torque).collect())
     }
@@ -263,8 +246,7 @@ impl System for BenchSystem<'_> {
         let setup = Setup { settings, intersample: hold };
         let reals: Vec<(&str, f64)> = reals.iter().map(|(name, v)| (name.as_str(), *v)).collect();
         let delay = of(Target::Delay, 0.0);
-        let read = if whole { Read::All } else { Read::States };
-        let found = setup.run_under(self.fmu, &reals, &acting, delay, &effects, read)?;
+        let found = setup.run_under(self.fmu, &reals, &acting, delay, &effects, whole)?;
         let turned = acting.angle.is_some().then(|| {
             let lead = delay - of(Target::AngleDelay, delay);
             simulate::angle_and_rate_at(&acting.time, &found, lead)
@@ -281,8 +263,8 @@ impl System for BenchSystem<'_> {
         })
     }
 
-    fn derived(&self) -> Vec<(String, String)> {
-        self.derived.clone()
+    fn derived(&self, _: usize) -> usize {
+        self.derived
     }
 
     fn derive(&self, values: &[f64]) -> Option<Vec<f64>> {
@@ -303,6 +285,6 @@ impl System for BenchSystem<'_> {
             (Target::GyroScale, _) => 1.0 + value,
             _ => *value,
         };
-        Some(self.targets.iter().zip(values).take(self.derived.len()).map(one).collect())
+        Some(self.targets.iter().zip(values).take(self.derived).map(one).collect())
     }
 }

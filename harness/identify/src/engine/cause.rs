@@ -56,7 +56,7 @@ struct Score {
 /// If the system refuses the minimum.
 fn scores(fit: &mut Fit, minimum: &Minimum, candidates: &[usize]) -> Result<Vec<Score>> {
     let unknowns = &fit.problem.unknowns;
-    let is_known = |(u, free): (&Unknown, &bool)| *free || u.part == Part::Tolerance;
+    let is_known = |(u, free): (&Unknown, &bool)| *free || u.is_known();
     let known: Vec<bool> = unknowns.iter().zip(&minimum.free).map(is_known).collect();
     let base = &minimum.point;
     let jacobian = fit.derivatives(base, &known)?.matrix;

@@ -11,7 +11,7 @@ use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 
 use super::minimum::{Curvature, places};
-use super::problem::{Part, Role};
+use super::problem::Role;
 use super::profile::{Curve, OPEN, Point};
 use super::{Fit, Solution};
 
@@ -52,7 +52,7 @@ impl Solution<'_> {
     pub fn draw(&mut self, with_tolerances: bool) -> Result<Derived> {
         let unknowns = &self.fit.problem.unknowns;
         let is_known: Vec<bool> =
-            unknowns.iter().map(|u| with_tolerances && u.part == Part::Tolerance).collect();
+            unknowns.iter().map(|u| with_tolerances && u.is_known()).collect();
         let tolerances = self.fit.derivatives(&self.minimum.point, &is_known)?;
         let means = self.fit.derivatives_at(&mut self.minimum)?.means + &tolerances.means;
         let bent = self.profile.as_ref().map(|(j, _)| *j);
@@ -123,11 +123,11 @@ impl Solution<'_> {
         let near: Vec<&super::hold::Rival> = self.rivals.iter().filter(|r| r.is_near()).collect();
         let weights: Vec<f64> = near.iter().map(|r| (-0.5 * r.more).exp()).collect();
         let total = 1.0 + weights.iter().sum::<f64>();
-        let names = problem.system.derived();
+        let quantities = &unknowns[..problem.system.derived(n)];
         let mut found = Derived {
-            names: names.iter().map(|(name, _)| name.clone()).collect(),
-            units: names.iter().map(|(_, unit)| unit.clone()).collect(),
-            columns: vec![Vec::with_capacity(DRAWS); names.len()],
+            names: quantities.iter().map(|u| u.name.clone()).collect(),
+            units: quantities.iter().map(|u| u.unit.clone()).collect(),
+            columns: vec![Vec::with_capacity(DRAWS); quantities.len()],
             tolerances: places(is_known)
                 .into_iter()
                 .map(|j| (unknowns[j].name.clone(), Vec::new()))

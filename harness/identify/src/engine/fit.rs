@@ -49,6 +49,7 @@ pub struct Derivatives {
     /// Jacobian of `Point::e` with a column for each unknown. The column is 0 if the derivative by this
     /// unknown was not requested.
     pub matrix: DMatrix<f64>,
+    /// Mean change of the model over the rows of each signal (row) per unit of each unknown (column).
     pub means: DMatrix<f64>,
 }
 

@@ -7,8 +7,8 @@
 use anyhow::Result;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::KEPT;
 use super::fit::{Derivatives, Fit, Point};
+use super::{KEPT, SETS, WIDER};
 
 #[derive(Clone, Debug)]
 pub struct Minimum {
@@ -49,11 +49,6 @@ const FLAT: f64 = 1e-12;
 /// A direction counts as resolved if its eigenvalue is at least this many times the eigenvalue that errors of the
 /// derivatives cause by chance.
 const RESOLVED: f64 = 4.0;
-/// Largest number of damping factors that are tried with one Jacobian.
-const TRIES: usize = 8;
-/// Factor by which the damping grows after a step that fails, and shrinks after a step with more than half
-/// of its forecast decrease.
-const DAMPING: f64 = 8.0;
 
 /// The curvature JᵀJ of a sum of squares, scaled to a unit diagonal.
 pub struct Curvature {
@@ -272,7 +267,7 @@ impl Fit<'_> {
                 break;
             }
             let mut outcome = None;
-            for _ in 0..TRIES {
+            for _ in 0..SETS {
                 let scaled = curvature.solve(&b, &all, damping);
                 let mut step = vec![0.0; n];
                 for (k, &j) in which.iter().enumerate() {
@@ -315,14 +310,14 @@ impl Fit<'_> {
                         jacobian.ger(1.0 / size, &off, &own, 1.0);
                     }
                     if gain > 0.5 {
-                        damping = (damping / DAMPING).max(1e-7);
+                        damping = (damping / WIDER).max(1e-7);
                     }
                     point = there;
                     fresh = false;
                     outcome = Some(gain > KEPT);
                     break;
                 }
-                damping = (damping * DAMPING).max(1e-4);
+                damping = (damping * WIDER).max(1e-4);
                 if !fresh {
                     outcome = Some(false);
                     break;

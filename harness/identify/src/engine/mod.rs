@@ -49,7 +49,8 @@ pub const STEPS: (f64, f64) = (1e-7, 0.2);
 /// Ratio of the second to the first difference above which errors of the solver may dominate a derivative. Without any signal,
 /// these errors make the ratio √3.
 pub const BEND: f64 = 0.3;
-/// Factor from one step of a finite difference to the next wider one, which is tried if the ratio is above [`BEND`].
+/// Factor between two values that are tried one after the other: steps of a finite difference if the ratio is above [`BEND`], and
+/// damping factors of Levenberg–Marquardt steps.
 pub const WIDER: f64 = 8.0;
 /// Distance to the minimum, in standard deviations, at which a search ends: 0.5 while starts are compared, and 0.02 in the last
 /// search, whose result is reported.
@@ -57,7 +58,8 @@ pub const ENDS: (f64, f64) = (0.5, 0.02);
 /// Factors of the noise in successive searches over the whole recordings. A large factor gives the priors more weight, so that a
 /// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];
-/// Largest number of Jacobians that a search computes.
+/// Largest number of turns of a loop that ends earlier as a rule: Jacobians of a search, damping factors with one Jacobian,
+/// alternations between noise and minimum, and doublings of a distance.
 pub const SETS: usize = 8;
 /// Decrease of the sum of squares below which another Jacobian is not worth its simulations, and below which two minima
 /// count as equally low.

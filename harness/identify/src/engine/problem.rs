@@ -120,9 +120,14 @@ impl Unknown {
         (end(self.bounds.0), end(self.bounds.1))
     }
 
+    /// Returns true for a known value with a tolerance.
+    pub fn is_known(&self) -> bool {
+        self.part == Part::Tolerance
+    }
+
     /// Returns true for a known value with a tolerance that affects the simulated outputs.
     pub fn is_held(&self) -> bool {
-        self.part == Part::Tolerance && self.role != Role::Derived
+        self.is_known() && self.role != Role::Derived
     }
 
     /// Returns true if the unknown affects the outputs of this recording.
@@ -193,11 +198,16 @@ pub trait System: Sync {
         whole: bool,
     ) -> Result<Motion>;
 
-    fn derived(&self) -> Vec<(String, String)>;
+    /// Returns the number of quantities that [`System::derive`] computes. They have the names and units of the first unknowns.
+    fn derived(&self, unknowns: usize) -> usize {
+        unknowns
+    }
 
     /// Returns the quantities that users ask for, such as the tank and the inertia of the hub, from the values of all unknowns;
     /// `None` if the values are impossible.
-    fn derive(&self, values: &[f64]) -> Option<Vec<f64>>;
+    fn derive(&self, values: &[f64]) -> Option<Vec<f64>> {
+        Some(values.to_vec())
+    }
 }
 
 /// Recordings that are fitted together, the unknowns, and the simulated system.

@@ -280,14 +280,6 @@ mod tests {
             let torque = self.0[..rows].iter().map(|w| v[0] + v[1] * shape(*w, v[2]));
             Ok(Motion { outputs: vec![torque.collect()], ..Motion::default() })
         }
-
-        fn derived(&self) -> Vec<(String, String)> {
-            Vec::new()
-        }
-
-        fn derive(&self, _: &[f64]) -> Option<Vec<f64>> {
-            None
-        }
     }
 
     /// For a given ω_s the friction is linear in c and d, so that the sum of squares along ω_s has a closed form.

@@ -22,12 +22,9 @@ const BEGINNING_NOISE: f64 = 0.03;
 /// Ratio of the residual's white noise to the noise between neighbouring rows, above which the residual is more than
 /// noise of the sensor.
 pub(super) const ABOVE: f64 = 1.5;
-/// Largest number of alternations between noise and minimum, and the sum of squares per row above which the alternation ends. The
-/// sum of squares per row is 1 if the noise matches the residual.
-const TURNS: usize = 8;
+/// Sum of squares per row above which the alternation between noise and minimum ends. The sum of squares per row is 1 if the noise
+/// matches the residual.
 const SETTLED: f64 = 0.98;
-/// Largest number of doublings of the distance at which the likelihood on one side of an initial value is examined.
-const LOOKS: usize = 8;
 /// First distance at which the likelihood on one side of an initial value is examined, standard deviations.
 const FAR: f64 = 3.0;
 /// Ratio of the square root of the likelihood's rise to the square root of a parabola's rise at the distance `FAR`. Below this
@@ -294,7 +291,7 @@ impl Fit<'_> {
     /// Returns the distance of all known values from their stated values: the root of the sum of squares of their differences,
     /// each over its standard deviation.
     pub fn pull(&self, z: &[f64]) -> f64 {
-        let known = self.problem.unknowns.iter().zip(z).filter(|(u, _)| u.part == Part::Tolerance);
+        let known = self.problem.unknowns.iter().zip(z).filter(|(u, _)| u.is_known());
         let own = known.filter_map(|(u, z)| u.prior.map(|(mean, std)| ((z - mean) / std).powi(2)));
         own.sum::<f64>().sqrt()
     }
@@ -371,7 +368,7 @@ impl Fit<'_> {
         let (mut once, mut profile) = (false, None);
         let rows = self.sampled();
         for _ in 0..ROUNDS {
-            for turn in 0..TURNS {
+            for turn in 0..SETS {
                 let before = self.noise.clone();
                 self.renew_noise(&minimum.point);
                 if turn > 0 && self.noise.iter().zip(before).all(|(n, b)| n.white == b.white) {
@@ -479,7 +476,7 @@ impl Fit<'_> {
                 (cost - minimum.point.cost).max(0.0).sqrt()
             };
             let (mut near, mut far, mut now) = ((0.0, 0.0), FAR, rise(FAR));
-            for _ in 0..LOOKS {
+            for _ in 0..SETS {
                 if now > KINKED * FAR {
                     break;
                 }
@@ -581,9 +578,7 @@ impl Fit<'_> {
                 self.inflation = inflation;
                 let sets = if inflation > 1.0 { SETS } else { SETS / 2 };
                 let end = End { gain: ALIKE, ..End::new(sets, ENDS.0) };
-                let searched = self.minimise(&z, &free, None, end);
-                self.inflation = 1.0;
-                let minimum = searched?;
+                let minimum = self.minimise(&z, &free, None, end)?;
                 z.clone_from(&minimum.point.z);
                 if inflation == INFLATIONS[1] {
                     self.renew_noise(&minimum.point);

@@ -63,14 +63,6 @@ impl System for Oscillation<'_> {
         let signal = free_decay::model(&self.0[recording].time[..rows], four(0), four(own));
         Ok(Motion { outputs: vec![signal], ..Motion::default() })
     }
-
-    fn derived(&self) -> Vec<(String, String)> {
-        Vec::new()
-    }
-
-    fn derive(&self, _: &[f64]) -> Option<Vec<f64>> {
-        None
-    }
 }
 
 fn problem<'a>(

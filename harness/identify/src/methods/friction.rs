@@ -43,7 +43,9 @@ pub fn identify(
         friction: vec![FrictionModel::Stribeck.name().into()],
         ..options.clone()
     };
-    let is_assumed = !nominal::states_liquid(&options.settings);
+    let states_liquid =
+        |(name, _): &(String, String)| [tank::H, fluid::RHO].contains(&name.as_str());
+    let is_assumed = !options.settings.iter().any(states_liquid);
     if is_assumed {
         options.settings.extend(empty());
     }

@@ -61,11 +61,10 @@ impl Question {
                 )),
             }
         }
-        let is_known = |u: &Unknown| u.part == Part::Tolerance;
         for (k, (unknown, target)) in unknowns.iter().enumerate() {
             let before = &unknowns[..k];
             if let Some((other, _)) = before.iter().find(|(other, _)| other.name == unknown.name) {
-                problems.push(match (is_known(unknown), is_known(other)) {
+                problems.push(match (unknown.is_known(), other.is_known()) {
                     (true, false) => format!(
                         "--tolerance {}: --free names this value as an unknown (allowed: --prior, with its mean and standard deviation)",
                         unknown.name
