@@ -15,7 +15,7 @@ use identify::model::simulate::Model;
 use signals::recording::Columns;
 use signals::table::Table;
 
-use super::estimates::{Out, deviation, print_estimates};
+use super::estimates::{Out, deviation};
 use crate::terminal;
 
 /// Options for fitting any FMU.

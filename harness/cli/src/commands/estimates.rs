@@ -80,7 +80,7 @@ impl Out<'_> {
     }
 }
 
-pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
+fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {
         let percent =

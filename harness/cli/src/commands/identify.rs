@@ -257,6 +257,9 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     Ok(arguments)
 }
 
+/// A fit of the bench, for example [`output_error::identify`].
+type Identify = fn(&Fmu, &[Recording], &Options, &mut dyn FnMut(&News)) -> Result<Identification>;
+
 fn parse_start(text: &str) -> Result<(String, f64, Option<f64>)> {
     let (name, numbers) = setting(text)?;
     let number = |text: &str| text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
@@ -409,7 +412,7 @@ impl KnownArgs {
 
     fn identify_and_print(
         &self,
-        identify: fn(&Fmu, &[Recording], &Options, &mut dyn FnMut(&News)) -> Result<Identification>,
+        identify: Identify,
         options: Options,
         data: &DataArgs,
     ) -> Result<()> {
