@@ -14,6 +14,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 
 /// Definition of a unit: exponents of the SI base units, factor and offset.
 pub type Base = ([i32; 8], f64, f64);
@@ -68,12 +69,26 @@ pub fn object(py: Python, value: Value) -> PyResult<Py<PyAny>> {
 }
 
 /// A value from Python.
-#[derive(FromPyObject)]
 pub enum Given {
     Boolean(bool),
     Integer(i64),
     Real(f64),
     String(String),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Given {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'a, 'py, PyAny>) -> PyResult<Given> {
+        // Most values are floats. To try the other types first would take longer than to set the value.
+        if let Ok(x) = value.cast::<PyFloat>() {
+            return Ok(Given::Real(x.value()));
+        }
+        let integer = || value.extract().map(Given::Integer);
+        let real = |_| value.extract().map(Given::Real);
+        let text = |_| value.extract().map(Given::String);
+        value.extract().map(Given::Boolean).or_else(|_| integer()).or_else(real).or_else(text)
+    }
 }
 
 impl Given {

@@ -184,8 +184,8 @@ class Plant(Instance):
 
     Parameters
     ----------
-    fmu : str or Path
-        File of an FMU, or the name of one of this package.
+    fmu : str, Path or Fmu
+        File of an FMU, the name of one of this package, or an FMU that is already open.
     settings : mapping, optional
         Values of parameters and start values by name, as `Fmu.convert` takes them.
     tolerance : float, optional
@@ -225,7 +225,7 @@ class Plant(Instance):
 
     def __init__(
         self,
-        fmu: Path | str,
+        fmu: Path | str | Fmu,
         settings: Parameters | None = None,
         *,
         tolerance: float | None = None,
@@ -234,7 +234,8 @@ class Plant(Instance):
         inputs: Mapping[str, float] | None = None,
         torque: float | None = None,
     ) -> None:
-        super().__init__(Fmu.open(fmu))
+        """Instantiate the FMU and initialise it."""
+        super().__init__(fmu if isinstance(fmu, Fmu) else Fmu.open(fmu))
         self.time = start
         """Present time, s."""
         if torque is not None:

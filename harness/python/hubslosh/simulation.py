@@ -249,20 +249,19 @@ def record_run(
     asked = [name for name in dict.fromkeys([*columns, *limits]) if name not in known]
     inputs = dict(constants) | {name: value[0] for name, value in given.items()}
     with Plant(
-        model, parameters, tolerance=tolerance, start=start, stop=stop, inputs=inputs
+        fmu, parameters, tolerance=tolerance, start=start, stop=stop, inputs=inputs
     ) as plant:
         found = plant.run(points, given, slopes, asked, feedback, wanted)
     every = {"time": points} | computed() | given | found
-    rows = slice(None) if wanted is None else wanted
+    if wanted is not None:
+        every = {name: of[wanted] for name, of in every.items()}
     read = {
-        name: np.ascontiguousarray(every[name][rows], float)
+        name: np.ascontiguousarray(every[name], float)
         for name in ("time", *limits)
         if name in every
     }
     shown = {name: of for name, of in every.items() if name in columns or name not in limits}
     table = Run(shown, copy=False)
-    if wanted is not None:
-        table = table[wanted].reset_index(drop=True)
     units = {"time": "s", **units}
     table.attrs["units"] = Noted(
         (name, units[name] if name in units else fmu.unit(name)) for name in table.columns
