@@ -4,6 +4,8 @@
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::fmt::Display;
+use core::format_args as lazy;
 use formulas::cylinder;
 use taylor::integrator::Steps;
 use taylor::vector::{
@@ -517,12 +519,12 @@ impl Tank {
 
 impl Appendage {
     fn find_problems(&self, name: &str, problems: &mut Problems) {
-        problems.vector(&format!("{name}.position"), &self.position, "m");
-        problems.number(&format!("{name}.frequency"), self.frequency, 1e-6, 1e6, "Hz");
-        problems.number(&format!("{name}.zeta"), self.zeta, 0.0, 10.0, "");
-        problems.vector(&format!("{name}.participation"), &self.participation, "kg^0.5, kg^0.5.m");
-        problems.vector(&format!("{name}.eta_0"), &[self.eta], "kg^0.5.m");
-        problems.vector(&format!("{name}.eta_dot_0"), &[self.eta_dot], "kg^0.5.m/s");
+        problems.vector(lazy!("{name}.position"), &self.position, "m");
+        problems.number(lazy!("{name}.frequency"), self.frequency, 1e-6, 1e6, "Hz");
+        problems.number(lazy!("{name}.zeta"), self.zeta, 0.0, 10.0, "");
+        problems.vector(lazy!("{name}.participation"), &self.participation, "kg^0.5, kg^0.5.m");
+        problems.vector(lazy!("{name}.eta_0"), &[self.eta], "kg^0.5.m");
+        problems.vector(lazy!("{name}.eta_dot_0"), &[self.eta_dot], "kg^0.5.m/s");
     }
 }
 
@@ -720,25 +722,26 @@ pub(crate) fn steps_problem(max_steps: usize) -> Option<String> {
     (max_steps == 0).then(|| "solver.max_steps = 0 (allowed: 1 and above)".into())
 }
 
+/// Messages about wrong parameters. Names are formatted only for a message, because a craft has hundreds of parameters.
 struct Problems(Vec<String>);
 
 impl Problems {
-    fn number(&mut self, name: &str, value: f64, low: f64, high: f64, unit: &str) {
+    fn number(&mut self, name: impl Display, value: f64, low: f64, high: f64, unit: &str) {
         if !(low..=high).contains(&value) {
             let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
             self.0.push(format!("{name} = {value:?} (allowed: {low:?} to {high:?}{unit})"));
         }
     }
 
-    fn vector(&mut self, name: &str, value: &[f64], unit: &str) {
+    fn vector(&mut self, name: impl Display, value: &[f64], unit: &str) {
         for (i, &x) in value.iter().enumerate() {
-            self.number(&format!("{name}[{}]", i + 1), x, -FARTHEST, FARTHEST, unit);
+            self.number(lazy!("{name}[{}]", i + 1), x, -FARTHEST, FARTHEST, unit);
         }
     }
 
-    fn direction(&mut self, name: &str, value: &[f64]) {
+    fn direction(&mut self, name: impl Display, value: &[f64]) {
         let before = self.0.len();
-        self.vector(name, value, "");
+        self.vector(&name, value, "");
         if self.0.len() > before {
             return;
         }
@@ -753,14 +756,14 @@ impl Problems {
 impl Tank {
     fn find_problems(&self, name: &str, problems: &mut Problems) {
         let before = problems.0.len();
-        problems.number(&format!("{name}.diameter"), self.diameter, 0.0, 1e3, "m");
+        problems.number(lazy!("{name}.diameter"), self.diameter, 0.0, 1e3, "m");
         if self.diameter > 0.0 {
-            problems.number(&format!("{name}.depth"), self.depth, 1e-3, 1e3, "m");
-            problems.number(&format!("{name}.density"), self.density, 1e-3, 1e5, "kg/m3");
+            problems.number(lazy!("{name}.depth"), self.depth, 1e-3, 1e3, "m");
+            problems.number(lazy!("{name}.density"), self.density, 1e-3, 1e5, "kg/m3");
         }
         self.find_table_problems(name, problems);
         for (n, f) in self.frequency.iter().enumerate().take(self.modes) {
-            problems.number(&format!("{name}.frequency[{}]", n + 1), *f, 0.0, 1e6, "Hz");
+            problems.number(lazy!("{name}.frequency[{}]", n + 1), *f, 0.0, 1e6, "Hz");
         }
         if problems.0.len() == before {
             self.resolve().find_resolved_problems(name, problems);
@@ -779,40 +782,45 @@ impl Tank {
             ));
             return;
         }
-        problems.number(&format!("{name}.outlet"), self.outlet, -FARTHEST, FARTHEST, "m");
-        let masses = table.masses();
+        problems.number(lazy!("{name}.outlet"), self.outlet, -FARTHEST, FARTHEST, "m");
+        let (masses, fill) = (table.masses(), lazy!("{name}.fill"));
         for i in 0..table.points {
             let at = i + 1;
             let low = if i == 0 { LIGHTEST } else { masses[i - 1] };
-            let name_of = |what: &str| format!("{name}.fill.{what}[{at}]");
-            problems.number(&name_of("liquid"), masses[i], low, HEAVIEST, "kg");
+            problems.number(lazy!("{fill}.liquid[{at}]"), masses[i], low, HEAVIEST, "kg");
             if i > 0 && masses[i] == low {
                 problems.0.push(format!(
-                    "{} = {low:?} kg equals the mass of the previous point (allowed: masses that increase from point to point)",
-                    name_of("liquid")
+                    "{name}.fill.liquid[{at}] = {low:?} kg equals the mass of the previous point (allowed: masses that \
+                     increase from point to point)"
                 ));
             }
-            problems.number(&name_of("H_0"), table.h_0[i], -FARTHEST, FARTHEST, "m");
-            problems.number(&name_of("I_0"), table.i_0[i], 0.0, HEAVIEST, "kg.m2");
-            problems.number(&name_of("I_z"), table.i_z[i], 0.0, HEAVIEST, "kg.m2");
+            problems.number(lazy!("{fill}.H_0[{at}]"), table.h_0[i], -FARTHEST, FARTHEST, "m");
+            problems.number(lazy!("{fill}.I_0[{at}]"), table.i_0[i], 0.0, HEAVIEST, "kg.m2");
+            problems.number(lazy!("{fill}.I_z[{at}]"), table.i_z[i], 0.0, HEAVIEST, "kg.m2");
             let mut sum = 0.0;
             for n in 0..self.modes.min(MODES) {
-                let name_of = |what: &str| format!("{name}.fill.{what}[{},{at}]", n + 1);
                 let (mass, length) = (table.mass[n][i], table.length[n][i]);
-                problems.number(&name_of("mass"), mass, LIGHTEST, HEAVIEST, "kg");
-                problems.number(&name_of("length"), length, SHORTEST, FARTHEST, "m");
-                problems.number(&name_of("hinge"), table.hinge[n][i], -FARTHEST, FARTHEST, "m");
-                problems.number(&name_of("zeta"), table.zeta[n][i], 0.0, 10.0, "");
+                let place = lazy!("[{},{at}]", n + 1);
+                problems.number(lazy!("{fill}.mass{place}"), mass, LIGHTEST, HEAVIEST, "kg");
+                problems.number(lazy!("{fill}.length{place}"), length, SHORTEST, FARTHEST, "m");
+                problems.number(
+                    lazy!("{fill}.hinge{place}"),
+                    table.hinge[n][i],
+                    -FARTHEST,
+                    FARTHEST,
+                    "m",
+                );
+                problems.number(lazy!("{fill}.zeta{place}"), table.zeta[n][i], 0.0, 10.0, "");
                 for (what, column) in [
                     ("nonlinear_inertia", &table.nonlinear_inertia),
                     ("nonlinear_stiffness", &table.nonlinear_stiffness),
                 ] {
-                    problems.number(&name_of(what), column[n][i], -1e3, 1e3, "");
+                    problems.number(lazy!("{fill}.{what}{place}"), column[n][i], -1e3, 1e3, "");
                 }
                 for (what, column) in
                     [("angle_limit", &table.angle_limit), ("swirl_limit", &table.swirl_limit)]
                 {
-                    problems.number(&name_of(what), column[n][i], 0.0, 1.6, "rad");
+                    problems.number(lazy!("{fill}.{what}{place}"), column[n][i], 0.0, 1.6, "rad");
                 }
                 sum += mass;
             }
@@ -825,7 +833,7 @@ impl Tank {
             }
         }
         let (first, last) = (masses[0], masses[table.points - 1]);
-        problems.number(&format!("{name}.liquid_0"), self.liquid_0, first, last, "kg");
+        problems.number(lazy!("{name}.liquid_0"), self.liquid_0, first, last, "kg");
         for (what, is_set) in [
             ("diameter", self.diameter > 0.0),
             ("frequency", self.frequency.iter().any(|f| *f > 0.0)),
@@ -841,32 +849,32 @@ impl Tank {
 
     fn find_resolved_problems(&self, name: &str, problems: &mut Problems) {
         let before_all = problems.0.len();
-        problems.vector(&format!("{name}.position"), &self.position, "m");
-        problems.direction(&format!("{name}.q"), &self.q);
+        problems.vector(lazy!("{name}.position"), &self.position, "m");
+        problems.direction(lazy!("{name}.q"), &self.q);
         // Perpendicular to its plane the bob of a planar mode counts as rigid liquid. The sum of the bobs' masses may
         // therefore exceed the mass of the liquid, so that m_0 is negative.
         let least = if self.is_planar() { -HEAVIEST } else { 0.0 };
-        problems.number(&format!("{name}.m_0"), self.m_0, least, HEAVIEST, "kg");
-        problems.number(&format!("{name}.H_0"), self.h_0, -FARTHEST, FARTHEST, "m");
-        problems.number(&format!("{name}.I_0"), self.i_0, least, HEAVIEST, "kg.m2");
-        problems.number(&format!("{name}.I_z"), self.i_z, least, HEAVIEST, "kg.m2");
-        problems.vector(&format!("{name}.r_0"), &self.r_0, "m");
+        problems.number(lazy!("{name}.m_0"), self.m_0, least, HEAVIEST, "kg");
+        problems.number(lazy!("{name}.H_0"), self.h_0, -FARTHEST, FARTHEST, "m");
+        problems.number(lazy!("{name}.I_0"), self.i_0, least, HEAVIEST, "kg.m2");
+        problems.number(lazy!("{name}.I_z"), self.i_z, least, HEAVIEST, "kg.m2");
+        problems.vector(lazy!("{name}.r_0"), &self.r_0, "m");
         let [xy, xz, yz] = self.products;
         for (what, value) in [("dI_y", self.di_y), ("I_xy", xy), ("I_xz", xz), ("I_yz", yz)] {
-            problems.number(&format!("{name}.{what}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
+            problems.number(lazy!("{name}.{what}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
         }
         self.find_axial_problems(name, problems);
         if self.modes > MODES {
             problems.0.push(format!("{name}.modes = {} (allowed: 0 to {MODES})", self.modes));
         }
-        problems.number(&format!("{name}.g_ref"), self.g_ref, 1e-9, 1e6, "m/s2");
-        problems.number(&format!("{name}.g_floor"), self.g_floor, 0.0, 1e6, "m/s2");
-        problems.number(&format!("{name}.g_bond"), self.g_bond, 0.0, 1e6, "m/s2");
+        problems.number(lazy!("{name}.g_ref"), self.g_ref, 1e-9, 1e6, "m/s2");
+        problems.number(lazy!("{name}.g_floor"), self.g_floor, 0.0, 1e6, "m/s2");
+        problems.number(lazy!("{name}.g_bond"), self.g_bond, 0.0, 1e6, "m/s2");
         self.find_ball_problems(name, problems);
         self.find_spin_problems(name, problems);
         for n in 0..self.modes.min(MODES) {
             let i = n + 1;
-            problems.number(&format!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
+            problems.number(lazy!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
             let (length, f) = (self.length[n], self.frequency[n]);
             if f > 0.0 && !(SHORTEST..=FARTHEST).contains(&length) {
                 let by_k = libm::sqrt(self.k[n] / self.mass[n]) / core::f64::consts::TAU;
@@ -875,28 +883,28 @@ impl Tank {
                     "{name}.frequency[{i}] = {f:?} Hz (allowed: above {by_k:?} Hz, the frequency from {name}.k[{i}] without thrust, and below {most:?} Hz)"
                 ));
             } else {
-                problems.number(&format!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");
+                problems.number(lazy!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");
             }
             let hinge = self.hinge[n];
-            problems.number(&format!("{name}.hinge[{i}]"), hinge, -FARTHEST, FARTHEST, "m");
-            problems.number(&format!("{name}.k[{i}]"), self.k[n], 0.0, HEAVIEST, "N/m");
-            problems.number(&format!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
+            problems.number(lazy!("{name}.hinge[{i}]"), hinge, -FARTHEST, FARTHEST, "m");
+            problems.number(lazy!("{name}.k[{i}]"), self.k[n], 0.0, HEAVIEST, "N/m");
+            problems.number(lazy!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
             let growth = self.zeta_amplitude[n];
-            problems.number(&format!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
+            problems.number(lazy!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
             for (what, value) in [
                 ("zeta_breaking", self.zeta_breaking[n]),
                 ("breaking_steepness", self.breaking_steepness[n]),
             ] {
-                problems.number(&format!("{name}.{what}[{i}]"), value, 0.0, 10.0, "");
+                problems.number(lazy!("{name}.{what}[{i}]"), value, 0.0, 10.0, "");
             }
             for (what, value) in [
                 ("nonlinear_inertia", self.nonlinear_inertia[n]),
                 ("nonlinear_stiffness", self.nonlinear_stiffness[n]),
             ] {
-                problems.number(&format!("{name}.{what}[{i}]"), value, -1e3, 1e3, "");
+                problems.number(lazy!("{name}.{what}[{i}]"), value, -1e3, 1e3, "");
             }
             for (what, value) in self.beyond_third_order(n) {
-                problems.number(&format!("{name}.{what}[{i}]"), value, -1e5, 1e5, "");
+                problems.number(lazy!("{name}.{what}[{i}]"), value, -1e5, 1e5, "");
                 if value != 0.0 && self.fill.points > 0 {
                     problems.0.push(format!(
                         "{name}.{what}[{i}] = {value:?} cannot be combined with {name}.fill.points above 0, because a fill table has \
@@ -913,8 +921,8 @@ impl Tank {
                 }
             }
             let [c, epsilon] = [self.gyroscopic[n], self.gyroscopic_stiffness[n]];
-            problems.number(&format!("{name}.gyroscopic[{i}]"), c, -10.0, 10.0, "");
-            problems.number(&format!("{name}.gyroscopic_stiffness[{i}]"), epsilon, -1e3, 1e3, "");
+            problems.number(lazy!("{name}.gyroscopic[{i}]"), c, -10.0, 10.0, "");
+            problems.number(lazy!("{name}.gyroscopic_stiffness[{i}]"), epsilon, -1e3, 1e3, "");
             if self.gyroscopic(n).is_some() && self.plane_normal(n).is_some() {
                 problems.0.push(format!(
                     "{name}.gyroscopic[{i}] = {c:?} and {name}.gyroscopic_stiffness[{i}] = {epsilon:?} cannot be combined with \
@@ -925,15 +933,15 @@ impl Tank {
             for (what, value) in
                 [("angle_limit", self.angle_limit[n]), ("swirl_limit", self.swirl_limit[n])]
             {
-                problems.number(&format!("{name}.{what}[{i}]"), value, 0.0, 1.6, "rad");
+                problems.number(lazy!("{name}.{what}[{i}]"), value, 0.0, 1.6, "rad");
             }
-            problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
+            problems.number(lazy!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
             let before = problems.0.len();
             if self.direction[n] != [0.0; 2] {
-                problems.direction(&format!("{name}.direction[{i}]"), &self.direction[n]);
-                problems.number(&format!("{name}.arm[{i}]"), self.arm[n], -FARTHEST, FARTHEST, "m");
+                problems.direction(lazy!("{name}.direction[{i}]"), &self.direction[n]);
+                problems.number(lazy!("{name}.arm[{i}]"), self.arm[n], -FARTHEST, FARTHEST, "m");
             }
-            problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
+            problems.direction(lazy!("{name}.p_0[{i}]"), &self.p_0[n]);
             if problems.0.len() == before
                 && let Some(b) = self.plane_normal(n)
             {
@@ -954,7 +962,7 @@ impl Tank {
                     problems.0.push(format!("{name}.p_0[{i}]: {}", self.bound_message(n, name)));
                 }
             }
-            problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
+            problems.vector(lazy!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
         }
         if problems.0.len() == before_all {
             self.find_ball_surface_problems(name, problems);
@@ -1004,18 +1012,18 @@ impl Tank {
             [("spin_inertia", self.spin_inertia), ("spin_inertia_across", self.spin_inertia_across)]
         {
             if value != 0.0 {
-                problems.number(&format!("{name}.{what}"), value, LEAST_SPIN, HEAVIEST, "kg.m2");
+                problems.number(lazy!("{name}.{what}"), value, LEAST_SPIN, HEAVIEST, "kg.m2");
             }
         }
         if self.spin_inertia == 0.0 {
             return;
         }
-        problems.number(&format!("{name}.spin_coupling"), self.spin_coupling, 0.0, 1.0, "");
+        problems.number(lazy!("{name}.spin_coupling"), self.spin_coupling, 0.0, 1.0, "");
         for (i, decay) in self.spin_decay.iter().enumerate() {
-            problems.number(&format!("{name}.spin_decay[{}]", i + 1), *decay, 0.0, 1e3, "1/s");
+            problems.number(lazy!("{name}.spin_decay[{}]", i + 1), *decay, 0.0, 1e3, "1/s");
         }
         for (i, slip) in self.slip_0.iter().enumerate() {
-            problems.number(&format!("{name}.slip_0[{}]", i + 1), *slip, -1e3, 1e3, "rad/s");
+            problems.number(lazy!("{name}.slip_0[{}]", i + 1), *slip, -1e3, 1e3, "rad/s");
         }
         for (what, is_set) in
             [("fill.points", self.fill.points > 0), ("ball.travel", self.ball.travel > 0.0)]
@@ -1031,20 +1039,14 @@ impl Tank {
 
     fn find_ball_problems(&self, name: &str, problems: &mut Problems) {
         let ball = &self.ball;
-        problems.number(&format!("{name}.ball.travel"), ball.travel, 0.0, 1e3, "m");
+        problems.number(lazy!("{name}.ball.travel"), ball.travel, 0.0, 1e3, "m");
         if ball.travel <= 0.0 {
             return;
         }
-        problems.number(&format!("{name}.ball.radius"), ball.radius, 0.0, 1e3, "m");
-        problems.number(&format!("{name}.ball.restitution"), ball.restitution, 0.0, 1.0, "");
-        problems.number(
-            &format!("{name}.ball.contact_speed"),
-            ball.contact_speed,
-            1e-9,
-            1e3,
-            "m/s",
-        );
-        problems.number(&format!("{name}.ball.drag"), ball.drag, 0.0, 1e3, "1/s");
+        problems.number(lazy!("{name}.ball.radius"), ball.radius, 0.0, 1e3, "m");
+        problems.number(lazy!("{name}.ball.restitution"), ball.restitution, 0.0, 1.0, "");
+        problems.number(lazy!("{name}.ball.contact_speed"), ball.contact_speed, 1e-9, 1e3, "m/s");
+        problems.number(lazy!("{name}.ball.drag"), ball.drag, 0.0, 1e3, "1/s");
     }
 
     fn find_ball_surface_problems(&self, name: &str, problems: &mut Problems) {
@@ -1098,15 +1100,15 @@ impl Tank {
 
 impl Craft {
     fn find_problems(&self, name: &str, problems: &mut Problems) {
-        problems.number(&format!("{name}.mass"), self.mass, LIGHTEST, HEAVIEST, "kg");
-        problems.vector(&format!("{name}.r"), &self.r, "m");
+        problems.number(lazy!("{name}.mass"), self.mass, LIGHTEST, HEAVIEST, "kg");
+        problems.vector(lazy!("{name}.r"), &self.r, "m");
         let before = problems.0.len();
         let Inertia { xx, yy, zz, xy, xz, yz } = self.j;
         for (element, value) in [("Jxx", xx), ("Jyy", yy), ("Jzz", zz)] {
-            problems.number(&format!("{name}.{element}"), value, 0.0, HEAVIEST, "kg.m2");
+            problems.number(lazy!("{name}.{element}"), value, 0.0, HEAVIEST, "kg.m2");
         }
         for (element, value) in [("Jxy", xy), ("Jxz", xz), ("Jyz", yz)] {
-            problems.number(&format!("{name}.{element}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
+            problems.number(lazy!("{name}.{element}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
         }
         if problems.0.len() > before {
             return;
@@ -1201,16 +1203,16 @@ impl Parameters {
         self.craft.find_problems("craft", &mut problems);
         problems.vector("gravity", &self.gravity, "m/s2");
         for (i, k) in self.pivot.k.iter().enumerate() {
-            problems.number(&format!("pivot.k[{}]", i + 1), *k, 0.0, HEAVIEST, "N.m/rad");
+            problems.number(lazy!("pivot.k[{}]", i + 1), *k, 0.0, HEAVIEST, "N.m/rad");
         }
         for (i, c) in self.pivot.c.iter().enumerate() {
-            problems.number(&format!("pivot.c[{}]", i + 1), *c, 0.0, HEAVIEST, "N.m.s/rad");
+            problems.number(lazy!("pivot.c[{}]", i + 1), *c, 0.0, HEAVIEST, "N.m.s/rad");
         }
         let friction = &self.pivot.friction;
         for (name, torques) in [("c", &friction.c), ("d", &friction.d)] {
             for (i, torque) in torques.iter().enumerate() {
-                let name = format!("pivot.friction.{name}[{}]", i + 1);
-                problems.number(&name, *torque, 0.0, HEAVIEST, "N.m");
+                let name = lazy!("pivot.friction.{name}[{}]", i + 1);
+                problems.number(name, *torque, 0.0, HEAVIEST, "N.m");
             }
         }
         problems.number("pivot.friction.omega_s", friction.omega_s, 1e-6, 1e6, "rad/s");
