@@ -33,7 +33,7 @@ class Appendage:
     Parameters
     ----------
     position : sequence of float, shape (3,)
-        Interface point from O, body axes, m.
+        Position of the interface point from the craft's origin O, body axes, m.
     frequency : float or sequence of float, shape (n,)
         Natural frequencies with the interface fixed, Hz.
     participation : array_like, shape (6,) or (n, 6)
@@ -79,7 +79,7 @@ class Appendage:
             participation factors ``x``, ``y``, ``z`` (kg^0.5) and ``rx``, ``ry``, ``rz`` (kg^0.5·m)
             in body axes, and optionally ``zeta``, the damping ratio of each mode.
         position : sequence of float, shape (3,)
-            Interface point from O, body axes, m.
+            Position of the interface point from the craft's origin O, body axes, m.
         zeta : float
             Damping ratio of all modes if the table has no column ``zeta``.
 
@@ -146,13 +146,13 @@ class Appendage:
             (``pip install pyyeti``); or mass and stiffness matrix, each of shape (6 + n, 6 + n),
             kg, m and s.
         position : sequence of float, shape (3,)
-            Interface point from O, body axes, m.
+            Position of the interface point from the craft's origin O, body axes, m.
         zeta : float or sequence of float
             One damping ratio for all modes, or one for each mode in the file.
         axes : array_like, shape (3, 3), optional
             Matrix from the axes of the file to body axes; by default they are the same.
         most : int
-            Number of modes to keep, at most.
+            Largest number of modes to keep.
         names : tuple of str
             Names of mass and stiffness matrix in the file.
 

@@ -71,8 +71,8 @@ def is_number(value: Any) -> bool:
 def out_of_range(**values: Any) -> list[str]:
     """Return a sentence for each argument that is outside its allowed range.
 
-    The keywords name the arguments, for example ``out_of_range(period=0.0)``; `check_ranges` raises
-    the sentences as an error.
+    The keyword is the argument's name, for example ``out_of_range(period=0.0)``. The tables
+    `SECONDS`, `WHOLE` and `PLAIN` have the allowed range of each name.
     """
     found = []
     for name, value in values.items():
@@ -89,7 +89,7 @@ def out_of_range(**values: Any) -> list[str]:
 
 
 def check_ranges(**values: Any) -> None:
-    """Raise FmuError if an argument is outside its allowed range."""
+    """Raise FmuError if an argument is outside the range that `out_of_range` allows."""
     refuse(out_of_range(**values))
 
 
@@ -200,7 +200,10 @@ def check_table(table: Any, what: str) -> None:
 
 
 def not_columns(table: Any, names: Iterable[str], what: str) -> list[str]:
-    """Return one error sentence if a table does not have columns of all these names."""
+    """Return one error sentence if ``table`` does not have a column for each of ``names``.
+
+    ``what`` is the name of the table in the sentence.
+    """
     there = [str(name) for name in table.columns]
     missing = [f"{name}{did_you_mean(name, there)}" for name in names if name not in there]
     return [f"{what} has no column {', '.join(missing)}"] if missing else []
@@ -213,7 +216,11 @@ def check_columns(table: Any, names: Iterable[str], what: str) -> None:
 
 
 def numbers_in(table: Any, names: Sequence[str], what: str) -> list[NDArray[np.float64]]:
-    """Return columns of a table as finite numbers, or raise FmuError that says what is wrong."""
+    """Return the columns ``names`` of ``table`` as arrays of finite numbers.
+
+    Raises FmuError if a column is missing or has other values; ``what`` is the name of the table in
+    the error message.
+    """
     check_columns(table, names, what)
     problems: list[str] = []
     found = [column_of(table, name, what, problems) for name in names]
@@ -283,7 +290,10 @@ def range_ends(given: Any, nominal: float) -> tuple[float, float]:
 
 
 def not_vectors(of: Any, length: int, *names: str) -> list[str]:
-    """Return one error sentence for each attribute that is not a vector of finite numbers."""
+    """Return one error sentence for each wrong attribute of the object ``of``.
+
+    The attributes ``names`` must be vectors of ``length`` finite numbers.
+    """
     found = []
     for name in names:
         try:
@@ -294,7 +304,10 @@ def not_vectors(of: Any, length: int, *names: str) -> list[str]:
 
 
 def vector(values: Any, length: int, what: str) -> np.ndarray:
-    """Return ``values`` as an array of ``length`` finite numbers."""
+    """Return ``values`` as an array of ``length`` finite numbers, or raise FmuError.
+
+    ``what`` is the name of the argument in the error message.
+    """
     try:
         found = array(values)
     except FmuError as error:

@@ -112,7 +112,10 @@ class WorstCase:
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Proof that a loop is stable for all Δ up to a certain size; see `UncertainModel.certify`.
+    """Proof that a loop is stable for all values of uncertain parameters in a box.
+
+    `UncertainModel.certify` returns an instance. Δ has the deviation δ of each parameter from its
+    nominal value, where ±1 is an end of the parameter's range.
 
     Parameters
     ----------
@@ -185,7 +188,7 @@ class Certificate:
         Parameters
         ----------
         path : str or Path
-            File to write. Example 15 of the book shows how to check such a file.
+            File to write. The script ``check_certificate.py`` of example 14 checks such a file.
 
         Raises
         ------
@@ -224,7 +227,7 @@ class UnstableError(Exception):
 
 
 class ExhaustedError(Exception):
-    """Raised if a proof needs more convex problems than are allowed."""
+    """Raised if a proof needs too many convex problems, or too small boxes of parameters."""
 
 
 Pair = tuple[Complex, Complex]  # D and G
@@ -256,9 +259,10 @@ class Search:
         self.line = Line(progress)
 
     def response(self, a: float, b: float) -> Complex:
-        """Return the closed loop's response N at fixed points within a frequency interval.
+        """Return the closed loop's response N at frequencies between ``a`` and ``b``, Hz.
 
-        The points are Chebyshev nodes, so that a polynomial through them represents N.
+        The frequencies are Chebyshev nodes, so that a polynomial through these values is close to N
+        everywhere between ``a`` and ``b``.
         """
         if (a, b) not in self.known:
             self.known[a, b] = self.closed(a + (b - a) * NODES)
@@ -326,7 +330,9 @@ class Search:
     def halved(self, region: Region) -> list[Region]:
         """Return two regions whose boxes are the halves of a region's box.
 
-        The box is cut along the uncertain quantity that gives the halves the largest margins.
+        The box is cut in the middle of the range of one uncertain parameter. It is the parameter
+        for which both halves have the largest margins (see `margin`) in the middle of the region's
+        frequency interval.
         """
         a, b, low, high = region
         if ((high - low) / self.width).max() < SMALLEST_BOX:
@@ -350,9 +356,10 @@ class Search:
         return best[1]
 
     def margin(self, f: float, low: Vector, high: Vector) -> tuple[float, int]:
-        """Return the largest margin for a box at one frequency, and the index of its scalings.
+        """Return the margin of a proof at the frequency ``f`` (Hz), and the index of its scalings.
 
-        The scalings (D, G) that give this margin are ``pairs[index]``.
+        The proof is for the box of Δ from ``low`` to ``high``. It succeeds if the margin, which
+        `Scalings.best` maximises, is above 0. ``pairs[index]`` has the scalings D and G.
         """
         key = f, low.tobytes(), high.tobytes()
         if key not in self.found:

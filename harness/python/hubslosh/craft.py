@@ -218,7 +218,7 @@ class MassProperties:
     mass : float
         Mass, kg.
     center_of_mass : ndarray, shape (3,)
-        Centre of mass from O, body axes, m.
+        Centre of mass from the craft's origin O, body axes, m.
     inertia : ndarray, shape (3, 3)
         Inertia about the centre of mass, body axes, kg·m². Products of inertia are minus the
         integral of x y dm.
@@ -278,8 +278,8 @@ class Craft:
         Name or file of the FMU, as for `simulate`.
     engines : mapping of Engine
         Engines by name. The engines that burn act in addition to ``thrust``; O of the FMU then lies
-        on the line of action of the resultant force. Canted engines can also cause a torque about
-        this line, which remains.
+        on the line of action of the resultant force. If canted engines also cause a torque about
+        this line, the FMU gets this torque, because no choice of O can remove it.
     appendages : mapping of Appendage
         Flexible appendages by name, with at most six modes in total. ``mass``, ``inertia`` and
         ``center_of_mass`` must include the undeformed appendages.
@@ -401,7 +401,7 @@ class Craft:
 
     @property
     def _names(self) -> Names:
-        """Names of the tanks and, for each appendage mode in the FMU's order, of its appendage."""
+        """Names of the tanks; and for each appendage mode of the FMU, the name of its appendage."""
         modes = [name for name, of in self.appendages.items() for _ in range(of.count)]
         return Names.collect(self.tanks, modes)
 
@@ -694,9 +694,9 @@ class Craft:
             method. A tank has its name or number: ``NTO.frequency[1]`` or ``tank[1].frequency[1]``
             (Hz, under the present thrust; the height of the slosh mass is kept), ``zeta[1]``,
             ``mass[1]`` (kg) and ``bob[1]`` (height of the slosh mass, m; mass, centre and inertia
-            of the liquid stay). ``craft.Jxx``, … and every other parameter of the FMU are
-            allowed, too. A mode of an appendage has the appendage's name: ``array.frequency[1]``
-            and ``array.zeta[1]``.
+            of the whole liquid do not change). ``craft.Jxx``, … and every other parameter of
+            the FMU are allowed, too. A mode of an appendage has the appendage's name:
+            ``array.frequency[1]`` and ``array.zeta[1]``.
         trimmed : bool
             Trim the craft, see `trim`. False leaves the thrust at O, and warns if this thrust turns
             the craft.
@@ -1750,8 +1750,9 @@ def _is_empty(fill: Any) -> bool:
 def _own_inertia(tank: Tank, liquid: Liquid) -> Vector:
     """Return a liquid's moments of inertia about its centre of mass, tank axes, kg·m² (3).
 
-    They count the whole liquid as rigid if ``liquid`` is "frozen". If it is "effective", they count
-    only the part of the inertia that follows rotations of the tank.
+    If ``liquid`` is "rigid", they are the moments of a solid of the liquid's shape. If it is
+    "effective", they are the moments of liquid without friction under a rigid lid, which follows
+    rotations of the tank only in part.
     """
     kind = "eff" if liquid == "effective" else "frozen"
     axes = tank.all.get("axes")  # of a box: motion along y turns about x

@@ -123,9 +123,9 @@ def curves_of(
 def _smooth(
     gain: "LinearModel", f: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return the frequencies ``f`` (Hz), with more where the loop gain changes fast.
+    """Return frequencies (Hz) for a smooth curve of the loop gain, and the loop gain at each.
 
-    Also return the loop gain at all these frequencies.
+    The frequencies are ``f`` and further frequencies where the loop gain changes fast.
     """
     model, values = _compiled(gain), np.zeros(0, complex)
     new, old = f, np.zeros(0)

@@ -1,4 +1,8 @@
-"""Search for the smallest Δ that brings a sampled loop to the limit of stability."""
+"""Search for the smallest Δ that brings a sampled loop to the limit of stability.
+
+Δ has the deviation δ of each uncertain parameter from its nominal value; ±1 is an end of the
+parameter's range. The size of Δ is the largest |δ|.
+"""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -39,9 +43,10 @@ CORNER_STEPS, LINE_STEPS = 8, 24
 
 
 class DeltaSearch:
-    """A search for the smallest unstable Δ of a loop around an uncertain model.
+    """A search for the smallest Δ at which a loop around an uncertain model is unstable.
 
-    The closed loop's matrices are computed for many Δ at once.
+    Δ has the deviations of the uncertain parameters. The closed loop's matrices are computed for
+    many Δ at once.
     """
 
     def __init__(
@@ -63,7 +68,7 @@ class DeltaSearch:
     def poles(self, deltas: Matrix) -> Complex:
         """Return the poles of the closed loop for each Δ; a neutral pole is replaced by 0.
 
-        The poles are NaN if no craft has this Δ, for example because a mass would be negative.
+        The poles are NaN if the parameters at Δ are impossible, such as a negative mass.
         """
         parts = [deltas[k : k + TOGETHER] for k in range(0, len(deltas), TOGETHER)]
         return np.concatenate([self._poles(part) for part in parts])
@@ -83,7 +88,10 @@ class DeltaSearch:
         return found
 
     def radius(self, deltas: Matrix) -> Matrix:
-        """Return the largest magnitude of a pole for each Δ; -inf if no craft has this Δ."""
+        """Return the largest magnitude of the closed loop's poles for each Δ.
+
+        It is -inf if the parameters at Δ are impossible, such as a negative mass.
+        """
         if not len(deltas):
             return np.zeros(0)
         sizes = np.abs(self.poles(deltas)).max(axis=1, initial=0.0)
@@ -136,7 +144,7 @@ class DeltaSearch:
         return bool(inside <= UNSTABLE < outside)
 
     def limit(self, delta: Matrix) -> WorstCase | None:
-        """Return the limit of stability on the line from 0 to an unstable Δ."""
+        """Return the limit of stability on the line from 0 to an unstable Δ; None if not found."""
         size = float(np.abs(delta).max())
         return min(
             self.limits(delta[None] / size, size, LINE_STEPS), key=attrgetter("size"), default=None
@@ -212,8 +220,8 @@ class DeltaSearch:
     def _in_box(self, starts: Sequence[Matrix], best: WorstCase, box: float) -> WorstCase:
         """Search the box ``|δ| ≤ box`` for an unstable Δ.
 
-        The search begins at ``starts`` and at the least unstable Δ that is known, ``best``. Return
-        the limit of stability on the line from Δ = 0 to the unstable Δ.
+        The search begins at ``starts`` and at ``best``, the smallest unstable Δ that is known. If
+        it finds an unstable Δ, return the limit of stability on the line from 0 to this Δ.
         """
         known = [self.model.delta(best.delta)] if best.delta else []
         near = [at * min(1.0, box / np.abs(at).max(initial=box)) for at in (*known, *starts)]

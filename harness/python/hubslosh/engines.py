@@ -23,7 +23,7 @@ class Engine:
     Parameters
     ----------
     position : sequence of float, shape (3,)
-        Point where the thrust acts, from O, body axes, m.
+        Point where the thrust acts, from the craft's origin O, body axes, m.
     direction : sequence of float, shape (3,)
         Direction of the force on the craft, body axes, of any length.
     thrust : float
@@ -74,7 +74,7 @@ class Engine:
         Parameters
         ----------
         origin : ndarray, shape (3,)
-            The point from O, body axes, m.
+            The point from the craft's origin O, body axes, m.
 
         Returns
         -------
@@ -96,8 +96,9 @@ class Engine:
 def resultant(force: Vector, engines: Mapping[str, Engine]) -> tuple[Vector, Vector, Vector]:
     """Return the force of all engines, a point on its line of action, and the remaining torque.
 
-    ``force`` is a force at O that acts in addition to the engines. The point is measured from O.
-    The remaining torque is the part about the line of action, which no point of action can remove.
+    ``force`` (N) acts at the craft's origin O, in addition to the engines. The point is measured
+    from O, m. The remaining torque (N·m) is the part about the line of action, which no choice of
+    the point can remove.
     """
     total = np.concatenate([force, np.zeros(3)])
     for engine in engines.values():

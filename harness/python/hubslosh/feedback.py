@@ -12,7 +12,11 @@ Matrix = NDArray[np.float64]
 
 @dataclass
 class Linear:
-    """Sampled controller u = C x + D e + f, x⁺ = A x + B e, with the control error e = r - y."""
+    """Sampled linear controller of the error e = r - y, with the matrices A, B, C and D.
+
+    In each cycle it computes the commands u = C x + D e + f and its next state A x + B e from its
+    state x, the reference r, the measurements y and the feedforward f.
+    """
 
     A: Matrix
     B: Matrix

@@ -222,7 +222,7 @@ class LiquidModes:
             Number of modes, 1 to 3; the modes with the largest slosh masses are kept. By default 3,
             or all modes with a slosh mass if there are fewer than 3.
         position : sequence of float, shape (3,)
-            Position of O in body axes, m. The tank's axes are parallel to the body axes.
+            Position of the tank's O in body axes, m. Its axes are parallel to the body axes.
 
         Returns
         -------

@@ -314,11 +314,11 @@ class Loop:
     def _with_wheels(
         self, model: LinearModel, inputs: list[str], *, all_states: bool = False
     ) -> LinearModel:
-        """Return ``model`` with torques of wheels among its inputs, which are then ``inputs``.
+        """Return ``model`` with ``inputs``, among which can be torques of reaction wheels.
 
-        ``model`` must have the inputs torque and h_wheels, too. The momentum of a wheel acts on a
-        craft that turns, so that the wheel's speed is then a state. For ``all_states`` see
-        `linearize`.
+        ``model`` must have the inputs torque and h_wheels, and each of ``inputs`` that is not the
+        torque of a wheel. The momentum of a wheel acts on a craft that turns, so that the wheel's
+        speed is then a state. For ``all_states`` see `linearize`.
         """
         turned = self._turned
         torque, h = (
@@ -793,9 +793,9 @@ def _bilinear(
 ) -> tuple[NDArray[np.float64], ...]:
     """Return A, B, C, D of a system discretised by SciPy with the period ``period``, s.
 
-    ``given`` has each matrix of the system as its shape and its bytes, because results are cached:
-    the threads of SciPy wait for each other, so that on two cores a call can take as long as all
-    margins of a loop.
+    ``given`` has the shape and the bytes of each matrix, because the cache of results needs
+    arguments that can be hashed. A call can take as long as all margins of a loop, because SciPy's
+    threads wait for each other.
     """
     from scipy.signal import cont2discrete
 

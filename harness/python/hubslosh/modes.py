@@ -50,8 +50,9 @@ def mode_errors(
 ) -> pd.DataFrame:
     """Return the error of the slosh force on HubSlosh's tank for each number of modes.
 
-    The reference is the force of all ``slosh.modes``. An impulse excites all frequencies equally,
-    but a control loop excites only its band, so use the column ``band`` for loops.
+    The error is the difference to the force with all modes (parameter ``slosh.modes``). An impulse
+    excites all frequencies equally, but a control loop excites only its band, so use the column
+    ``band`` for loops.
 
     Parameters
     ----------

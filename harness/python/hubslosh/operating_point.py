@@ -76,7 +76,7 @@ class OperatingPoint:
     def untrimmed_acceleration(self) -> Vector:
         """Angular acceleration before trimming, body axes, rad/s².
 
-        Appendages have the deflection of this acceleration, so that they do not vibrate.
+        Appendages have the deflection that this acceleration causes, so that they do not vibrate.
         """
         if self.untrimmed is None:
             return np.zeros(3)
@@ -91,8 +91,8 @@ class OperatingPoint:
     def lateral_acceleration(self) -> dict[str, float]:
         """Specific force across each tank's axis after trimming, m/s², by the tank's name.
 
-        It moves the liquid. It is evaluated at the tank's origin or, if the craft spins, at the
-        slosh mass of the tank's first mode.
+        If it is not 0, the liquid is not at rest at this point. It is evaluated at the tank's
+        origin or, if the craft spins, at the slosh mass of the tank's first mode.
         """
         return self._remaining[1]
 
@@ -210,13 +210,20 @@ def is_spacecraft(fmu: Fmu) -> bool:
 
 
 def warn_of_rotation(what: str, turning: Any) -> None:
-    """Warn if ``turning``, the angular acceleration at the linearisation point, is not 0."""
+    """Warn if ``turning``, the angular acceleration at the linearisation point, is not 0.
+
+    ``what`` names the point in the warning.
+    """
     if text := rotation(what, turning):
         warnings.warn(text, FmuWarning, stacklevel=caller())
 
 
 def warn_of_attitude(what: str, names: Sequence[str], omega: Any) -> None:
-    """Warn if the attitude is measured in a craft that spins at ``omega``."""
+    """Warn if ``names`` of outputs include the attitude q of a craft that spins at ``omega``.
+
+    This attitude is never steady, so that a linear model of it is valid only at the start.
+    ``what`` names the linearisation point in the warning.
+    """
     if np.any(omega) and any(name.startswith("q[") for name in names):
         warnings.warn(
             f"{what} is no steady state of q: the attitude of a craft that spins at "

@@ -385,7 +385,7 @@ def identify(
     prior : mapping, optional
         With ``free``: mean and standard deviation of unknowns of which estimates exist already.
     settings : mapping, optional
-        Values of other parameters.
+        Values of known parameters by their names in the FMU, such as ``{"tank.h": 0.1}``.
     out : str or Path, optional
         File for the result, .json.
     progress : bool or callable, optional

@@ -201,7 +201,7 @@ class Modes:
         return float(self.fmu.variable(name).start or 0.0)
 
     def problem(self, mode: ModeQuantity) -> str:
-        """Return the reason why a quantity cannot be given, or an empty string if it can."""
+        """Return the reason why a quantity cannot be set, or an empty string if it can."""
         if mode.tank > self.number("tanks") or mode.number > self.number(
             f"tank[{mode.tank}].modes"
         ):

@@ -67,7 +67,7 @@ def requirements_of(given: Any) -> tuple[Requirement, ...]:
 
 
 def margins_of(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the margins that may be required, at each operating point of a review."""
+    """Return a table of the margins that requirements can limit, with a row for each point."""
     gain = points[["gain_up", "gain_down"]].abs().min(axis=1)
     found = points.assign(gain_margin=gain, phase_margin=points["phase_margin"].abs())
     return found[list(UNITS)]

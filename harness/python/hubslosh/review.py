@@ -516,10 +516,10 @@ def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
 
 
 def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
-    """Return the plants of all points with equal states, so that they can be stacked.
+    """Return the linear models of the craft at all points, all with the same states.
 
-    The states are all states that any plant has, in the FMU's order. A plant that lacks a state
-    gets it with zeros.
+    The states are all states that any of the models has, in the FMU's order. If a model lacks one
+    of these states, its rows and columns are zeros.
     """
     models = []
     used: set[str] = set()

@@ -308,7 +308,8 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
 def _curves(review: "Review") -> list[Curves]:
     """Return, for each command, the loop gain at some fills and at the worst case.
 
-    The fills are equally spaced, or unstable.
+    The fills are up to ``MOST_CURVES`` equally spaced fills, and as many fills at which the nominal
+    point is unstable.
     """
     count = len(review.fills)
     chosen = sorted(set(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int)))

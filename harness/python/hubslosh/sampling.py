@@ -317,8 +317,8 @@ def _results(
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield each run's number and results when it is done.
 
-    ``jobs`` yields the number and the drawn values of each run. The processes of ``pool`` call
-    ``outcome``; up to ``most`` runs are in progress.
+    ``jobs`` yields the number and the drawn values of each run. The workers of ``pool``, which are
+    threads or workers of a Dask cluster, call ``outcome``; up to ``most`` runs are in progress.
     """
     with pool:
         under_way: dict[Future[dict[str, Any]], tuple[int, dict[str, Any]]] = {}

@@ -43,7 +43,8 @@ def frequency_response(
         Column of the output.
     resolution : float, optional
         Half width of the smoothing window, Hz; by default three lines of the spectrum. A wider
-        window reduces noise more, but flattens a narrow resonance: keep the resolution below ζ f.
+        window reduces noise more, but flattens a narrow resonance: keep the resolution below ζ f,
+        where f is the frequency and ζ the damping ratio of the resonance.
     band : tuple of float, optional
         Lowest and highest frequency, Hz; by default all.
     hold : bool

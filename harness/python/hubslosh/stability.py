@@ -328,7 +328,7 @@ def _closed(gain: LinearModel) -> NDArray[np.complex128]:
 
 
 def _size(A: Matrix) -> Any:
-    """Return the norm of a matrix, or of each matrix of a stack; 1 for a matrix of zeros."""
+    """Return the Frobenius norm of a matrix, or of each matrix of a stack; 1 for zeros."""
     size = np.linalg.norm(A, axis=(-2, -1))
     return np.where(size > 0, size, 1.0)
 
@@ -459,7 +459,10 @@ def band(model: LinearModel) -> tuple[float, float]:
 
 
 def frequencies(model: LinearModel, low: float, high: float, count: int = 200) -> Matrix:
-    """Return ``count`` frequencies from ``low`` to ``high`` (Hz), and more near light poles."""
+    """Return ``count`` frequencies from ``low`` to ``high`` (Hz), and more near poles.
+
+    More frequencies are needed near lightly damped poles, where the response changes fast.
+    """
     lines = [np.geomspace(low, high * (1 - 1e-9), count)]
     s = np.linalg.eigvals(model.A).astype(complex)
     if model.period is not None:
@@ -571,7 +574,11 @@ def _exact_delay(
     period = gain.period or 0.0
 
     def refined_delay(delay: float) -> float:
-        """Return the delay corrected by the remaining phase at the frequency of magnitude 1."""
+        """Return the delay after one correction.
+
+        At the frequency at which an eigenvalue of L has the magnitude 1, the corrected delay
+        rotates the eigenvalue to -1, except for the effect of the delay on this frequency.
+        """
         nonlocal w
         cycles = int(delay / period)
         model = _compiled(delayed(delay - cycles * period))

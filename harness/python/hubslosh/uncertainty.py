@@ -117,7 +117,10 @@ class _Bob:
 
 @dataclass(frozen=True)
 class _Tank:
-    """A tank: origin (m), axes (columns x, y, e), rigid liquid, ``g_ref`` for damping ratios."""
+    """A tank: its origin (m), its axes (columns x, y, e), and parameters of its rigid liquid.
+
+    The FMU's damping ratios are given for the specific force ``g_ref``, m/s².
+    """
 
     number: int
     origin: Matrix
@@ -132,7 +135,11 @@ class _Tank:
 
 @dataclass(frozen=True)
 class _Spin:
-    """Liquid that spins: matrices I⁻¹, Γ and K of spin.rs, and angular momentum L, tank axes."""
+    """Liquid that spins, in tank axes, with the angular momentum L.
+
+    If w is the angular velocity of the tank, I⁻¹ L - Γ w is the angular velocity of the liquid
+    relative to the tank. The friction torque at the wall is K times this relative velocity.
+    """
 
     inverse: Matrix
     coupling: Matrix
@@ -140,20 +147,29 @@ class _Spin:
     momentum: Matrix
 
     def rate(self, w: Matrix) -> Matrix:
-        """Return the derivative of L if the tank has the angular velocity ``w``, tank axes."""
+        """Return the derivative of the liquid's angular momentum, tank axes.
+
+        ``w`` is the tank's angular velocity, rad/s.
+        """
         slip = self.slip(w)
         found: Matrix = _cross(slip) @ self.momentum - self.friction @ slip
         return found
 
     def slip(self, w: Matrix) -> Matrix:
-        """Return the angular velocity of the liquid relative to the tank, tank axes, rad/s."""
+        """Return the liquid's angular velocity relative to the tank, tank axes, rad/s.
+
+        ``w`` is the tank's angular velocity.
+        """
         found: Matrix = self.inverse @ self.momentum - self.coupling @ w
         return found
 
 
 @dataclass(frozen=True)
 class _Mode:
-    """A mode of an appendage: participation u, change of the mass matrix per η, displacement η."""
+    """A mode of an appendage: participation factors u, displacement η at the operating point.
+
+    ``body`` is the derivative of the craft's 6 × 6 mass matrix with respect to η.
+    """
 
     number: int
     u: Matrix
@@ -184,7 +200,7 @@ class _Craft:
         return sum((mode.eta * mode.body for mode in self.modes), np.zeros((6, 6)))
 
     def pull(self, values: Mapping[str, float]) -> Matrix:
-        """Return force and torque about O (6 numbers) of the deflected appendages on the craft."""
+        """Return force and torque about O with which deflected appendages pull the craft."""
         pulls = (
             (TURN * values[mode.name("frequency")]) ** 2 * mode.eta * mode.u for mode in self.modes
         )
@@ -202,7 +218,7 @@ class _Craft:
         return _rigid(*self.dry(self.values)) + self.liquid
 
     def load(self, values: Mapping[str, float], *, moving: bool = True) -> Matrix:
-        """Return the gyroscopic force and torque about O (6 numbers), which act also at X = 0.
+        """Return force and torque about O (6 numbers) that rotation at a constant rate needs.
 
         If ``moving`` is False, craft and liquid count as one rigid body.
         """
@@ -223,13 +239,19 @@ class _Craft:
         return load
 
     def accelerations(self) -> tuple[Matrix, Matrix]:
-        """Return X of the craft with rigid liquid, and X with sloshing liquid."""
+        """Return the craft's acceleration with rigid liquid, and with liquid that can slosh.
+
+        Each acceleration has six numbers: specific force at O, then angular acceleration.
+        """
         whole = np.linalg.solve(self.rigid(), self.wrench - self.load(self.values, moving=False))
         load = self.wrench + self.pull(self.values) - self.load(self.values)
         return whole, np.linalg.solve(self.mass_matrix(self.values), load)
 
     def specific(self, X: Matrix, place: Matrix) -> Matrix:
-        """Return the specific force (m/s²) at the position ``place`` of the craft."""
+        """Return the specific force (m/s²) at the position ``place`` of the craft.
+
+        ``X`` has the specific force at O, then the angular acceleration.
+        """
         found: Matrix = (
             X[:3] + np.cross(X[3:], place) + np.cross(self.omega, np.cross(self.omega, place))
         )
@@ -242,12 +264,20 @@ class _Craft:
         return found
 
     def arm(self, bob: _Bob, values: Mapping[str, float]) -> Matrix:
-        """Return the matrix (6 × 2) whose transpose maps X to the bob's acceleration across e."""
+        """Return the matrix (6 × 2) of the directions in which a slosh mass can move.
+
+        Its transpose maps the craft's acceleration (specific force at O, angular acceleration) to
+        the two components of the slosh mass's acceleration across the tank's axis.
+        """
         E = self.tanks[bob.tank].axes[:, :2]
         return np.vstack([E, _cross(self.place(bob, values)) @ E])
 
     def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
-        """Return the mass matrix without appendage modes and without slosh across the tank axes."""
+        """Return the mass matrix (6 × 6) of the parts that follow the craft's acceleration.
+
+        Slosh masses follow it only along the axes of their tanks, because they are free to move
+        across; the share of each appendage mode is left out.
+        """
         M = _rigid(*self.dry(values)) + self.liquid + self.deformed()
         for mode in self.modes:
             M = M - np.outer(mode.u, mode.u)
@@ -438,10 +468,11 @@ def _slope(ends: tuple[Matrix, Matrix], size: Matrix, step: float) -> Matrix:
 
 
 def _derivative(craft: _Craft, step: float, ends: tuple[_Craft, _Craft]) -> dict[str, float]:
-    """Return the derivatives of all uncertain parameters by one FMU parameter of a tank.
+    """Return the derivative of each uncertain parameter with respect to one FMU parameter.
 
-    ``ends`` has the craft before and after a change of this FMU parameter by ``step``. A change of
-    the rigid liquid counts as a change of the dry craft, because only the sum of both acts.
+    The FMU parameter belongs to a tank, such as the length of a pendulum. ``ends`` has the craft
+    before and after a change of this FMU parameter by ``step``. A change of the rigid liquid counts
+    as a change of the dry craft, because only the sum of both acts.
     """
     of_bobs = [bob.name(kind) for bob in craft.bobs for kind in KINDS]
     values, *at = (np.array([c.values[of] for of in of_bobs]) for c in (craft, *ends))
@@ -485,10 +516,11 @@ OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge
 def _converted(
     model: str | Path, given: Parameters, craft: _Craft, table: "pd.DataFrame"
 ) -> tuple["pd.DataFrame", list[str]]:
-    """Return the derivatives of uncertain parameters by FMU parameters, and error messages.
+    """Return derivatives of uncertain parameters, and error messages.
 
-    The rows of ``table`` name the FMU parameters, for example because `identify` has estimated
-    them. ``craft`` was read from the FMU ``model`` with the parameters ``given``.
+    The derivatives are with respect to the FMU parameters that the rows of ``table`` name, for
+    example because `identify` has estimated them. ``craft`` was read from the FMU ``model`` with
+    the parameters ``given``.
     """
     import pandas as pd
 
@@ -533,13 +565,13 @@ class _Equations:
         self.most = width + 30 * max(np.count_nonzero(self.spread), 1) * (1 + len(values) // 4)
 
     def unit(self, first: int, count: int) -> Matrix:
-        """Return ``count`` signals, from number ``first`` on, as rows of an identity matrix."""
+        """Return ``count`` signals: rows of an identity matrix that begin at row ``first``."""
         return np.eye(count, self.most, first)
 
     def times(self, name: str, signal: Matrix) -> Matrix:
-        """Return the product of a parameter and signals.
+        """Return the product of the parameter ``name`` and the rows of ``signal``.
 
-        If the parameter is uncertain, each signal that is not 0 adds a channel to Δ.
+        If the parameter is uncertain, each row that is not 0 adds a channel (a row) to Δ.
         """
         product = self.values[name] * signal
         if name in self.index:
@@ -556,9 +588,10 @@ def _partitioned(
 ) -> tuple[Matrix, list[int], tuple[str, ...]]:
     """Return M from (states, channels, all inputs) to (derivatives, channels, all outputs).
 
-    A channel is a row of Δ. ``craft`` is the craft at its operating point, where its acceleration
-    is γ X_f + X_c; ``values`` are its parameters at Δ = 0, and ``spread`` has the change of each
-    parameter (row) with each δ (column). Also return the number of channels of each column of
+    A channel is a row of Δ. ``craft`` is the craft at its operating point. Its acceleration there
+    is γ X_f + X_c: X_f is due to force and torque, X_c is due to rotation, and γ is an uncertain
+    factor. ``values`` are its parameters at Δ = 0, and ``spread`` has the change of
+    each parameter (row) with each δ (column). Also return the number of channels of each column of
     ``spread``, and the names of the states.
     """
     states = [*OUTPUTS, *(
@@ -577,7 +610,11 @@ def _partitioned(
         return -_cross(W @ place) - W @ _cross(place)
 
     def grown(signal: Matrix) -> Matrix:
-        """Return γ times signals. If the craft does not spin, β/g does not depend on γ."""
+        """Return ``signal`` times the factor γ of the acceleration due to force and torque.
+
+        If rotation causes no acceleration, γ multiplies both sides of the pendulum's equation for
+        y. Then γ has its nominal value here, which needs fewer channels of Δ.
+        """
         return eq.times(FACTOR, signal) if omega.any() or X_c.any() else values[FACTOR] * signal
 
     rates = [(w - W @ x[:3]) / 2, w_d]
@@ -903,9 +940,9 @@ class UncertainModel:
         )  # fmt: skip
 
     def _scale(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
-        """Return the ratios of the states of M to the states of the FMU at ``delta``.
+        """Return the ratio of each state of M to the FMU's state of the same name, at ``delta``.
 
-        For a slosh mode the ratio is the slosh mass times the pendulum length.
+        For a slosh mode the ratio is the slosh mass times the pendulum length; for others it is 1.
         """
         values = self._values | self.values(delta)
         sizes = {
@@ -921,13 +958,14 @@ class UncertainModel:
         return values[bob.name("frequency")] / self._craft.values[bob.name("frequency")]
 
     def _acceleration(self, values: Mapping[str, float]) -> Matrix:
-        """Return specific force at O and angular acceleration at the operating point."""
+        """Return specific force at O and angular acceleration of the craft with ``values``."""
         return values[FACTOR] * self._X_f + self._X_c
 
     def _length(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return the pendulum length (m) with which gravity keeps its share of ω².
+        """Return the pendulum length (m) of the mode ``bob`` at the frequency in ``values``.
 
-        The frequency of the mode ``bob`` is in ``values``.
+        It is chosen so that the specific force and the centring stiffness keep their shares of the
+        restoring force.
         """
         craft, axis = self._craft, self._craft.tanks[bob.tank].axes[:, 2]
         before, now = (
@@ -998,8 +1036,9 @@ class UncertainModel:
     def _around(self, loop: Loop) -> tuple["UncertainModel", LinearModel]:
         """Return this model with the commands of a loop as inputs, and the loop's controller.
 
-        A wheel's torque T acts on the craft, and its momentum h by the torque -w × h, with h' = -T.
-        Raises FmuError if the loop does not fit the model.
+        If the loop commands a wheel, its torque T acts on the craft, which turns at w. The
+        momentum h of the wheel, with the derivative -T, causes the further torque -w × h. Raises
+        FmuError if the loop does not fit the model.
         """
         K, M, width = loop._must_be_linear(), self.M, self.order
         measured, inputs = loop.names[0], loop._acting_inputs

@@ -164,10 +164,10 @@ def speed_name(torque: str) -> str:
 
 
 def rows_of(wheels: Mapping[str, Wheel], command: Sequence[str]) -> list[Row]:
-    """Return rows for `Feedback.wheels`.
+    """Return the data of each wheel that a controller commands, as `Feedback.wheels` takes them.
 
-    ``wheels`` has the wheels whose torques are commands, by the names of the torques in
-    ``command``.
+    ``command`` has the names of all commands, and ``wheels`` the wheels by the names of their
+    torques among them.
     """
     return [
         (command.index(name), of.direction.tolist(), of.inertia, of.max_torque, of.max_speed,

@@ -58,7 +58,11 @@ class Confirmation:
 
     @property
     def agrees(self) -> bool:
-        """True if frequency and factor, or growth rate of an unstable loop, agree to 1 %."""
+        """True if the simulation agrees with the prediction to 1 %.
+
+        The frequency of the oscillation is compared, and the factor of the gain at the limit of
+        stability or, of an unstable loop, the growth rate.
+        """
         if abs(self.simulated_frequency - self.frequency) > 0.01 * self.frequency:
             return False
         if self.command is not None:
