@@ -293,7 +293,7 @@ class Appendage:
 
 
 def _unmasked(given: Any) -> Vector:
-    """Return ``given`` as floats; empty if an entry is masked or is not a number."""
+    """Return ``given`` as an array, which is empty if an entry is masked or is not a number."""
     try:
         return array(given)
     except FmuError:

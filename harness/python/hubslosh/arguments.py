@@ -189,7 +189,7 @@ def wrong_parts(
 
 
 def check_table(table: Any, what: str) -> None:
-    """Raise FmuError if an argument is not a pandas.DataFrame."""
+    """Raise FmuError if the argument ``table``, named ``what``, is not a pandas.DataFrame."""
     import pandas as pd
 
     if not isinstance(table, pd.DataFrame):

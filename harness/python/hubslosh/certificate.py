@@ -219,7 +219,7 @@ def corners(count: int) -> Vector:
 
 
 class UnstableError(Exception):
-    """Raised if the loop is unstable at a Δ for which stability should be proved."""
+    """Raised if the loop is unstable for parameters for which stability should be proved."""
 
     def __init__(self, delta: Vector) -> None:
         super().__init__()

@@ -495,11 +495,11 @@ class Craft:
                         of.contact_angle, spin)  # fmt: skip
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
-        """Return the slosh modes of each (name, fill, gravity), or None if the tank is empty.
+        """Return a solved tank for each item of ``asked``, or None if the tank is empty.
 
-        The name is the tank's, and gravity is the specific force, m/s². Each combination is
-        computed only once for this craft. All new combinations are computed in one call, on all
-        cores.
+        An item has the tank's name, its fill, and the specific force along its axis, m/s². Each
+        combination is computed only once for this craft. All new combinations are computed in one
+        call, on all cores.
         """
         wanted = [key for key in dict.fromkeys(asked) if not _is_empty(key[1])]
         new = [key for key in wanted if key not in self._known]
@@ -784,11 +784,11 @@ class Craft:
         trimmed: bool = True,
         **options: Any,
     ) -> tuple[OperatingPoint, float | None]:
-        """Return the operating point at ``fill``, and the loop's delay (s) or None.
+        """Return the operating point at ``fill``, and the delay (s) in ``parameters`` or None.
 
         The point is trimmed if ``trimmed``, so that the thrust acts through the centre of mass. The
-        delay is an entry of ``parameters``, although it is no parameter of the FMU. ``options`` are
-        passed to `_untrimmed`.
+        delay is returned separately, because it belongs to the control loop and not to the FMU.
+        ``options`` are passed to `_untrimmed`.
         """
         every, modes, late = self._resolve(fill, parameters, **options)
         return self._realised(every, modes, trimmed=trimmed), late
@@ -857,8 +857,8 @@ class Craft:
         """Return Spacecraft's parameters at ``fill``, with O where the user put it.
 
         Trimming would move the reference point O. If ``rigid``, tanks have no slosh modes; if
-        ``detach``, their liquid is detached. ``mass_flow`` (kg/s) and ``between`` (two fills) make
-        the tanks drain, see `_draining`.
+        ``detach``, their liquid can leave the bottom. ``mass_flow`` (kg/s) and ``between`` (two
+        fills) make the tanks drain, see `_draining`.
         """
         if detach and (rigid or mass_flow is not None):
             raise FmuError(

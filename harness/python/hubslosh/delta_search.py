@@ -109,7 +109,9 @@ class DeltaSearch:
     def limits(self, ways: Matrix, largest: float, steps: int) -> list[WorstCase]:
         """Return the Δ at the limit of stability on lines from Δ = 0.
 
-        Each row of ``ways`` is the direction of a line; its largest component is 1.
+        Each row of ``ways`` is the direction of a line; its largest component is 1. Stability is
+        tested at ``steps`` points of each line, up to the size ``largest``. Lines whose limit is
+        larger than the limit on another line are left out.
         """
         sizes = np.linspace(0, largest, steps + 1)
         at = np.maximum(sizes[1:, None, None] * ways, self.least)

@@ -268,7 +268,7 @@ class Fmu:
 
     @cached_property
     def _by_causality(self) -> dict[tuple[str, ...], list[str]]:
-        """Names of the variables by the causalities for which `names` was called."""
+        """Cache of the results of `names`, by its arguments."""
         return {}
 
     @cached_property

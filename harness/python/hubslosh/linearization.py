@@ -385,9 +385,9 @@ def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
 
 @lru_cache(maxsize=32)
 def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
-    """Return exp(A t), and the states after the time t with each input held at 1 from 0 on.
+    """Return exp(A t), and the states (rows) at t after a unit step of each input (column).
 
-    ``time`` is t, s, and A the matrix of ``model``.
+    ``time`` is t, s, after the step, and A the matrix of ``model``.
     """
     n, m = model.B.shape[-2:]
     whole = exponential(_block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)

@@ -168,7 +168,10 @@ def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
         names = _flexible(plant)
 
     def accelerations(deflections: Vector) -> tuple[Vector, Vector]:
-        """Return the modal accelerations and the angular acceleration for given deflections."""
+        """Return the accelerations of appendage modes and the craft's angular acceleration.
+
+        The modes are at rest, with the modal displacements ``deflections``.
+        """
         start = dict(zip((f"{name}eta_0" for name in names), deflections.tolist(), strict=True))
         start |= dict.fromkeys((f"{name}eta_dot_0" for name in names), 0.0)
         with Plant(model, {**parameters, **start}) as plant:

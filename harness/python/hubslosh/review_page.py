@@ -453,7 +453,10 @@ def _requirements(review: "Review") -> str:
 
 
 def _unstable(row: Any) -> str:
-    """Return text with the number of unstable points of a fill; the nominal point is named."""
+    """Return the number of unstable points of a fill, for example "nominal, 3 of 20 points".
+
+    The text begins with "nominal" if the nominal point is unstable.
+    """
     if not row["unstable"]:
         return "no"
     nominal = "nominal, " if np.isnan(row["modulus_margin_nominal"]) else ""

@@ -91,14 +91,17 @@ def draw(
 def _drawn(ranges: Mapping[str, Range], run: int, seed: int) -> dict[str, Any]:
     """Return the random values of run number ``run`` of a study with the seed ``seed``.
 
-    The limits in ``ranges`` are absolute numbers.
+    ``ranges`` has no shares such as "10%" (see `_resolved`).
     """
     shares = iter(uniforms(int(seed), int(run), len(ranges)))
     return {name: _value(of, next(shares)) for name, of in ranges.items()}
 
 
 def _value(of: Range, share: float) -> Any:
-    """Return the value of the range ``of`` at the uniform random number ``share`` in [0, 1)."""
+    """Return the value that the uniform random number ``share`` in [0, 1) selects from a range.
+
+    For example, 0.25 selects 3.0 from the range (2, 6), and the first quartile of a distribution.
+    """
     if hasattr(of, "ppf"):
         value = of.ppf(share)
     elif isinstance(of, list):

@@ -55,9 +55,11 @@ def form(N: Complex, D: Complex, G: Complex) -> Complex:
 
 
 def recentred(N: Complex, copies: NDArray[np.int64], low: Vector, high: Vector) -> Complex:
-    """Return N for a box of δ, from ``low`` to ``high``, after scaling the box to [-1, 1].
+    """Return N after a change of variables in which a box of δ becomes |δ| ≤ 1.
 
-    A proof for |δ| ≤ 1 with the returned matrix is then a proof for the box.
+    N is the response from the outputs to the inputs of Δ; its row n belongs to the parameter
+    ``copies[n]``. The box reaches from ``low`` to ``high``. A proof for |δ| ≤ 1 with the returned
+    matrix is a proof for the box.
     """
     middle, radius = ((low + high) / 2)[copies], ((high - low) / 2)[copies]
     found: Complex = np.linalg.solve(np.eye(len(middle)) - N * middle, N) * radius

@@ -46,7 +46,7 @@ class History:
         self.native = native.History(time, values, slopes, hold)
 
     def after(self, t: Real) -> tuple[Real, Real]:
-        """Return values and slopes of the input immediately after each ascending time ``t``."""
+        """Return the input and its derivative just after each of the ascending times ``t``."""
         values, slopes = self.native.after(np.ascontiguousarray(t, float))
         return np.frombuffer(values).copy(), np.frombuffer(slopes).copy()
 
@@ -436,7 +436,10 @@ def check_parameters(
     histories: Mapping[str, History],
     problems: list[str],
 ) -> None:
-    """Append to ``problems`` everything that is wrong with the parameters."""
+    """Append to ``problems`` everything that is wrong with the parameters.
+
+    For example, ``parameters`` must not set an input that has a history in ``histories``.
+    """
     for name, value in parameters.items():
         try:
             variable = fmu.variable(name)

@@ -43,7 +43,12 @@ class Suggestion:
 def suggest(
     nominal: "Sequence[Point]", every: "Sequence[Point]", slosh: pd.DataFrame
 ) -> Suggestion:
-    """Try notches at the slosh mode with the highest peak, and roll-offs, and return the best."""
+    """Try notches at the slosh mode with the highest peak, and roll-offs, and return the best.
+
+    A filter is judged by the smallest modulus margin over the points ``nominal`` and the worst
+    points of ``every``. Filters that cost too much phase at the rigid-body crossover are left out.
+    ``slosh`` is the table of slosh modes in the loop.
+    """
     worst = sorted(every, key=lambda point: point.distance)[:WORST]
     points = list({id(point): point for point in [*nominal, *worst]}.values())
     grids = [_sampled(point) for point in points]

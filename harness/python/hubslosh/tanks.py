@@ -416,7 +416,7 @@ def check_fill(fill: Any) -> Any:
 
 
 def amount_of(fill: Any) -> Any:
-    """Return the number in a fill, which is a height in m, a percentage or a mass in kg."""
+    """Return the number in a fill: its height in m, percentage (60 for "60%") or mass in kg."""
     if isinstance(fill, str):
         return percent_of(fill)
     return fill[0] if is_mass(fill) else fill

@@ -102,7 +102,10 @@ ALONE = 1e-12  # Relative size below which a coefficient is a rounding error and
 
 @dataclass(frozen=True)
 class _Bob:
-    """A slosh mode: numbers of tank and mode, pendulum length (m), stiffness over mass (1/s²)."""
+    """A slosh mode: numbers of tank and mode, and pendulum length (m).
+
+    ``stiffness`` is the centring stiffness divided by the slosh mass, 1/s².
+    """
 
     tank: int
     mode: int
@@ -218,9 +221,10 @@ class _Craft:
         return _rigid(*self.dry(self.values)) + self.liquid
 
     def load(self, values: Mapping[str, float], *, moving: bool = True) -> Matrix:
-        """Return force and torque about O (6 numbers) that rotation at a constant rate needs.
+        """Return force and torque about O (6 numbers) that rotation without acceleration needs.
 
-        If ``moving`` is False, craft and liquid count as one rigid body.
+        They balance the gyroscopic and centrifugal loads of craft and liquid. If ``moving`` is
+        False, craft and liquid count as one rigid body.
         """
         w = self.omega
         rigid = _rigid(*self.dry(values)) + self.liquid
@@ -606,7 +610,7 @@ def _partitioned(
     W = _cross(omega)
 
     def inwards(place: Matrix) -> Matrix:
-        """Return the derivative of w × (w × place) with respect to w."""
+        """Return the derivative of the acceleration w × (w × place) by the angular velocity w."""
         return -_cross(W @ place) - W @ _cross(place)
 
     def grown(signal: Matrix) -> Matrix:
@@ -1237,7 +1241,11 @@ class UncertainModel:
 
     @property
     def _least(self) -> Matrix:
-        """Lower bound of each δ, at which a damping ratio is 0 and other quantities are above 0."""
+        """Lower bound of each δ, or -inf.
+
+        At the bound a damping ratio is almost 0; a mass, moment of inertia or frequency is 1 % of
+        its nominal value.
+        """
         found = np.full(len(self.deltas), -np.inf)
         for k, name in enumerate(self.deltas):
             if name in self.spread.index and (share := _LEAST.get(_kind(name))) is not None:
