@@ -919,7 +919,7 @@ def flat(settings: dict, prefix: str = "") -> dict:
 
 
 BREAKING = ((0.03, 0.66), (0.09, 0.60))
-"""Growth and onset of damping by breaking waves: both ends of their ranges in book/damping.md."""
+"""Growth and onset of breaking waves: both ends of their ranges in book/finite_amplitude.md."""
 
 
 def as_built() -> list[Row]:
