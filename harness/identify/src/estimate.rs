@@ -22,10 +22,10 @@ impl Estimated {
         Estimated { value, std, std_noise: std, interval, determined: true, unit: unit.into() }
     }
 
-    /// Returns `of`, for example a standard deviation, as a percentage of the estimated value. Returns `None` if the value is
-    /// zero within its standard deviation, because a percentage would then be meaningless.
-    pub fn percent(&self, of: f64) -> Option<f64> {
-        (self.value.abs() > self.std).then(|| 100.0 * of / self.value)
+    /// Returns `amount`, for example a standard deviation, as a percentage of the estimated value. Returns `None` if the
+    /// value is zero within its standard deviation, because a percentage would then be meaningless.
+    pub fn percent(&self, amount: f64) -> Option<f64> {
+        (self.value.abs() > self.std).then(|| 100.0 * amount / self.value)
     }
 
     /// Returns the change `by` of the value as text: in percent or, if the value is near zero, in its own unit.

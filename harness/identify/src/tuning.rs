@@ -17,7 +17,7 @@ pub const UNEVEN: f64 = 0.02;
 pub const KERNEL_HALF: isize = 24;
 
 // Gaps of the torque: `input/gaps.rs`.
-// Tests: `lost_samples_of_a_sweep_are_predicted_and_those_of_noise_are_not`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
+// Tests: `lost_samples_of_a_sweep_are_predicted_and_lost_samples_of_noise_are_not`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
 /// Ratio of the spacing of two samples to the usual spacing above which samples between them must have been lost.
 pub const LOST_SPACING: f64 = 1.75;
 /// Longest gap of the torque that is filled by prediction, s.
@@ -37,14 +37,14 @@ pub const GAP_KICK: f64 = 0.1;
 pub const FEW_GAPS: usize = 5;
 
 // Plausibility of a recording: `input/plausible.rs`.
-// Tests: `the_inertia_of_a_wheel_is_reported_if_it_gives_its_torque_and_otherwise_a_doubt`.
+// Tests: `a_wheel_that_does_not_give_the_commanded_torque_is_reported`.
 /// Length of the windows, s, in which the change of the wheel's speed is compared with the torque.
 pub const WHEEL_WINDOW: f64 = 0.1;
 
 // Reading: `input/reading.rs`.
 // Tests: `each_fault_of_a_recording_is_named_in_its_error`, `twenty_spikes_are_reported_and_left_out`.
-/// Time at the beginning of a part of a recording in which no sensor is fitted, s, if the hub is already moving there: a sensor
-/// with a delay shows the motion before the part's first torque.
+/// If the hub already moves when a part of a recording begins, no sensor is fitted during this time, s: a delayed sensor
+/// then shows motion that torque before the part has caused.
 pub const LATE_SENSOR: f64 = 0.1;
 /// Largest number of rows of a free decay. The limit is needed because the spectrum of the residual
 /// takes 400 sines for each row.
@@ -71,28 +71,28 @@ pub const LONG_RECORDING: f64 = 120.0;
 pub const SLOW_GYRO: f64 = 0.75;
 /// Largest absolute value of a signal that is accepted. The sum of the squares over all rows then cannot overflow.
 pub const LARGEST_VALUE: f64 = 1e100;
-/// If at least this fraction of the changes of a gyro signal falls on the rows of a slower clock, the gyro counts as
-/// sampled by this clock.
+/// If at least this fraction of the changes of a gyro's value is in every n-th row of the recording, the gyro counts as
+/// sampled n times more slowly than the recording.
 pub const ON_CLOCK: f64 = 0.98;
 /// Slowest gyro that is detected: the number of rows for each of its values.
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
 // Tests: `each_fault_of_a_sensor_is_reported`, `no_fault_is_found_in_a_sound_gyro`, `a_hub_at_rest_is_no_fault`, `clipping_at_one_end_of_the_range_is_also_assumed_at_the_other_end`.
-/// Smallest number of equal values at an end of the sensor's range that count as clipped, and the smallest ratio of this number
-/// to the number of equal values just inside the range.
+/// Equal values at an end of the sensor's range are clipped if their number is at least the first number, and more than the
+/// second number times the number that is expected from the values just inside the range.
 pub const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of the zone just inside an end of the sensor's range, relative to the sensor's noise.
 pub const CLIPPED_INSIDE: f64 = 3.0;
-/// Smallest step, in units of the sensor's resolution, from both ends of the range to the next value if the sensor
-/// clips at both ends.
+/// A sensor is clipped at both ends of its range if the values next to both ends are more than this number of resolution
+/// steps away from the ends.
 pub const FAULT_STEPS: f64 = 2.0;
 /// If a run of equal values has at most this probability of being chance, the sensor counts as frozen.
 pub const FROZEN_CHANCE: f64 = 1e-6;
 /// Smallest number of equal values in a row at which the sensor may count as frozen.
 pub const FROZEN_RUN: usize = 5;
-/// Smallest number of repeated values that is reported, and the smallest ratio of the mean square deviation of repeated values
-/// from their neighbours to the mean square deviation of other values.
+/// Repeated values are reported if their number is at least the first number, and if the mean square of their deviations
+/// from the neighbouring values is more than the second number times the usual squared deviation.
 pub const REPEATS: (usize, f64) = (10, 3.0);
 /// Largest rounding error of a sensor's value, relative to its largest absolute value.
 pub const SENSOR_ROUNDING: f64 = 1e-9;
@@ -129,7 +129,8 @@ pub const KNOWN_REACH: f64 = 5.0;
 pub const COMPARED_STEPS: usize = 1000;
 /// Tolerance of the host's solver in runs that check the FMU's own solver, if the FMU suggests no tolerance.
 pub const COMPARED_TOLERANCE: f64 = 1e-8;
-/// Ratio of the tolerance in the checking run to the tolerance that is used or that the FMU suggests.
+/// Factor by which the tolerance is smaller in a run that checks the FMU's own solver. It multiplies the tolerance that is
+/// set or, if none is set, the tolerance that the FMU suggests.
 pub const COMPARED_FACTOR: f64 = 1e-2;
 /// Number of steps from row to row in which a linear input is held constant if the FMU takes no slopes. The held value is the
 /// value in the middle of a step: the input then differs from the line by a sawtooth of an eighth of the change from row to row,
@@ -139,7 +140,7 @@ pub const HELD_STEPS: usize = 4;
 pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 // Effects outside the FMU: `bench/effect.rs`.
-// Tests: `lags_of_a_sine_equal_those_of_its_frequency_response`.
+// Tests: `a_lag_changes_a_sine_as_its_frequency_response_predicts`.
 /// Smallest and largest number of lines that replace the curve of a lagged torque from knot to knot. At 2.4 Hz and 50 knots a
 /// second, the effect of the lines differs from the effect of the curve by at most 1e-3.
 pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
@@ -150,7 +151,7 @@ pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
 pub const COARSEST: f64 = 0.2;
 
 // Runs of the bench: `bench/simulate.rs`.
-// Tests: `the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque`, `a_simulation_that_would_take_too_long_is_refused`.
+// Tests: `the_simulation_of_the_fit_reproduces_a_twin_with_a_delay_or_a_smooth_torque`, `a_simulation_that_would_take_too_long_is_refused`.
 /// Two instants closer than this, s, count as the same.
 pub const SAME_INSTANT: f64 = 1e-9;
 /// Largest number of internal steps of our FMUs in a communication step: the first number, plus the second number for each second
@@ -187,7 +188,7 @@ pub const PAGE_POINTS: usize = 700;
 pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
 // Friction runs: `methods/friction.rs`.
-// Tests: `friction_fits_of_three_sets_of_runs_end_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_advice`, `noise_shows_no_preferential_direction_and_a_variation_of_10_per_cent_does`.
+// Tests: `friction_fits_of_three_sets_of_runs_end_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_advice`, `friction_that_depends_on_angle_and_direction_is_distinguished_from_noise`.
 /// Length of the blocks of rows that are averaged for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
 /// Smallest number of blocks in the recording of a friction run.

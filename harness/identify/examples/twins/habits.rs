@@ -52,7 +52,8 @@ struct Row {
     angle: Option<f64>,
 }
 
-/// Returns a variant of the twin that the format needs, for example with a slow gyro.
+/// Returns the twin with the properties that recordings in the logger format `habit` have: for example a sampling rate of
+/// 33 Hz for `ms-33hz`, or an encoder for `two-delays`.
 pub fn of(mut twin: Twin, habit: &str) -> Twin {
     match habit {
         "ms-33hz" | "us-33hz" => twin = twin.with_rate(33.0),

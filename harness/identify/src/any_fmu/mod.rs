@@ -199,7 +199,6 @@ fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     }
 }
 
-/// Uncertainty of one unknown.
 struct Number {
     std: f64,
     std_noise: f64,

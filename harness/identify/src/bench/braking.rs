@@ -17,8 +17,8 @@ pub struct FrictionPoint {
 #[derive(Clone, Debug, Serialize)]
 pub struct Braking {
     pub direction: &'static str,
-    /// Speed at which the coefficients hold, rad/s: the mean over both directions. The fit includes the dependence on the
-    /// speed as a parabola.
+    /// Speed of the hub for which `coefficients` are computed, rad/s: the mean over both directions. The fit describes the
+    /// dependence of the deceleration on the speed by a parabola.
     pub speed: f64,
     /// Coefficients in the order β_0, β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
@@ -28,10 +28,12 @@ pub struct Braking {
     pub rows: usize,
     /// Number of stretches from which the coefficients were computed. A stretch is one revolution of the hub within one decay.
     pub stretches: usize,
-    /// Angle (rad) of each row, and its acceleration corrected to the speed `speed` (rad/s²).
+    /// For each fitted row, the angle of the hub, rad, and its angular acceleration, rad/s², corrected for the difference
+    /// of the rate from `speed`.
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
-    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).
+    /// Covariance of `coefficients`, computed from the scatter between stretches (see `stretches`). `None` if their number
+    /// is below [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).
     #[serde(skip)]
     pub(crate) covariance: Option<DMatrix<f64>>,
 }

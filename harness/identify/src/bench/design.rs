@@ -57,7 +57,8 @@ impl Multisine {
         Ok(flat.drawn(peak, &mut random))
     }
 
-    /// Returns a multisine with the same lines, with these shares of the power and new random phases.
+    /// Returns a multisine with the same frequencies and new random phases. `shares` are the fractions of the power at
+    /// these frequencies, `peak` is the largest torque, N·m, and `seed` selects the phases.
     pub fn shaped(&self, shares: &[f64], peak: f64, seed: u64) -> Self {
         let amplitudes = shares.iter().map(|p| p.sqrt()).collect();
         Multisine { amplitudes, ..self.clone() }.drawn(peak, &mut Random::new(seed, 1))

@@ -68,7 +68,7 @@ mod tests {
     /// A lag with the time constant T multiplies the amplitude of a sine with the angular frequency Ω by 1/√(1 + (ΩT)²) and
     /// shifts its phase by −atan ΩT.
     #[test]
-    fn lags_of_a_sine_equal_those_of_its_frequency_response() {
+    fn a_lag_changes_a_sine_as_its_frequency_response_predicts() {
         let (w, lag, h) = (15.0_f64, 0.03, 0.02);
         let time: Vec<f64> = (0..2000).map(|k| h * f64::from(k)).collect();
         // linear interpolation of a sine reduces its amplitude by sinc²

@@ -15,7 +15,7 @@ use crate::input::recording::{Recording, masked};
 use crate::model::simulate::most_steps;
 use crate::tuning::SAME_INSTANT;
 
-/// The FMU's parameters that are multiplied by a drift of the friction.
+/// The FMU's friction coefficients. If friction drifts during a recording, all three change in proportion.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
 #[derive(Clone, Debug, Default)]

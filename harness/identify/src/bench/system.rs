@@ -104,7 +104,8 @@ pub struct BenchSystem<'a> {
     pub way: f64,
     /// Largest absolute torque of the recordings, N·m.
     pub largest: f64,
-    /// Motion at the minimum of each recording, from which additional torques are computed.
+    /// For each recording, the motion at the minimum. Additional torques, for example a torque proportional to the rate,
+    /// are computed from this motion.
     pub base: OnceLock<Vec<Motion>>,
 }
 

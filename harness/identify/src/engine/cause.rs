@@ -39,7 +39,8 @@ pub struct Effect {
     pub size: (f64, f64),
     /// Decrease of −2 ln L when the effect is fitted.
     pub gain: f64,
-    /// True if the residual is noise once the effect is fitted, and if no sign indicates that the effect imitates another one.
+    /// True if the residual is noise once the effect is fitted, and nothing indicates that another effect is the true
+    /// cause.
     pub fits: bool,
 }
 
@@ -209,7 +210,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cause_wins_against_effects_that_fit_and_loses_to_better_ones_that_do_not() {
+    fn the_cause_is_clearly_better_than_other_effects_that_fit_and_not_clearly_worse_than_any_effect()
+     {
         let effect = |gain: f64, fits: bool| Effect { unknown: 0, size: (1.0, 0.1), gain, fits };
         let named = |all: &[Effect]| cause(all).map(|effect| effect.gain);
         assert_eq!(named(&[effect(100.0, true), effect(80.0, true)]), Some(100.0));

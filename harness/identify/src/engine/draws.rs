@@ -22,17 +22,19 @@ const FEWEST: usize = 400;
 /// Number of grid points over the range of the profile's coordinate; between two grid points draws are uniform.
 const PLACES: usize = 400;
 
-/// Quantities that are computed from the unknowns: their names, units and values at the minimum, and in `columns`
-/// the draws of each.
+/// Quantities that are computed from the unknowns, for example the diameter of the tank. `values` are their values at the
+/// minimum. `columns` contains random draws of each quantity, from which its interval is computed.
 #[derive(Clone, Debug, Default)]
 pub struct Derived {
     pub names: Vec<String>,
     pub units: Vec<String>,
     pub values: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
-    /// Draws of known values, by name: deviations in their coordinates, divided by their standard deviations.
+    /// Name and random draws of each known value with a tolerance. A draw is the deviation from the stated value, divided
+    /// by its standard deviation.
     pub tolerances: Vec<(String, Vec<f64>)>,
-    /// For the quantity with this name: true for each end of its interval that the range of the profile left open.
+    /// Name of the quantity whose profile was followed, and for the lower and the upper end of its interval true if the end
+    /// is open, because −2 ln L has not risen enough where the profile ends.
     pub open: Option<(String, [bool; 2])>,
 }
 
@@ -221,8 +223,8 @@ impl Solution<'_> {
     }
 }
 
-/// Returns the matrix that maps independent standard normal numbers to deviations of the unknowns `which`, so that their
-/// covariance follows from the Jacobian.
+/// Returns a matrix that maps independent standard normal numbers to random deviations of the unknowns `which`. The
+/// deviations have the covariance (JᵀJ)⁻¹ of the Jacobian J. For `keeps_flat` see [`Curvature::with_flat`].
 fn spread(jacobian: &DMatrix<f64>, which: &[bool], keeps_flat: bool) -> DMatrix<f64> {
     let curvature = Curvature::new(jacobian, places(which)).with_flat(keeps_flat);
     let (vectors, inverse) = curvature.spread();

@@ -49,7 +49,8 @@ pub struct Derivatives {
     /// Jacobian of `Point::e` with a column for each unknown. The column is 0 if the derivative by this
     /// unknown was not requested.
     pub matrix: DMatrix<f64>,
-    /// Mean change of the model over the rows of each signal (row) per unit of each unknown (column).
+    /// Derivative of the mean of each signal (row of the matrix) by each unknown (column). The mean is over the rows in
+    /// which the signal was measured.
     pub means: DMatrix<f64>,
 }
 

@@ -14,19 +14,21 @@ use super::{ALIKE, DECIDES, ENDS, Fit, SETS};
 /// Negative delay, in rows, that still counts as no delay, because the time stamps of two channels may differ by so much.
 const EARLIEST: f64 = 0.05;
 
-/// An intersample behaviour that was not chosen, at its own minimum.
+/// Result of the search with an intersample behaviour that was not chosen.
 #[derive(Clone, Debug)]
 pub struct Rival {
     pub hold: Hold,
-    /// Sum of squares at this minimum minus the sum of squares with the chosen intersample behaviour.
+    /// Smallest sum of squares with this intersample behaviour minus the smallest sum of squares with the chosen one.
     pub more: f64,
-    /// Coordinates of its minimum minus the coordinates of the minimum with the chosen intersample behaviour.
+    /// Difference of the minimum with this intersample behaviour from the minimum with the chosen one, in the coordinates
+    /// of the unknowns.
     pub shift: Vec<f64>,
     /// Delay, s, that was estimated with this intersample behaviour, if a delay is estimated.
     pub delay: Option<f64>,
     /// True if an output would precede its input with this delay.
     pub early: bool,
-    /// True if the search for its minimum was given up, because its sum of squares is far above the lowest one.
+    /// True if the search with this intersample behaviour was given up, because its sum of squares was far above the lowest
+    /// one.
     pub lost: bool,
 }
 

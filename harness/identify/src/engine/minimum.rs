@@ -36,8 +36,8 @@ pub struct End {
 }
 
 impl End {
-    /// Creates the limits of a search, which ends after `sets` Jacobians, or when the Newton decrement is
-    /// below `decrement`, standard deviations.
+    /// Creates limits with which a search ends after `sets` Jacobians, or earlier if the Newton decrement (the estimated
+    /// distance to the minimum, in standard deviations) is below `decrement`.
     pub fn new(sets: usize, decrement: f64) -> Self {
         End { sets, decrement, above: f64::INFINITY, gain: 0.0, trusts: false }
     }
@@ -68,13 +68,13 @@ impl Curvature {
         Curvature { which, matrix, scale, keeps_flat: false }
     }
 
-    /// If `keeps_flat` is true, directions that the recordings hardly determine get the largest variance that the curvature
-    /// resolves, so that no unknown in such a direction seems to be well known. Otherwise these directions get a variance of 0.
+    /// Sets the variance of directions that the recordings hardly determine. If `keeps_flat` is true, it is the largest
+    /// variance that the curvature resolves, so that no unknown in such a direction seems to be well known. Otherwise it is
+    /// 0.
     pub fn with_flat(self, keeps_flat: bool) -> Self {
         Curvature { keeps_flat, ..self }
     }
 
-    /// Returns the gradient of the unknowns of `which`, in the scales of the matrix.
     fn scaled(&self, gradient: &DVector<f64>) -> Vec<f64> {
         self.which.iter().zip(&self.scale).map(|(j, s)| gradient[*j] * s).collect()
     }
@@ -121,8 +121,9 @@ impl Curvature {
         self.eigen().map_or(f64::NAN, ratio).sqrt()
     }
 
-    /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue. The inverse is set to 0 for a
-    /// direction that the recordings hardly determine, unless [`with_flat`](Self::with_flat) changed that.
+    /// Returns the eigenvectors of the scaled curvature, and for each the variance in its direction, which is the inverse
+    /// of the eigenvalue. A direction that the recordings hardly determine has the variance that
+    /// [`with_flat`](Self::with_flat) sets, by default 0.
     pub fn spread(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.which.len();
         let Some(found) = self.eigen() else { return (DMatrix::zeros(n, n), DVector::zeros(n)) };
@@ -140,9 +141,9 @@ impl Curvature {
         (found.eigenvectors, inverse)
     }
 
-    /// Returns the directions that the curvature does not resolve, as unit vectors in the scaled unknowns. `errors` are
-    /// the independent relative errors of the derivatives. On average they contribute Σ v_i² errors_i² to the eigenvalue
-    /// of a unit eigenvector v.
+    /// Returns the eigenvectors, in scaled unknowns, whose eigenvalues are so small that errors of the derivatives may have
+    /// caused them. `errors` are the relative errors of the derivatives by each unknown; they are taken as independent of
+    /// each other.
     pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
         let Some(found) = self.eigen() else { return Vec::new() };
         let flat = FLAT * found.eigenvalues.max();

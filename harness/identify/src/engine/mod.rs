@@ -41,16 +41,17 @@ pub const DECIDES: f64 = 10.0;
 pub const ALIKE: f64 = 2.0;
 /// Relative standard deviation of an estimate above which its likelihood may not be a parabola.
 pub const VAGUE: f64 = 0.05;
-/// Norm of the change of the whitened residuals that the step of a finite difference aims at: large enough to exceed the errors
-/// of a solver, small enough for curvature not to matter.
+/// A step of a finite difference is chosen so that the change of the whitened residuals has about this norm: large enough
+/// to exceed the errors of a solver, and small enough for curvature not to matter.
 pub const MOVE: f64 = 0.3;
 /// Shortest and longest step of a finite difference, as a fraction of the unknown's `reach`.
 pub const STEPS: (f64, f64) = (1e-7, 0.2);
-/// Ratio of the second to the first difference above which errors of the solver may dominate a derivative. Without any signal,
-/// these errors make the ratio √3.
+/// If the norm of the second difference of the residuals is more than this fraction of the norm of their first difference,
+/// errors of the solver may dominate the derivative, and a longer step is tried. For differences that contain only errors
+/// of the solver, the fraction is √3.
 pub const BEND: f64 = 0.3;
-/// Factor between two values that are tried one after the other: steps of a finite difference if the ratio is above [`BEND`], and
-/// damping factors of Levenberg–Marquardt steps.
+/// Factor by which the step of a finite difference becomes longer if [`BEND`] is exceeded, and by which the damping of
+/// Levenberg–Marquardt steps changes.
 pub const WIDER: f64 = 8.0;
 /// Distance to the minimum, in standard deviations, at which a search ends: 0.5 while starts are compared, and 0.02 in the last
 /// search, whose result is reported.
@@ -58,8 +59,7 @@ pub const ENDS: (f64, f64) = (0.5, 0.02);
 /// Factors of the noise in successive searches over the whole recordings. A large factor gives the priors more weight, so that a
 /// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];
-/// Largest number of turns of a loop that ends earlier as a rule: Jacobians of a search, damping factors with one Jacobian,
-/// alternations between noise and minimum, and doublings of a distance.
+/// Largest number of iterations of a loop that usually ends earlier, for example of the Jacobians of one search.
 pub const SETS: usize = 8;
 /// Decrease of the sum of squares below which another Jacobian is not worth its simulations, and below which two minima
 /// count as equally low.

@@ -22,7 +22,8 @@ impl Hold {
     }
 }
 
-/// The place at which an unknown acts. Outputs and recordings are given by their index.
+/// Effect of an unknown on the simulation, the outputs or the priors. The numbers are indices of recordings, outputs and
+/// unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// The unknown changes the simulation of one recording, or of all recordings (`None`), so that its derivatives are
@@ -34,10 +35,10 @@ pub enum Role {
     /// Bias that is added to the output with the first index, in the recording with the second index or
     /// in all recordings (`None`).
     Bias(usize, Option<usize>),
-    /// The second output times the unknown is added to the first output. If both indices are equal, the unknown is the scale
-    /// error of the sensor.
+    /// The output with the second index, multiplied by the unknown, is added to the output with the first index. If both
+    /// indices are equal, the unknown is the scale error of the sensor.
     Gain(usize, usize),
-    /// Error of a stated value: it moves the mean of the prior of the unknown with this index.
+    /// Error of a stated value. It shifts the mean of a prior: the prior of the unknown with this index.
     Stated(usize),
     /// The unknown changes no output, only quantities that [`System::derive`] computes.
     Derived,
@@ -52,12 +53,12 @@ pub enum Part {
     Candidate,
 }
 
-/// One unknown number with its `unit`. The search works with its coordinate z, which is the value or, if `log` is true, the
-/// logarithm of the value.
+/// An unknown that is estimated. The search varies its coordinate z, which is the logarithm of its value if `log` is true,
+/// and otherwise the value itself.
 ///
-/// `start` and `bounds` are values. `prior` (mean and standard deviation of the knowledge before the recordings) and `reach`
-/// (plausible distance from the start) are in the coordinate. If `bent` is true, −2 ln L of the likelihood L is not a
-/// parabola along the unknown, and the profile of the likelihood is followed.
+/// `start` and `bounds` are values. `prior` (mean and standard deviation before the recordings are known) and `reach`
+/// (plausible distance from the start) are in the coordinate z. If `bent` is true, −2 ln L (L: likelihood) is not a
+/// parabola along the unknown, so that its likelihood profile is followed.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     pub name: String,
@@ -174,8 +175,8 @@ pub struct Drift {
     pub width: f64,
 }
 
-/// A simulation at the rows of one recording: the outputs, their time derivatives (`slopes`) if the system computes them, and
-/// `others`, quantities that the search does not need but the system does afterwards.
+/// A simulation at the rows of one recording: the outputs, their time derivatives (`slopes`) if the system computes them,
+/// and `others`, quantities that are not fitted, for example the slosh angle, which the report needs.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     pub outputs: Vec<Vec<f64>>,

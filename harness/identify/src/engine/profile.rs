@@ -62,8 +62,9 @@ impl Fit<'_> {
         Ok(self.bent.is_some())
     }
 
-    /// Returns how far the likelihood along unknown `j` is from a parabola: the relative difference between the square roots of
-    /// the two rises at an end of the 95 % interval, or at a bound before this end. The larger value of both sides counts.
+    /// Returns how far −2 ln L (L: likelihood) along unknown `j` is from a parabola: the relative difference between the
+    /// square roots of its rise and of the parabola's rise at an end of the 95 % interval, or at a bound before this end.
+    /// The larger difference of the two ends counts.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -128,9 +129,10 @@ impl Fit<'_> {
         Ok(points)
     }
 
-    /// Returns the bent unknown and its profile through a minimum, in ascending order of the coordinate. Returns `None` if no
-    /// unknown is bent, or if the recordings determine the bent unknown so well that −2 ln L is a parabola along it. Points of
-    /// `beyond` outside the range of the profile are added.
+    /// Returns the index of the bent unknown, and its likelihood profile through `minimum` in ascending order of the
+    /// coordinate. `beyond` are points that [`Fit::across_ridges`] found; points outside the range of the profile are added
+    /// to it. Returns `None` if no unknown is bent, or if the recordings determine the bent unknown so well that −2 ln L is
+    /// a parabola along it.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -267,8 +269,8 @@ mod tests {
     use crate::engine::search::solve_near;
     use crate::engine::{Hold, Motion, Problem, Recorded, Role, Signal, System, Unknown};
 
-    /// Friction c + d exp(−(ω/ω_s)²) at rates ω far below ω_s. Such data determine c + d and d/ω_s² much better than
-    /// c, d and ω_s.
+    /// Simulated friction torque c + d exp(−(ω/ω_s)²) at given rates ω, which are far below the Stribeck speed ω_s. The
+    /// torque determines c + d and d/ω_s² much better than c, d and ω_s.
     struct Bearing(Vec<f64>);
 
     fn shape(rate: f64, speed: f64) -> f64 {
@@ -282,9 +284,10 @@ mod tests {
         }
     }
 
-    /// For a given ω_s the friction is linear in c and d, so that the sum of squares along ω_s has a closed form.
+    /// For a given Stribeck speed ω_s the friction is linear in the coefficients c and d, so that the smallest sum of
+    /// squares at each ω_s has a closed form.
     #[test]
-    fn a_profile_follows_a_bent_valley_at_its_floor() {
+    fn the_profile_has_the_smallest_sum_of_squares_at_each_stribeck_speed() {
         let (truth, mut random) = ([0.02, 2.4e-3, 0.09], Random::new(431, 0));
         let rates: Vec<f64> = (0..4000).map(|k| 0.024 * (0.01 * f64::from(k)).sin()).collect();
         let noise = 1e-5;

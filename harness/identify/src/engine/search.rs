@@ -27,14 +27,16 @@ pub(super) const ABOVE: f64 = 1.5;
 const SETTLED: f64 = 0.98;
 /// First distance at which the likelihood on one side of an initial value is examined, standard deviations.
 const FAR: f64 = 3.0;
-/// Ratio of the square root of the likelihood's rise to the square root of a parabola's rise at the distance `FAR`. Below this
-/// ratio the likelihood has a kink.
+/// At `FAR` standard deviations from the minimum, the square root of the rise of −2 ln L is equal to `FAR` if −2 ln L is a
+/// parabola. Below this fraction of `FAR`, the likelihood has a kink.
 const KINKED: f64 = 0.8;
-/// If a search over more than a fraction (first number) of the recordings has a sum of squares above a multiple (second number)
-/// of the sum of squares of the best search, its start is given up.
+/// A search from one start is given up if its sum of squares is more than three times (second number) the sum of squares of
+/// the best search over the same part of the recordings. Parts of at most a quarter of the recordings (first number) are
+/// not compared.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
-/// Limits of the noise while a misfit is examined: largest white noise relative to the noise between neighbouring rows, largest
-/// relative size of the drift, and smallest correlation time of the drift, s.
+/// Limits of the estimated noise while the cause of a misfit is searched, so that the misfit is not taken for noise:
+/// largest white noise relative to the noise between neighbouring rows, largest standard deviation of the drift relative to
+/// the white noise, and smallest correlation time of the drift, s.
 pub(super) const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
 pub struct Solution<'p> {
@@ -352,9 +354,8 @@ impl Fit<'_> {
         Ok(profile)
     }
 
-    /// Alternates between estimates of the noise and searches of the minimum until the noise matches the residual. Unknowns at
-    /// a bound are tried once more from their starts, and a lower minimum on the profile replaces the minimum. Returns the
-    /// minimum and its profile.
+    /// Estimates the noise and searches the minimum in turn, until the noise matches the residual. Returns the minimum and
+    /// the profile of the bent unknown. `beyond` are points that may lie outside the range of this profile.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -449,9 +450,8 @@ impl Fit<'_> {
         Ok(())
     }
 
-    /// Returns the content of [`Solution::sides`]: initial values of recordings, with the factor of the standard deviation on
-    /// each side. A factor differs from 1 if dry friction stops the hub before the first fitted row: the likelihood then has a
-    /// kink, and is flat beyond it.
+    /// Computes [`Solution::sides`]. If dry friction stops the hub before the first fitted row, the likelihood has a kink
+    /// at the initial rate, and is flat beyond the kink.
     fn sides(&mut self, minimum: &Minimum) -> Vec<(usize, [f64; 2])> {
         let unknowns = &self.problem.unknowns;
         let is_start = |j: &usize| matches!(unknowns[*j].role, Role::Run(Some(_)));
@@ -496,9 +496,9 @@ impl Fit<'_> {
         self.tests(point).iter().all(Tests::passed) && !self.is_loud()
     }
 
-    /// Frees the known values within their tolerances, if the residual is more than noise and becomes noise by that. Returns the
-    /// minimum with these values, or `None` if they stay fixed. It happens if slosh is nonlinear, or if an encoder shows the
-    /// error of the clock: a recording then determines some known values better than their tolerances.
+    /// Searches the minimum once more with the known values free within their tolerances. Returns this minimum if its
+    /// residual is noise, for example because nonlinear slosh determines a known value better than its tolerance.
+    /// Otherwise, or if the residual is noise already, the known values stay fixed, and the function returns `None`.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -522,10 +522,11 @@ impl Fit<'_> {
         Ok(None)
     }
 
-    /// Returns the minimum that the search reaches from a start. With `parts`, growing parts of the recordings are fitted one
-    /// after the other. Without parts, the whole recordings are fitted several times, each time with a smaller factor of the
-    /// noise. The smallest sum of squares over each part is added to `own`; `best` has the smallest sums of squares of the best
-    /// search so far. Returns `None` if the search approaches the minimum of the best search.
+    /// Searches the minimum from the start `z`. If `parts` contains fractions of the recordings, these growing parts are
+    /// fitted one after the other. If `parts` is empty, the whole recordings are fitted several times, with noise that is
+    /// first multiplied by a large factor ([`INFLATIONS`]). `own` receives each fraction with its smallest sum of squares;
+    /// `best` contains these pairs for the best search so far. Returns `None` if the search approaches the minimum of the
+    /// best search.
     fn search_from(
         &mut self,
         z: &[f64],

@@ -25,15 +25,17 @@ const ROUNDING: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub struct SolverError {
     pub shift: Vec<f64>,
-    /// Relative error of each derivative: from the noise of the outputs alone, and from this noise and the
-    /// curvature within the step.
+    /// For the derivative by each unknown, two relative errors: from the solver's noise alone, and from this noise together
+    /// with the truncation error of the finite difference.
     pub derivative: Vec<(f64, f64)>,
-    /// For each system with smaller errors, true if its outputs differ.
+    /// For each system of `finer` in [`Fit::solver_error`], true if its outputs differ from the outputs of the fitted
+    /// system.
     pub differs: Vec<bool>,
 }
 
-/// Roughness of the outputs along one unknown: one sample of their noise between neighbouring values of the unknown, the norm of
-/// h³ times the third derivative with the noise subtracted, and the step h.
+/// Errors of the solver along one unknown, from five simulations in which the unknown has neighbouring values, `step`
+/// apart. `noise` is one sample of the solver's noise as a vector of whitened residuals. `third` is the norm of step³ times
+/// the third derivative of the whitened residuals, without the part that the noise causes.
 struct Roughness {
     noise: DVector<f64>,
     third: f64,
@@ -68,8 +70,9 @@ impl Fit<'_> {
         Some(Roughness { noise, third: 0.5 * third.max(0.0).sqrt(), step })
     }
 
-    /// Measures the solver's errors at a point, whose derivatives by the unknowns `which` are given. `finer` are copies of the
-    /// system with smaller solver errors.
+    /// Measures how much the solver's errors change the estimates and the derivatives at the point `at`. `jacobian`
+    /// contains the derivatives at this point by the unknowns for which `which` is true. `finer` are copies of the system
+    /// with smaller solver errors; their outputs are compared with the outputs of the fitted system.
     pub fn solver_error(
         &self,
         at: &Point,

@@ -211,7 +211,7 @@ mod tests {
 
     /// Gaps of 1, 10 and 50 samples in a sweep are predicted within 1e-4 of the amplitude. Gaps in white noise are not filled.
     #[test]
-    fn lost_samples_of_a_sweep_are_predicted_and_those_of_noise_are_not() {
+    fn lost_samples_of_a_sweep_are_predicted_and_lost_samples_of_noise_are_not() {
         let values: Vec<f64> = (0..4000).map(|k| sweep(100.0 + 0.02 * f64::from(k))).collect();
         for lost in [1, 10, 50] {
             let found =

@@ -137,7 +137,7 @@ mod tests {
     /// In the first recording the wheel's acceleration times its inertia equals the commanded torque, and a note states the
     /// inertia. In the second it equals 5 % of the torque, and a doubt says that the wheel did not give the torque.
     #[test]
-    fn the_inertia_of_a_wheel_is_reported_if_it_gives_its_torque_and_otherwise_a_doubt() {
+    fn a_wheel_that_does_not_give_the_commanded_torque_is_reported() {
         let (notes, doubts) = columns(&wheel(1.0));
         assert!(notes[0].contains("wheel.I = 2.25") && doubts.is_empty(), "{notes:?} {doubts:?}");
         let (notes, doubts) = columns(&wheel(0.05));

@@ -18,9 +18,10 @@ pub struct Faults {
 /// The value of a sensor while the hub is at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rest {
-    /// Of a gyro: its bias, because the true rate is 0; `None` if the bias is unknown.
+    /// The value of a gyro at rest: its bias, because the true rate is 0. `None` if the bias is unknown.
     Rate(Option<f64>),
-    /// Of an encoder: any angle. When the hub begins to turn, the angle starts with zero rate.
+    /// The value of an encoder at rest, which may be any angle. The angle leaves this value smoothly, because the hub
+    /// starts with zero rate.
     Angle,
 }
 
@@ -134,8 +135,8 @@ fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize
     if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
 }
 
-/// Returns the median of the jumps with which the values leave the end of the sensor's range. `rows` are the rows
-/// with this end value.
+/// Returns the median difference between the value at an end of the sensor's range and the next value that differs from it.
+/// `rows` are the rows with the value at this end.
 fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
     let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
     let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();
@@ -150,10 +151,10 @@ fn resolution(values: &[f64]) -> f64 {
     steps.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the first and last rows of the runs of equal values in which the sensor is frozen. Such a run is too long to be
-/// chance. In addition, its value is away from the mean (the value of a hub at rest is the gyro's bias, which is near the mean),
-/// and it ends in a jump. Once a run has both properties, one of the two is enough for the other runs, because a rate may freeze
-/// near its mean, or come back near the frozen value.
+/// Returns the first and the last row of each run of equal values in which the sensor is frozen. The evidence for a frozen
+/// sensor is a run that is too long to be chance, whose value is away from the mean (the gyro's bias, which is the value of
+/// a hub at rest, is near the mean), and which ends in a jump. If there is such a run, other long runs count even if they
+/// lack one of the last two properties, because a rate may freeze near its mean, or come back near the frozen value.
 fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let runs = runs(values);
     let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= FROZEN_RUN;
@@ -193,8 +194,8 @@ fn runs(values: &[f64]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// Returns the rows that repeat the value before them although the signal is changing. A long run of equal angles that ends
-/// without a jump is no fault, because the hub is at rest.
+/// Returns the rows that repeat the value before them although the signal is changing, except rows that are marked as
+/// faulty in `out`. A long run of equal angles that ends without a jump is no fault, because the hub is at rest.
 fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<usize> {
     let moves = |(a, b): &(usize, usize)| {
         let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > LIMIT * noise);

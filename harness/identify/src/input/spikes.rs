@@ -20,8 +20,8 @@ use analysis::statistics::{median, noise_level, peak};
 use crate::input::clocks::weights;
 use crate::tuning::{SPIKE_AROUND, SPIKE_NEAR_STEP, SPIKE_SHARE, TORQUE_STEP};
 
-/// Returns the ratio of the standard deviation of the difference r (defined at the top of this file) to the standard deviation σ
-/// of white noise in the values.
+/// Returns the standard deviation of the difference between a value and the cubic through its four neighbours, if the
+/// values are white noise with the standard deviation 1.
 fn gain() -> f64 {
     (1.0_f64 + 34.0 / 36.0).sqrt()
 }
@@ -37,8 +37,9 @@ pub fn differences_from_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
     (0..y.len()).map(one).collect()
 }
 
-/// Returns the rows in which a rate has a spike, in ascending order, each with the value of the cubic. If `fresh` is given, only
-/// its rows are used. Returns nothing if there are so many deviating values that they are noise of another kind.
+/// Returns the rows in which a rate has a spike, in ascending order, each with the value there of the cubic through the
+/// neighbouring rows. If `fresh` is given, only rows in which it is true are used. Returns nothing if so many values
+/// deviate that they are noise of another kind.
 pub fn find(
     time: &[f64],
     rate: &[f64],

@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_shows_no_preferential_direction_and_a_variation_of_10_per_cent_does() {
+    fn friction_that_depends_on_angle_and_direction_is_distinguished_from_noise() {
         let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
         // the 95 % band holds for the whole curve: on average 5 of 100 simulations leave it, and 12 are
         // three standard deviations more

@@ -75,8 +75,8 @@ impl Model {
 #[derive(Clone, Debug)]
 pub struct Setup {
     settings: Vec<Setting>,
-    /// Value references of the inputs, and for each whether it is held constant from row to row.
     inputs: Vec<u32>,
+    /// For each input, true if its value is held constant from row to row.
     held: Vec<bool>,
     outputs: Vec<Output>,
     reads: Vec<u32>,
@@ -409,8 +409,8 @@ impl Setup {
         Ok(())
     }
 
-    /// Applies the delays of sensors: the reading in a row is the output of an earlier row, at a distance of the delay. The
-    /// reading is 0 if this row would be before the beginning of the recording.
+    /// Delays the outputs that a sensor measures: the reading in each row is the output in the row that is earlier by the
+    /// sensor's delay, or 0 if this row would be before the beginning of the recording.
     fn late(&self, record: &Record, mut read: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
         for (number, (output, column)) in self.outputs.iter().zip(&mut read).enumerate() {
             let Some(sensor) = output.sensor.as_ref().filter(|s| s.errors().delay > 0.0) else {

@@ -251,7 +251,7 @@ fn an_unknown_keeps_its_prior_if_the_recordings_determine_it_less() {
 }
 
 #[test]
-fn predicted_standard_deviations_equal_those_of_the_fit() {
+fn predicted_standard_deviations_equal_the_standard_deviations_of_the_fit() {
     let at_truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega@each=0"];
     let question = question(&at_truth);
     let model = Model::open(packed_for_tests(), question.solver).unwrap();

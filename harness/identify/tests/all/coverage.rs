@@ -59,7 +59,7 @@ impl Count {
 /// runs only this test.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn coverage_of_a_hundred_twins_of_each_kind() {
+fn coverage_of_a_hundred_twins_of_each_kind_is_near_95_percent() {
     println!("| kind | intervals that hold the truth | part | refused | largest error/σ |");
     println!("| --- | --- | --- | --- | --- |");
     let adaptive = Adaptive::new(&["-DTOLERANCE=1e-3", "-DMODEL_EXCHANGE"]);

@@ -276,7 +276,8 @@ impl Moving {
         })
     }
 
-    /// Specific force at a point (x, z) of the tank from the motion of the tank, in the tank's axes.
+    /// Returns the specific force, m/s², in the tank's axes, at a point (x, z) that moves through the tank with the
+    /// velocity (u, w).
     fn carried(&self, t: f64, [x, z]: [f64; 2], [u, w]: [f64; 2]) -> [f64; 2] {
         let [[_, _, along], [angle, rate, bend]] = self.motion(t);
         let (sin, cos) = angle.sin_cos();
@@ -336,8 +337,8 @@ const MOVING: Moving = Moving {
     size: [0.0015, 0.05],
 };
 
-/// Returns the recording of [`MOVING`] with offsets of the force balance, and its question, in which damping and
-/// third-order terms are known.
+/// Returns a question in which the damping and the third-order coefficients are known, and the simulated recording of the
+/// tank [`MOVING`]. `offsets` are the constant errors of the force balance that measures Fx, Fz and My.
 fn moved(offsets: [f64; 3]) -> (Question, Record) {
     let rows = MOVING.rows(4.0, 0.01);
     let column = |k: usize| -> Vec<f64> { rows.iter().map(|row| row[k]).collect() };
@@ -413,8 +414,8 @@ fn breaking_waves_fit_only_a_model_with_damping_by_breaking() {
     assert!(result.parameters["tank.zeta_breaking[1]"].std < 0.01, "{:?}", result.parameters);
 }
 
-/// The errors of one draw of the noise are correlated, so that 90 % is two standard deviations below 95 %. The test takes
-/// minutes: `-- --ignored --nocapture intervals_of_force`. `HUBSLOSH_DRAWS=21-100` chooses other draws.
+/// At least 90 % of the intervals have to contain the true value. This limit is two standard deviations below 95 %, because
+/// the estimates from one draw of the noise have correlated errors. `HUBSLOSH_DRAWS=21-100` chooses other draws.
 #[test]
 #[ignore = "20 fits: .ci/run --nightly"]
 fn intervals_of_force_records_contain_the_true_values_in_95_percent_of_20_draws() {

@@ -121,9 +121,9 @@ fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
     SETS.iter().flat_map(of).collect()
 }
 
-/// Seed 2 of the first set failed when rows at rest were left out of the fit: the search alternated between two choices of these
-/// rows, because each choice gave a bias that led to the other choice. `friction.d` was wrong by 3.4 standard deviations and the
-/// bias of the ramp by 4.9, and the fit was accepted.
+/// With seed 2 of the first set, an earlier search left out rows at rest, and alternated between two choices of these rows,
+/// because each choice gave a gyro bias that led to the other choice. It accepted a fit in which `friction.d` was wrong by
+/// 3.4 standard deviations, and the gyro's bias by 4.9.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn friction_fits_of_three_sets_of_runs_end_in_no_false_minimum() {
@@ -137,7 +137,7 @@ fn friction_fits_of_eighteen_more_runs_end_in_no_false_minimum() {
 }
 
 #[test]
-fn identify_finds_the_preferential_direction_in_both_directions() {
+fn identify_finds_a_friction_asymmetry_of_the_opposite_sign() {
     assert_eq!(wrong(&SETS[0], 2, 0.002, -ASYMMETRY), [""; 0]);
 }
 

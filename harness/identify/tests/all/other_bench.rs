@@ -65,7 +65,7 @@ fn the_independent_simulator_gives_the_same_motion_as_the_fmu() {
 /// A hub with the inertia I is at rest below the torque c + d, so that a ramp k t makes it break away at t₀ = (c + d)/k. While it
 /// slips, I ω' = τ − c. Without Stribeck's excess d and viscous friction its rate is then ω = k (t − t₀)²/2I.
 #[test]
-fn a_ramp_breaks_away_where_the_closed_form_says() {
+fn under_a_ramp_of_torque_the_hub_breaks_away_as_in_the_closed_form() {
     let (k, c) = (0.004, 0.006);
     let bearing = Bearing { b: 0.0, c, d: 0.0, omega_s: 1.0, asymmetry: 0.0, eps: None };
     let frozen = Bench { liquid: Liquid::Frozen, bearing, ..Bench::default() };

@@ -335,7 +335,7 @@ fn inseparable_parameters_are_named_together_in_the_verdict_and_in_json() {
 
 /// The matrices of these fits are empty or singular. No fit may panic.
 #[test]
-fn fits_with_one_unknown_all_at_bounds_or_without_effect_end_in_a_result_or_an_error() {
+fn fits_with_empty_or_singular_matrices_do_not_panic() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-5", "-DMODEL_EXCHANGE"]);
     let one_row =
         Record { time: vec![0.0], outputs: vec![vec![1.0], vec![0.0]], ..Record::default() };
@@ -408,11 +408,12 @@ fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
     assert!(off < 0.01 * size, "{off} {size}");
 }
 
-/// Identifies 20 simulated recordings of each kind. It is run by `cargo test --release -p identify --test all
-/// -- --ignored --nocapture coverage_with_adaptive_solvers`.
+/// Identifies 20 simulated recordings for each tolerance of an adaptive solver and each size of the noise. At least 88 % of
+/// the intervals have to contain the true value. Only this test is run by `cargo test --release -p identify --test all --
+/// --ignored --nocapture coverage_with_adaptive_solvers`.
 #[test]
 #[ignore = "two minutes: .ci/run --nightly"]
-fn coverage_with_adaptive_solvers() {
+fn coverage_with_adaptive_solvers_is_near_95_percent() {
     for rough in ["-DROUGH", "-DSTEADY"] {
         for deaf in ["-DDEAF", "-DHEEDS"] {
             for (tolerance, scale) in

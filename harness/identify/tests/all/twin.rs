@@ -355,9 +355,8 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     }
 }
 
-/// A held torque acts half a row late, and without an estimated delay nothing can compensate for this. The fit therefore
-/// distinguishes smooth from linear torque long before the minimum is known accurately. A search whose sum of squares is clearly
-/// too large ends early: for the sweep of 2700 s, the impossible behaviours take nine simulations in all, and one at the end.
+/// A held torque acts half a row late. If no delay is estimated, nothing can compensate for this, and the sum of squares is
+/// soon so large that the search with a held torque is given up.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn impossible_intersample_behaviours_cost_few_simulations() {
@@ -490,7 +489,7 @@ fn the_delay_is_uncertain_if_another_intersample_behaviour_fits_as_well() {
 /// better if it acted 10 ms before its command, which is impossible.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn no_model_error_makes_the_rate_come_before_the_torque() {
+fn a_model_error_is_not_explained_by_a_rate_that_precedes_the_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("friction.model", "stribeck_smooth"), ("friction.eps", "1e-3")];
     let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=450".parse().unwrap());
@@ -705,7 +704,7 @@ fn a_rate_in_degrees_per_second_is_refused() {
 /// The simulation of the fit reproduces a simulated recording whose torque is held, linear or band-limited between samples, with
 /// a delay of 0 or 5 ms.
 #[test]
-fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
+fn the_simulation_of_the_fit_reproduces_a_twin_with_a_delay_or_a_smooth_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=130,f0=2,f1=3".parse().unwrap());
     for (intersample, delay) in [
@@ -738,8 +737,7 @@ fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
 /// valley of the likelihood may be the best fit, so that the test compares their intervals.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
-fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_asymmetry_not_at_all()
-{
+fn a_torque_error_of_1_percent_changes_the_friction_by_1_percent_but_neither_delay_nor_asymmetry() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("slosh.model", "linear"), ("friction.asymmetry", "0.1")];
     let mut recording = sweep(&fmu, "lin-sweep:amplitude=0.02,f0=1.8,f1=3,duration=60", &settings);
@@ -772,7 +770,7 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
 
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
+fn a_push_and_a_free_decay_do_not_determine_the_asymmetry_of_the_friction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for way in [1.0, -1.0] {
         let options = Options { models: vec!["frozen".into()], sensor_errors: true, ..options() };
@@ -822,7 +820,7 @@ fn a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result(
 /// Dry friction changes its sign when the hub turns back, which shows when the torque acts. Therefore the intersample behaviour
 /// and the delay can both be estimated.
 #[test]
-fn a_delay_of_half_a_row_is_not_reported_if_the_torque_between_rows_is_found() {
+fn no_delay_of_half_a_row_is_reported_if_the_intersample_behaviour_is_determined() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
     let sensor_errors = SensorErrors { delay: 0.01, ..SensorErrors::default() };

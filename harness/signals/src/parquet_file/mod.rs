@@ -88,9 +88,10 @@ pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
 
-/// Reads columns of a Parquet file. `positions` are the positions of these columns among all columns of the file. `time` is the
-/// position of the time among the columns to read, together with the length of its unit, s, if the unit is stated: integers need
-/// a unit, and timestamps have their own. Columns with true in `booleans` may hold Booleans.
+/// Reads columns of a Parquet file. `positions` receives the names of all columns, and returns the positions of the columns
+/// to read. If one of these is the time, `time` contains its index among the columns to read and, if a unit is stated, the
+/// length of the unit, s. Integer times need a stated unit; timestamps have their own. Columns with true in `booleans` may
+/// contain Booleans.
 ///
 /// # Errors
 /// If the file cannot be read, or the stated unit of timestamps is not their own; [`Foreign`] for types that this

@@ -17,26 +17,27 @@ const DECIMALS: i32 = 6;
 /// Largest difference between a time and a multiple of its last digit's unit, relative to this unit, that
 /// floating-point rounding explains: times since 1970 in seconds have only 52 binary digits.
 const OFF: f64 = 1e-2;
-/// Largest deviation of a printed time from an even grid, in excess of half the unit of the last digit and
-/// relative to this unit, at which the grid is still accepted.
+/// A grid is accepted if the differences between the printed times and the times of the grid span at most the unit of the
+/// last digit plus this fraction of the unit.
 const BEYOND: f64 = 0.02;
 const FEWEST: usize = 20;
 
-/// Result of the search for an even grid that explains the times of a recording. `AsTheyAre`: the times are
-/// already even, or no grid explains them. `On`: they are rounded times of this grid. `Unknown`: several rows
-/// share one time, so that the true times are unknown for the reason in the field.
+/// Result of the search for an even grid of which the times of a recording are rounded values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stamps {
+    /// The times are already even, or no even grid explains them.
     AsTheyAre,
+    /// The times are the rounded times of this grid.
     On(Grid),
+    /// Several rows have equal times, so that the times of the measurements are unknown. The text is the reason.
     Unknown(String),
 }
 
 /// Largest accepted relative error of the step of an even grid. The clock of every logger has an
 /// error of this size.
 const LARGEST_ERROR: f64 = 1e-4;
-/// Fraction of rows with the same time as the row before, above which the times are not the
-/// times of the measurements.
+/// If more than this fraction of the rows has the same time as the row before, the times cannot be the times of the
+/// measurements.
 const SHARED: f64 = 0.05;
 
 pub fn regular(time: &[f64]) -> Stamps {

@@ -124,8 +124,8 @@ fn truth(field: &str) -> Result<f64, Unreadable> {
     }
 }
 
-/// The lines of a file, split into fields; comments and empty lines are skipped. `count` is the number of
-/// lines so far, `comment` the fields of the last comment.
+/// Reader of the lines of a file, split into fields. It skips comments and empty lines. `count` is the number of lines read
+/// so far, and `comment` contains the fields of the last comment.
 struct Lines {
     reader: csv::Reader<File>,
     record: ByteRecord,

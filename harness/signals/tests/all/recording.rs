@@ -184,7 +184,7 @@ fn stored(name: &str) -> PathBuf {
 
 /// The files were written by several libraries (`data/make_parquet.py`).
 #[test]
-fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
+fn timestamps_of_a_parquet_file_become_seconds_since_the_first_row() {
     for name in ["ts_s", "ts_ms", "ts_us", "ts_ns", "pandas_ts", "polars_ts"] {
         let path = stored(&format!("{name}.parquet"));
         let step = if name == "ts_s" { 1.0 } else { 0.02 };

@@ -28,7 +28,7 @@ const REFUSED: f64 = 1e-3;
 #[derive(Clone, Default)]
 struct Truth {
     columns: String,
-    /// True times since the first row, s. Rows at the end of a file may be cut off.
+    /// True time of each row since the first row, s. The file may lack the last rows.
     time: Vec<f64>,
     is_unstated: bool,
 }
@@ -264,10 +264,11 @@ fn times_of_a_parquet_file_are_read_in_their_unit_or_refused() {
     judge("parquet", FEW, columns);
 }
 
-/// Reads 100,000 random text and Parquet files with times in different units; no file may be read in a wrong unit.
+/// Reads 100,000 random text files and as many Parquet files, in which the times have different units.
+/// `HUBSLOSH_FUZZ_INPUTS` sets another number.
 #[test]
 #[ignore = "takes long: .ci/fuzz-readers"]
-fn scale_campaign() {
+fn no_random_file_is_read_in_a_wrong_unit() {
     let count =
         std::env::var("HUBSLOSH_FUZZ_INPUTS").unwrap_or_default().parse().unwrap_or(100_000);
     judge("csv", count, text);
