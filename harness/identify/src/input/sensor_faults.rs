@@ -109,7 +109,6 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     found
 }
 
-/// Returns true if the largest and the smallest value are opposite numbers, as the ends of a sensor's range are.
 fn is_opposite(values: &[f64]) -> bool {
     let ends = values
         .iter()

@@ -104,7 +104,6 @@ impl Output {
     }
 }
 
-/// An initialised instance of the FMU, for Co-Simulation or for the host's solver.
 enum Initialised<'m> {
     Own(Instance<'m>),
     Host(exchange::Run<Box<Instance<'m>>>),
